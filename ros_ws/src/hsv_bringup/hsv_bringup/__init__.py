@@ -1,0 +1,1 @@
+"""Launch files, recorder and player of the bench."""

@@ -1,0 +1,22 @@
+from setuptools import setup
+
+setup(
+    name="hsv_bringup",
+    version="0.1.0",
+    packages=["hsv_bringup"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/hsv_bringup"]),
+        ("share/hsv_bringup", ["package.xml"]),
+        ("share/hsv_bringup/launch", ["launch/sil.launch.py"]),
+    ],
+    zip_safe=False,
+    maintainer="HSV bench maintainers",
+    maintainer_email="maintainers@hsv-bench.invalid",
+    description="Launch files, recorder and player of the bench.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "recorder = hsv_bringup.recorder:main",
+        ],
+    },
+)

@@ -1,0 +1,1 @@
+"""Notch filter, nominal trajectory and Tube-MPC controller."""

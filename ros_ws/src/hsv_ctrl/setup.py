@@ -1,0 +1,23 @@
+from setuptools import setup
+
+setup(
+    name="hsv_ctrl",
+    version="0.1.0",
+    packages=["hsv_ctrl"],
+    data_files=[
+        ("share/ament_index/resource_index/packages", ["resource/hsv_ctrl"]),
+        ("share/hsv_ctrl", ["package.xml"]),
+    ],
+    zip_safe=False,
+    maintainer="HSV bench maintainers",
+    maintainer_email="maintainers@hsv-bench.invalid",
+    description="Notch filter, nominal trajectory and Tube-MPC controller.",
+    license="Apache-2.0",
+    entry_points={
+        "console_scripts": [
+            "notch_filter = hsv_ctrl.notch_filter:main",
+            "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
+            "tube_mpc = hsv_ctrl.tube_mpc:main",
+        ],
+    },
+)

@@ -1,0 +1,1 @@
+"""What every node of the bench shares: lockstep links, parameters, message conversion, start and stop."""

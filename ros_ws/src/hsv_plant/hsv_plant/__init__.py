@@ -1,0 +1,1 @@
+"""The vehicle plant and the fault injector."""

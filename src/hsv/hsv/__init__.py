@@ -1,0 +1,1 @@
+"""Model, design, control and recording of a flexible air-breathing hypersonic vehicle; needs no ROS."""

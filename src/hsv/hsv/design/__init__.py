@@ -1,0 +1,1 @@
+"""Offline design: feedback and nominal gains by linear matrix inequalities, design files, certificates."""

@@ -1,0 +1,29 @@
+"""Exceptions of the library: one base class, and one subclass per cause that also inherits the standard one."""
+
+
+class HsvError(Exception):
+    """Base of everything this library raises on purpose; the message names the field, its value and what was due."""
+
+
+class QuantityError(HsvError, ValueError):
+    """A quantity whose text, unit or value is not acceptable."""
+
+
+class TrimError(HsvError, ValueError):
+    """No equilibrium with admissible inputs exists at the requested flight condition."""
+
+
+class ScenarioError(HsvError, ValueError):
+    """A scenario file that is missing or has a wrong field."""
+
+
+class DesignError(HsvError, ValueError):
+    """A design file, or a parameter of a controller, that is missing, malformed or does not stabilise."""
+
+
+class RecordingError(HsvError, ValueError):
+    """A bag that is missing, foreign or damaged."""
+
+
+class RunError(HsvError, RuntimeError):
+    """A flight that did not come to its planned end."""

@@ -1,0 +1,1 @@
+"""The fault vocabulary as pure functions of command and time."""

@@ -1,0 +1,1 @@
+"""Linear parameter-varying models: discretisation, polytopes, scheduling weights."""

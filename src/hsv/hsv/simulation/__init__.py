@@ -1,0 +1,1 @@
+"""Scenarios, the in-process closed loop and the metrics of a flight."""

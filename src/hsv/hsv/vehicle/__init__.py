@@ -1,0 +1,1 @@
+"""Equations of motion, trim and linearisation of the vehicle."""
