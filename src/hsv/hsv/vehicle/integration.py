@@ -1,0 +1,38 @@
+"""Classical Runge-Kutta integration of the equations of motion over one control period, compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hsv.vehicle.dynamics import N_STATES, derivative
+
+
+def workspace() -> np.ndarray:
+    """Return the scratch array (3, 9) that :func:`advance` wants, so that stepping allocates nothing."""
+    return np.empty((3, N_STATES))
+
+
+@njit(cache=True)
+def advance(x: Any, u: Any, p: Any, period: float, substeps: int, work: Any) -> None:
+    """Replace ``x`` (9) by the state one ``period`` (s) later, input ``u`` (2) held, by ``substeps`` steps of RK4."""
+    h = period / substeps
+    slope, point, total = work[0], work[1], work[2]
+    for _ in range(substeps):
+        derivative(x, u, p, slope)
+        for i in range(N_STATES):
+            total[i] = slope[i]
+            point[i] = x[i] + 0.5 * h * slope[i]
+        derivative(point, u, p, slope)
+        for i in range(N_STATES):
+            total[i] += 2.0 * slope[i]
+            point[i] = x[i] + 0.5 * h * slope[i]
+        derivative(point, u, p, slope)
+        for i in range(N_STATES):
+            total[i] += 2.0 * slope[i]
+            point[i] = x[i] + h * slope[i]
+        derivative(point, u, p, slope)
+        for i in range(N_STATES):
+            x[i] += h / 6.0 * (total[i] + slope[i])
