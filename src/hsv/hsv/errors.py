@@ -27,3 +27,7 @@ class RecordingError(HsvError, ValueError):
 
 class RunError(HsvError, RuntimeError):
     """A flight that did not come to its planned end."""
+
+
+class ParameterError(HsvError, ValueError):
+    """A parameter of a node or component with a wrong name, type, size or value."""

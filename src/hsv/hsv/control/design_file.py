@@ -1,0 +1,246 @@
+"""A controller design as it flies: read from, and written to, ROS 2 parameter YAML."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter, NotchSection
+from hsv.errors import DesignError, ParameterError
+from hsv.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
+from hsv.parameters import Parameter, check_all
+
+DESIGN_PARAMETERS = (
+    Parameter("design.name", "", "name of the design"),
+    Parameter("design.hash", "", "digest of all other parameters of the design, as it was written"),
+    *(p for p in NOTCH_PARAMETERS if p.name != "notch.enabled"),
+    Parameter("model.a", [], "state matrices A_i of all vertices, row by row, altitude-major (SI, discrete time)"),
+    Parameter("model.b", [], "input matrices B_i of all vertices, row by row, altitude-major (SI, discrete time)"),
+    Parameter("scheduling.interpolation", "linear", "weights between breakpoints", choices=INTERPOLATIONS),
+    Parameter("scheduling.altitude.breakpoints", [], "altitudes at which weights are given", "m"),
+    Parameter("scheduling.altitude.weights", [], "weights of the vertices in altitude, a row per breakpoint"),
+    Parameter("scheduling.velocity.breakpoints", [], "velocities at which weights are given", "m/s"),
+    Parameter("scheduling.velocity.weights", [], "weights of the vertices in velocity, a row per breakpoint"),
+    Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
+    Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
+    Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
+    Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
+    Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
+)
+"""What a design brings to the nodes."""
+
+N_STATES, N_INPUTS, N_RIGID = 9, 2, 5
+
+
+@dataclass(frozen=True)
+class ControlDesign:
+    """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.vehicle.dynamics`.
+
+    ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5) with x' P x <= 1 on the
+    rigid states, outermost first; ``input_minimum`` and ``input_maximum`` (2); ``notch``: the filter it was designed with.
+    """
+
+    name: str
+    period: float
+    polytope: Polytope
+    interpolation: str
+    altitude_samples: tuple[np.ndarray, np.ndarray]
+    velocity_samples: tuple[np.ndarray, np.ndarray]
+    feedback_gain: np.ndarray
+    nominal_gains: np.ndarray
+    nominal_ellipsoids: np.ndarray
+    input_minimum: np.ndarray
+    input_maximum: np.ndarray
+    notch: tuple[NotchSection, ...]
+    modified: bool = False
+    """Whether the parameters differ from those that were written (their digest does not match)."""
+
+    def to_parameters(self) -> dict[str, Any]:
+        """Return the flat ROS 2 parameters, digest included."""
+        values: dict[str, Any] = {
+            "design.name": self.name,
+            "period": self.period,
+            "notch.zero_frequency": np.array([s.zero_frequency for s in self.notch]),
+            "notch.zero_damping": np.array([s.zero_damping for s in self.notch]),
+            "notch.pole_frequency": np.array([s.pole_frequency for s in self.notch]),
+            "notch.pole_damping": np.array([s.pole_damping for s in self.notch]),
+            "model.a": self.polytope.A,
+            "model.b": self.polytope.B,
+            "scheduling.interpolation": self.interpolation,
+            "scheduling.altitude.breakpoints": self.altitude_samples[0],
+            "scheduling.altitude.weights": self.altitude_samples[1],
+            "scheduling.velocity.breakpoints": self.velocity_samples[0],
+            "scheduling.velocity.weights": self.velocity_samples[1],
+            "feedback.gain": self.feedback_gain,
+            "nominal.gains": self.nominal_gains,
+            "nominal.ellipsoids": self.nominal_ellipsoids,
+            "input.minimum": self.input_minimum,
+            "input.maximum": self.input_maximum,
+        }
+        flat = {
+            name: np.asarray(value, float).ravel().tolist() if isinstance(value, np.ndarray) else value
+            for name, value in values.items()
+        }
+        return {"design.hash": digest(flat), **flat}
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, Any]) -> ControlDesign:
+        """Return the design in ``values``, checked: types, sizes, finite numbers, and a stable closed loop.
+
+        Raises:
+            DesignError: Names the parameter that is wrong and what was expected.
+        """
+        try:
+            v = check_all(DESIGN_PARAMETERS, values)
+            notch = NotchFilter.from_parameters({**v, "notch.enabled": True})
+        except ParameterError as error:
+            raise DesignError(str(error)) from error
+        altitude = _samples(v, "scheduling.altitude")
+        velocity = _samples(v, "scheduling.velocity")
+        vertices = altitude[1].shape[1] * velocity[1].shape[1]
+        try:
+            axes = [axis_weights(*samples, v["scheduling.interpolation"]) for samples in (altitude, velocity)]
+        except DesignError as error:
+            raise DesignError(f"parameter scheduling.*: {error}") from error
+        A = _shaped(v, "model.a", (vertices, N_STATES, N_STATES))
+        B = _shaped(v, "model.b", (vertices, N_STATES, N_INPUTS))
+        F = _shaped(v, "feedback.gain", (N_INPUTS, N_STATES))
+        design = cls(
+            name=v["design.name"],
+            period=v["period"],
+            polytope=Polytope(A, B, axes[0], axes[1]),
+            interpolation=v["scheduling.interpolation"],
+            altitude_samples=altitude,
+            velocity_samples=velocity,
+            feedback_gain=F,
+            nominal_gains=_shaped(v, "nominal.gains", (-1, N_INPUTS, N_STATES)),
+            nominal_ellipsoids=_shaped(v, "nominal.ellipsoids", (-1, N_RIGID, N_RIGID)),
+            input_minimum=_shaped(v, "input.minimum", (N_INPUTS,)),
+            input_maximum=_shaped(v, "input.maximum", (N_INPUTS,)),
+            notch=notch.sections,
+            modified=v["design.hash"] != digest(v),
+        )
+        if len(design.nominal_gains) != len(design.nominal_ellipsoids):
+            raise DesignError(
+                f"parameter nominal.ellipsoids: {len(design.nominal_ellipsoids)} matrices, "
+                f"expected one per gain, {len(design.nominal_gains)}"
+            )
+        if not np.all(design.input_minimum < design.input_maximum):
+            raise DesignError("parameter input.minimum: expected values below input.maximum")
+        _check_stable("feedback.gain", A, B, F)
+        for gain in design.nominal_gains:
+            _check_stable("nominal.gains", A, B, gain)
+        return design
+
+
+def digest(values: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a design's flat parameters, ``design.hash`` left out."""
+    known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash"}
+    text = json.dumps({name: values[name] for name in sorted(known & values.keys())})
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def write_design(path: Path, design: ControlDesign, comment: str) -> None:
+    """Write ``design`` as ROS 2 parameter YAML for all nodes, with ``comment`` lines on top."""
+    tree: dict[str, Any] = {}
+    for name, value in design.to_parameters().items():
+        *groups, leaf = name.split(".")
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = value
+    header = "".join(f"# {line}\n" for line in comment.splitlines())
+    body = yaml.dump({"/**": {"ros__parameters": tree}}, sort_keys=False, default_flow_style=None, width=120)
+    path.write_text(header + body, encoding="utf-8")
+
+
+def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
+    """Return the flat parameters for ``node`` in a ROS 2 parameter YAML: its own section over the one for all nodes.
+
+    Raises:
+        DesignError: The file is missing or is not parameter YAML.
+    """
+    try:
+        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except OSError as error:
+        raise DesignError(f"design {str(path)!r}: cannot be read ({error.strerror}), expected a parameter file") from error
+    except yaml.YAMLError as error:
+        raise DesignError(f"design {str(path)!r}: {' '.join(str(error).split())}") from error
+    flat: dict[str, Any] = {}
+    for section in ("/**", node, f"/{node}"):
+        branch = tree.get(section) if isinstance(tree, dict) else None
+        if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
+            _flatten(branch["ros__parameters"], "", flat)
+    if not flat:
+        raise DesignError(f"design {str(path)!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
+    return flat
+
+
+def read_design(path: Path) -> ControlDesign:
+    """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
+    try:
+        return ControlDesign.from_parameters(read_parameters(path))
+    except DesignError as error:
+        message = str(error)
+        raise DesignError(message if message.startswith("design ") else f"{path}: {message}") from error
+
+
+def find_design(name: str) -> Path:
+    """Return the parameter file of a design given by path, or by name in ``HSV_DESIGN_PATH`` or the source checkout.
+
+    Raises:
+        DesignError: No such file.
+    """
+    if "/" in name or name.endswith(".yaml"):
+        candidates = [Path(name)]
+    else:
+        folders = [Path(folder) for folder in os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep) if folder]
+        # A source checkout, or a symlinked build of one, has the designs beside it.
+        folders += [parent / "offline_design" for parent in Path(__file__).resolve().parents]
+        candidates = [folder / f"{name}.yaml" for folder in folders]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    raise DesignError(f"design = {name!r}: no such file, expected a parameter file or a name in HSV_DESIGN_PATH")
+
+
+def _flatten(branch: Mapping[str, Any], prefix: str, into: dict[str, Any]) -> None:
+    for name, value in branch.items():
+        if isinstance(value, dict):
+            _flatten(value, f"{prefix}{name}.", into)
+        else:
+            into[f"{prefix}{name}"] = value
+
+
+def _shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.array(values[name], float)
+    unit = int(np.prod([n for n in shape if n > 0]))
+    if array.size == 0 or (array.size % unit if -1 in shape else array.size != unit):
+        expected = f"a multiple of {unit}" if -1 in shape else str(unit)
+        raise DesignError(f"parameter {name}: {array.size} values, expected {expected}")
+    return np.ascontiguousarray(array.reshape(shape))
+
+
+def _samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
+    breakpoints = np.array(values[f"{axis}.breakpoints"], float)
+    if len(breakpoints) < 2:
+        raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
+    return breakpoints, _shaped(values, f"{axis}.weights", (len(breakpoints), -1))
+
+
+def _check_stable(name: str, A: np.ndarray, B: np.ndarray, gain: np.ndarray) -> None:
+    # The flexible states follow the rigid ones and have poles of their own: all nine must be inside the unit circle.
+    for vertex, (a, b) in enumerate(zip(A, B, strict=True)):
+        radius = float(np.max(np.abs(np.linalg.eigvals(a + b @ gain))))
+        if not radius < 1.0:
+            raise DesignError(
+                f"parameter {name}: spectral radius {radius:.6f} of the closed loop at vertex {vertex}, expected below 1"
+            )

@@ -1,0 +1,150 @@
+"""Notch filter on the pitch-rate channel (paper eq. 38-39), discretised by the prewarped bilinear rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numba import njit
+from scipy.signal import cont2discrete, tf2ss
+
+from hsv.errors import ParameterError
+from hsv.parameters import Parameter, check_all
+
+MAX_SECTIONS = 4
+
+NOTCH_PARAMETERS = (
+    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    Parameter("notch.enabled", True, "false: the pitch rate passes unfiltered"),
+    Parameter("notch.zero_frequency", [15.0], "centre of the notch, one value per section", "rad/s", 0.1, 1e3),
+    Parameter("notch.zero_damping", [0.02], "damping ratio of the zeros: smaller is deeper", "", 0.0, 10.0),
+    Parameter("notch.pole_frequency", [15.0], "natural frequency of the poles", "rad/s", 0.1, 1e3),
+    Parameter("notch.pole_damping", [0.5], "damping ratio of the poles: larger is wider", "", 1e-3, 10.0),
+)
+
+
+@dataclass(frozen=True)
+class NotchSection:
+    """One second-order section (paper eq. 38); frequencies in rad/s, damping ratios dimensionless."""
+
+    zero_frequency: float
+    zero_damping: float
+    pole_frequency: float
+    pole_damping: float
+
+    def transfer_function(self) -> tuple[list[float], list[float]]:
+        """Return numerator and denominator in s, highest power first, with unit gain at zero frequency."""
+        return (
+            [1.0 / self.zero_frequency**2, 2.0 * self.zero_damping / self.zero_frequency, 1.0],
+            [1.0 / self.pole_frequency**2, 2.0 * self.pole_damping / self.pole_frequency, 1.0],
+        )
+
+    def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Return A (2, 2), B (2), C (2), D of the continuous filter (paper eq. 39), controller canonical form."""
+        A, B, C, D = tf2ss(*self.transfer_function())
+        return A, B[:, 0], C[0], float(D[0, 0])
+
+
+class NotchData(NamedTuple):
+    """Discrete sections in series for compiled functions: A (n, 2, 2), B, C, G (n, 2), D (n); G: state at rest per input."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    G: np.ndarray
+
+
+def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
+    """Return the sections discretised at ``period`` (s), each prewarped at its centre, so that the notch stays there.
+
+    Raises:
+        ParameterError: A centre frequency at or above the Nyquist frequency.
+    """
+    n = len(sections)
+    data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
+    for i, section in enumerate(sections):
+        angle = section.zero_frequency * period / 2.0
+        if angle >= math.pi / 2.0:
+            raise ParameterError(
+                f"parameter notch.zero_frequency[{i}] = {section.zero_frequency}: "
+                f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
+            )
+        A, B, C, D = section.state_space()
+        warped = 2.0 * math.tan(angle) / section.zero_frequency
+        Ad, Bd, Cd, Dd, _ = cont2discrete((A, B[:, None], C[None, :], [[D]]), warped, method="bilinear")
+        data.A[i], data.B[i], data.C[i], data.D[i] = Ad, Bd[:, 0], Cd[0], Dd[0, 0]
+        data.G[i] = np.linalg.solve(np.eye(2) - Ad, Bd[:, 0])
+    return data
+
+
+@njit(cache=True)
+def rest(data: Any, value: float, state: np.ndarray) -> None:
+    """Write into ``state`` (2 n) the equilibrium of all sections for a constant input ``value``."""
+    for i in range(len(data.D)):
+        state[2 * i] = data.G[i, 0] * value
+        state[2 * i + 1] = data.G[i, 1] * value
+
+
+@njit(cache=True)
+def filter_step(data: Any, state: np.ndarray, value: float) -> float:
+    """Return the filtered ``value`` from ``state`` (2 n), then update ``state``: y = C s + D v, s = A s + B v."""
+    for i in range(len(data.D)):
+        a, b = state[2 * i], state[2 * i + 1]
+        output = data.C[i, 0] * a + data.C[i, 1] * b + data.D[i] * value
+        state[2 * i] = data.A[i, 0, 0] * a + data.A[i, 0, 1] * b + data.B[i, 0] * value
+        state[2 * i + 1] = data.A[i, 1, 0] * a + data.A[i, 1, 1] * b + data.B[i, 1] * value
+        value = output
+    return value
+
+
+@dataclass(frozen=True)
+class NotchResult:
+    """``filtered_pitch_rate`` (rad/s) and the filter states (2 n) before the update of this step."""
+
+    filtered_pitch_rate: float
+    filter_state: np.ndarray
+
+
+class NotchFilter:
+    """Sections in series on the pitch rate; without sections the pitch rate passes."""
+
+    def __init__(self, sections: Sequence[NotchSection], period: float) -> None:
+        self.sections = tuple(sections)
+        self.data = discretise(sections, period)
+        self._state = np.zeros(2 * len(sections))
+        self._started = False
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+        """Build from the parameters of :data:`NOTCH_PARAMETERS`.
+
+        Raises:
+            ParameterError: A wrong value, or arrays of different lengths.
+        """
+        v = check_all(NOTCH_PARAMETERS, values)
+        columns = [v[f"notch.{name}"] for name in ("zero_frequency", "zero_damping", "pole_frequency", "pole_damping")]
+        n = len(columns[0])
+        for parameter, column in zip(NOTCH_PARAMETERS[2:], columns, strict=True):
+            if len(column) != n or not 1 <= n <= MAX_SECTIONS:
+                raise ParameterError(
+                    f"parameter {parameter.name}: {len(column)} values, "
+                    f"expected as many as notch.zero_frequency, 1 to {MAX_SECTIONS}"
+                )
+        sections = [NotchSection(*row) for row in zip(*columns, strict=True)] if v["notch.enabled"] else []
+        return cls(sections, v["period"])
+
+    def reset(self) -> None:
+        """Forget the past: the next step starts at rest for its own input."""
+        self._started = False
+
+    def step(self, pitch_rate: float) -> NotchResult:
+        """Filter the next ``pitch_rate`` (rad/s)."""
+        if not self._started:
+            rest(self.data, pitch_rate, self._state)
+            self._started = True
+        before = self._state.copy()
+        return NotchResult(filter_step(self.data, self._state, pitch_rate), before)

@@ -1,0 +1,199 @@
+"""Actuator faults: one table of types, a schedule of faults, and the object that applies it step by step."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numba import njit
+
+from hsv.errors import ParameterError
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import INPUT_NAMES
+
+NEVER = 2**62
+"""A step that is not reached."""
+
+
+@dataclass(frozen=True)
+class FaultType:
+    """One kind of fault: how it is coded for :func:`faulty`, what its value means and which values it admits."""
+
+    code: int
+    meaning: str
+    minimum: float
+    maximum: float
+
+
+FAULT_TYPES = {
+    "loss_of_effectiveness": FaultType(0, "the actuator moves by value times the command (paper eq. 15)", 0.0, 1.0),
+}
+"""The vocabulary: parser, help text and documentation are made from it."""
+
+
+@njit(cache=True)
+def faulty(code: int, value: float, command: float) -> float:
+    """Return what the actuator does with ``command`` under a fault of type ``code``."""
+    if code == 0:
+        return value * command
+    return command
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of one channel of the control input.
+
+    Raises:
+        ParameterError: Unknown channel or type, or a value the type does not admit.
+    """
+
+    channel: str
+    type: str
+    value: float
+
+    def __post_init__(self) -> None:
+        if self.channel not in INPUT_NAMES:
+            raise ParameterError(f"fault.channel = {self.channel!r}: expected one of {', '.join(INPUT_NAMES)}")
+        if self.type not in FAULT_TYPES:
+            raise ParameterError(f"fault.type = {self.type!r}: expected one of {', '.join(FAULT_TYPES)}")
+        kind = FAULT_TYPES[self.type]
+        if not (math.isfinite(self.value) and kind.minimum <= self.value <= kind.maximum):
+            raise ParameterError(
+                f"fault.value = {self.value!r}: expected {kind.minimum:g} to {kind.maximum:g} for {self.type}"
+            )
+
+
+class FaultSchedule(NamedTuple):
+    """Faults for compiled functions, a row each: steps [start, stop), channel, type code, value; later rows win."""
+
+    start: np.ndarray
+    stop: np.ndarray
+    channel: np.ndarray
+    code: np.ndarray
+    value: np.ndarray
+
+
+@njit(cache=True)
+def apply_faults(schedule: Any, step: int, command: np.ndarray, actuator: np.ndarray) -> None:
+    """Write into ``actuator`` (2) what becomes of ``command`` (2) in this step."""
+    actuator[:] = command
+    for row in range(len(schedule.start)):
+        if schedule.start[row] <= step < schedule.stop[row]:
+            channel = schedule.channel[row]
+            actuator[channel] = faulty(schedule.code[row], schedule.value[row], command[channel])
+
+
+FAULT_PARAMETERS = (
+    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    Parameter("fault.channels", ["none"], "actuator of each scheduled fault, or one 'none'"),
+    Parameter("fault.types", ["none"], "type of each scheduled fault: " + ", ".join(FAULT_TYPES)),
+    Parameter("fault.values", [0.0], "value of each scheduled fault"),
+    Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
+)
+
+
+@dataclass
+class _Entry:
+    fault: Fault
+    start: int
+    stop: int = NEVER
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """What the actuators do (2), and the faults acting in this step."""
+
+    actuator: np.ndarray
+    active: tuple[Fault, ...]
+
+
+@dataclass
+class FaultInjector:
+    """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on."""
+
+    scheduled: list[tuple[Fault, int]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.reset()
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+        """Build from :data:`FAULT_PARAMETERS`.
+
+        Raises:
+            ParameterError: A wrong value, or arrays of different lengths.
+        """
+        v = check_all(FAULT_PARAMETERS, values)
+        names = ("channels", "types", "values", "starts")
+        columns = [v[f"fault.{name}"] for name in names]
+        if columns[0] == ["none"]:
+            return cls()
+        for name, column in zip(names, columns, strict=True):
+            if len(column) != len(columns[0]):
+                raise ParameterError(
+                    f"parameter fault.{name}: {len(column)} values, expected as many as fault.channels, {len(columns[0])}"
+                )
+        return cls(
+            [
+                (Fault(channel, kind, value), first_step(start, v["period"]))
+                for channel, kind, value, start in zip(*columns, strict=True)
+            ]
+        )
+
+    def reset(self) -> None:
+        """Return to the schedule: what was injected or cleared in flight is forgotten."""
+        self._entries = [_Entry(fault, start) for fault, start in self.scheduled]
+        self._next = 0
+        self._compile()
+
+    @property
+    def schedule(self) -> FaultSchedule:
+        """The faults known now, for compiled functions."""
+        return self._schedule
+
+    def inject(self, fault: Fault) -> int:
+        """Start ``fault`` with the next step, in place of what acts on its channel; return that step."""
+        self.clear(fault.channel)
+        self._entries.append(_Entry(fault, self._next))
+        self._compile()
+        return self._next
+
+    def clear(self, channel: str = "") -> int:
+        """End the faults acting on ``channel`` (all channels if empty) with the next step; return that step.
+
+        Raises:
+            ParameterError: Unknown channel.
+        """
+        if channel and channel not in INPUT_NAMES:
+            raise ParameterError(f"channel = {channel!r}: expected one of {', '.join(INPUT_NAMES)}, or empty for all")
+        for entry in self._entries:
+            if entry.start <= self._next < entry.stop and channel in ("", entry.fault.channel):
+                entry.stop = self._next
+        self._compile()
+        return self._next
+
+    def step(self, step: int, command: np.ndarray) -> FaultResult:
+        """Return what becomes of ``command`` (2) in ``step``."""
+        actuator = np.empty(2)
+        apply_faults(self._schedule, step, command, actuator)
+        self._next = step + 1
+        acting = {e.fault.channel: e.fault for e in self._entries if e.start <= step < e.stop}
+        return FaultResult(actuator, tuple(acting.values()))
+
+    def _compile(self) -> None:
+        rows = self._entries
+        self._schedule = FaultSchedule(
+            np.array([e.start for e in rows], np.int64),
+            np.array([e.stop for e in rows], np.int64),
+            np.array([INPUT_NAMES.index(e.fault.channel) for e in rows], np.int64),
+            np.array([FAULT_TYPES[e.fault.type].code for e in rows], np.int64),
+            np.array([e.fault.value for e in rows], np.float64),
+        )
+
+
+def first_step(time: float, period: float) -> int:
+    """Return the first step k with k * ``period`` >= ``time`` (s), rounding of the division allowed for."""
+    return math.ceil(time / period - 1e-9)

@@ -1,0 +1,100 @@
+"""Parameters of the components: one table a component, from which nodes declare and files are checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hsv.errors import ParameterError
+
+Value = bool | int | float | str | list[float] | list[str] | list[int]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter; its type is that of ``default``."""
+
+    name: str
+    """Dotted name, as in ROS 2."""
+    default: Value
+    """Value where nothing else is given; an empty list of floats stands for an array that a design must bring."""
+    description: str
+    """What it is, in a few words."""
+    unit: str = ""
+    """SI unit, empty where it has none."""
+    minimum: float = -math.inf
+    """Least admissible number (of every element)."""
+    maximum: float = math.inf
+    """Largest admissible number (of every element)."""
+    choices: tuple[str, ...] = ()
+    """Admissible words; empty: any."""
+    read_only: bool = True
+    """Whether it is fixed once the node has started."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the ROS 2 parameter type, e.g. ``double_array``."""
+        if isinstance(self.default, list):
+            return "string_array" if self.default and isinstance(self.default[0], str) else "double_array"
+        return {bool: "bool", int: "integer", float: "double", str: "string"}[type(self.default)]
+
+    @property
+    def constraint(self) -> str:
+        """What a value must satisfy, in words."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        low, high = self.minimum, self.maximum
+        words = {
+            (False, False): "",
+            (True, False): f" of at least {low:.10g}",
+            (False, True): f" of at most {high:.10g}",
+            (True, True): f" from {low:.10g} to {high:.10g}",
+        }[(math.isfinite(low), math.isfinite(high))]
+        return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}"
+
+    def check(self, value: object) -> Any:
+        """Return ``value`` if it is admissible.
+
+        Raises:
+            ParameterError: Wrong type (an integer is not a double), not finite, outside the range or the choices.
+        """
+        wrong = ParameterError(f"parameter {self.name} = {_shown(value)}: expected {self.constraint}")
+        if self.kind.endswith("_array"):
+            if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
+                raise wrong
+            element = str if self.kind == "string_array" else float
+            values = list(value)  # type: ignore[arg-type]
+            for index, entry in enumerate(values):
+                if not isinstance(entry, element) or (element is float and not self._in_range(entry)):
+                    raise ParameterError(
+                        f"parameter {self.name}[{index}] = {_shown(entry)}: expected {self.constraint}"
+                    )
+            return values
+        expected = {"bool": bool, "integer": int, "double": float, "string": str}[self.kind]
+        if not isinstance(value, expected) or (expected is int and isinstance(value, bool)):
+            raise wrong
+        if isinstance(value, str):
+            if self.choices and value not in self.choices:
+                raise wrong
+        elif not isinstance(value, bool) and not self._in_range(value):
+            raise wrong
+        return value
+
+    def _in_range(self, value: object) -> bool:
+        return isinstance(value, int | float) and math.isfinite(value) and self.minimum <= value <= self.maximum
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[str, Any]:
+    """Return the values of a whole table, defaults filled in; names that are not in the table are left out.
+
+    Raises:
+        ParameterError: A value that its parameter does not admit.
+    """
+    return {p.name: p.check(values.get(p.name, p.default)) for p in table}

@@ -1,0 +1,140 @@
+"""The closed loop in one process, compiled: the same arithmetic, in the same order, as the graph of nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance, nominal_input
+from hsv.control.notch_filter import NotchFilter, filter_step, rest
+from hsv.control.tube_law import TubeLaw, tube_input
+from hsv.faults.actuator import FaultInjector, apply_faults
+from hsv.vehicle.envelope import in_model_range
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.plant import FlightStatus, Plant
+
+
+@dataclass
+class Components:
+    """The five parts of the loop, as the five nodes hold them."""
+
+    plant: Plant
+    notch_filter: NotchFilter
+    nominal_trajectory: NominalTrajectory
+    tube_law: TubeLaw
+    fault_injector: FaultInjector
+
+
+class History(NamedTuple):
+    """Rows k = 0 ... n of everything that a flight produced, SI."""
+
+    state: np.ndarray
+    """x (n + 1, 9)"""
+    filtered_pitch_rate: np.ndarray
+    """q_f (n + 1), rad/s"""
+    deviation: np.ndarray
+    """x_n (n + 1, 9)"""
+    nominal_input: np.ndarray
+    """u_n (n + 1, 2)"""
+    gain_index: np.ndarray
+    """(n + 1)"""
+    u_unsaturated: np.ndarray
+    """(n + 1, 2)"""
+    command: np.ndarray
+    """(n + 1, 2)"""
+    actuator: np.ndarray
+    """(n + 1, 2)"""
+
+    @classmethod
+    def empty(cls, rows: int) -> History:
+        """Return room for ``rows`` steps."""
+        widths = (9, 0, 9, 2, 0, 2, 2, 2)
+        return cls(*(np.empty((rows, w)) if w else np.empty(rows) for w in widths))
+
+
+@njit(cache=True, nogil=True)
+def _fly(
+    vehicle: Any,
+    period: float,
+    substeps: int,
+    notch: Any,
+    nominal: Any,
+    tube: Any,
+    faults: Any,
+    x_r: np.ndarray,
+    u_r: np.ndarray,
+    x: np.ndarray,
+    work: np.ndarray,
+    history: Any,
+) -> int:
+    """Fly as many steps as ``history`` has rows, from ``x``; return the number of rows written (fewer: diverged)."""
+    n, m = len(x), 2
+    filter_state = np.zeros(2 * len(notch.D))
+    rest(notch, x[4], filter_state)
+    x_n = x - x_r
+    S, new = np.empty(n * (n + m)), np.empty(n)
+    u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    rows = len(history.filtered_pitch_rate)
+    for k in range(rows):
+        if k > 0:
+            advance(x, actuator, vehicle, period, substeps, work)
+        history.state[k] = x
+        q_f = filter_step(notch, filter_state, x[4])
+        history.filtered_pitch_rate[k] = q_f
+        history.deviation[k] = x_n
+        index, _ = nominal_input(nominal, x_n, u_n)
+        history.gain_index[k] = index
+        history.nominal_input[k] = u_n
+        tube_input(tube, x, q_f, x_r, x_n, u_n, u_r, u_feedback, total, u)
+        history.u_unsaturated[k] = total
+        history.command[k] = u
+        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, S, new)
+        apply_faults(faults, k, u, actuator)
+        history.actuator[k] = actuator
+        if not in_model_range(x):
+            return k + 1
+    return rows
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight: ``period`` (s), what happened at each step, the reference x_r (9), u_r (2), and how it ended."""
+
+    period: float
+    history: History
+    reference: np.ndarray
+    reference_input: np.ndarray
+    status: FlightStatus
+
+    @property
+    def time(self) -> np.ndarray:
+        """Simulated time (n + 1), s."""
+        return np.arange(len(self.history.state)) * self.period
+
+
+def fly(components: Components) -> Flight:
+    """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges."""
+    plant, nominal = components.plant, components.nominal_trajectory
+    reference = nominal.reference
+    history = History.empty(plant.steps + 1)
+    rows = _fly(
+        plant.vehicle,
+        plant.period,
+        plant.substeps,
+        components.notch_filter.data,
+        nominal.data,
+        components.tube_law.data,
+        components.fault_injector.schedule,
+        reference.state,
+        reference.input,
+        plant.initial.state.copy(),
+        workspace(),
+        history,
+    )
+    history = History(*(column[:rows] for column in history))
+    diverged = not in_model_range(history.state[-1])
+    status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
+    return Flight(plant.period, history, reference.state, reference.input, status)

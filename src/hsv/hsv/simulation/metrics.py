@@ -1,0 +1,120 @@
+"""The metrics of a flight: one implementation, for recorded flights and for those flown in process."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SETTLING_BAND = 0.02
+"""Share of the step within which a response counts as settled."""
+
+DECAY_LEVEL = 0.05
+"""Share of its own post-fault peak below which an elastic rate counts as decayed."""
+
+PRE_FAULT_WINDOW = 5.0
+"""Seconds before the fault over which the pre-fault mean is taken."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """Unit (SI) and meaning of a metric."""
+
+    unit: str
+    meaning: str
+
+
+METRICS = {
+    "altitude_rise_time": Metric("s", "10 % to 90 % of the altitude step"),
+    "altitude_settling_time": Metric("s", "last time before the fault that altitude is more than 2 % of the step off"),
+    "altitude_overshoot": Metric("1", "largest excess over the altitude step before the fault, share of the step"),
+    "altitude_integral_absolute_error": Metric("m s", "integral of |h - h_r|"),
+    "altitude_end_error": Metric("m", "h - h_r at the end"),
+    "velocity_rise_time": Metric("s", "10 % to 90 % of the velocity step"),
+    "velocity_settling_time": Metric("s", "last time before the fault that velocity is more than 2 % of the step off"),
+    "velocity_overshoot": Metric("1", "largest excess over the velocity step before the fault, share of the step"),
+    "velocity_integral_absolute_error": Metric("m", "integral of |V - V_r|"),
+    "velocity_end_error": Metric("m/s", "V - V_r at the end"),
+    "post_fault_attitude_deviation": Metric(
+        "rad", "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before"
+    ),
+    "post_fault_attitude_from_nominal": Metric(
+        "rad", "largest difference of angle of attack or pitch angle after the fault from reference + nominal"
+    ),
+    "attitude_from_nominal": Metric("rad", "the same over the whole flight"),
+    "elastic_rate_1_decay_time": Metric("s", "time after the fault until |rate| stays below 5 % of its post-fault peak"),
+    "elastic_rate_2_decay_time": Metric("s", "the same for the second mode"),
+    "elastic_decay_time": Metric("s", "the slower of the two"),
+    "fuel_equivalence_ratio_minimum": Metric("1", "least command"),
+    "fuel_equivalence_ratio_maximum": Metric("1", "largest command"),
+    "elevator_deflection_minimum": Metric("rad", "least command"),
+    "elevator_deflection_maximum": Metric("rad", "largest command"),
+    "saturated_steps": Metric("1", "steps in which a command was limited"),
+}
+"""Every metric, in the order in which they are printed."""
+
+
+@dataclass(frozen=True)
+class FlightData:
+    """What the metrics are made of, rows k = 0 ... n: time (s), x and x_r, x_n (9), commands (2), limited or not (2)."""
+
+    time: np.ndarray
+    state: np.ndarray
+    reference: np.ndarray
+    deviation: np.ndarray
+    command: np.ndarray
+    saturated: np.ndarray
+    fault_start: float | None
+    """Time of the first fault (s), ``None`` without one."""
+
+
+def flight_metrics(flight: FlightData) -> dict[str, float]:
+    """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
+    values: dict[str, float] = {}
+    time = flight.time
+    before = np.ones_like(time, bool) if flight.fault_start is None else time < flight.fault_start - 1e-9
+    for axis, column in (("altitude", 0), ("velocity", 1)):
+        error = flight.state[:, column] - flight.reference[:, column]
+        values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
+        values[f"{axis}_integral_absolute_error"] = float(np.trapezoid(np.abs(error), time))
+        values[f"{axis}_end_error"] = float(error[-1])
+    tube_error = np.abs(flight.state - flight.reference - flight.deviation)[:, 2:4]
+    values["attitude_from_nominal"] = float(np.max(tube_error))
+    after = ~before
+    if after.any() and before.any():
+        start = time[after][0]
+        window = before & (time >= start - PRE_FAULT_WINDOW - 1e-9)
+        attitude = flight.state[:, 2:4]
+        values["post_fault_attitude_deviation"] = float(
+            np.max(np.abs(attitude[after] - attitude[window].mean(axis=0)))
+        )
+        values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[after]))
+        for mode, column in ((1, 6), (2, 8)):
+            values[f"elastic_rate_{mode}_decay_time"] = _decay_time(
+                time[after] - start, np.abs(flight.state[after, column])
+            )
+        values["elastic_decay_time"] = max(values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"])
+    for name, column in (("fuel_equivalence_ratio", 0), ("elevator_deflection", 1)):
+        values[f"{name}_minimum"] = float(np.min(flight.command[:, column]))
+        values[f"{name}_maximum"] = float(np.max(flight.command[:, column]))
+    values["saturated_steps"] = float(np.count_nonzero(np.any(flight.saturated, axis=1)))
+    return {name: values[name] for name in METRICS if name in values}
+
+
+def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
+    """Return rise time, settling time and overshoot of a step whose size is the first error."""
+    if len(time) < 2 or abs(error[0]) < 1e-6:
+        return {}
+    done = 1.0 - error / error[0]
+    values = {"overshoot": max(0.0, float(np.max(done) - 1.0))}
+    if np.any(done >= 0.9):
+        values["rise_time"] = float(time[np.argmax(done >= 0.9)] - time[np.argmax(done >= 0.1)])
+    off = np.nonzero(np.abs(done - 1.0) > SETTLING_BAND)[0]
+    if off[-1] + 1 < len(time):
+        values["settling_time"] = float(time[off[-1] + 1])
+    return values
+
+
+def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
+    """Return the last time at which ``magnitude`` exceeds the decay level of its own peak."""
+    return float(time[np.nonzero(magnitude > DECAY_LEVEL * np.max(magnitude))[0][-1]]) if magnitude.any() else 0.0

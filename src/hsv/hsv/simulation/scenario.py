@@ -1,0 +1,219 @@
+"""A flight to fly, as written in a TOML file with units, and as the parameters that the components take."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
+
+from hsv.errors import HsvError, QuantityError, ScenarioError
+from hsv.faults.actuator import Fault
+from hsv.simulation.metrics import METRICS
+from hsv.units import parse_quantity
+from hsv.vehicle.envelope import ALTITUDE_RANGE, FOOT, VELOCITY_RANGE
+from hsv.vehicle.parameters import uncertainty_bounds
+
+
+def _quantity(unit: str, low: float | None = None, high: float | None = None, shown: str = "") -> BeforeValidator:
+    def parse(text: object, info: ValidationInfo) -> float:
+        value = parse_quantity(text, unit, str(info.field_name))
+        if (low is not None and value < low) or (high is not None and value > high):
+            raise QuantityError(f"{info.field_name} = {text!r}: expected {shown}")
+        return value
+
+    return BeforeValidator(parse)
+
+
+def _range(limits: tuple[float, float], unit: str) -> str:
+    return f"{limits[0] / FOOT:.0f} {unit} to {limits[1] / FOOT:.0f} {unit}, the flight envelope"
+
+
+Altitude = Annotated[float, _quantity("m", *ALTITUDE_RANGE, shown=_range(ALTITUDE_RANGE, "ft"))]
+Velocity = Annotated[float, _quantity("m/s", *VELOCITY_RANGE, shown=_range(VELOCITY_RANGE, "ft/s"))]
+Time = Annotated[float, _quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class VehicleTable(_Table):
+    """The simulated vehicle."""
+
+    model: Literal["CM", "DM"] = "CM"
+    coupling: Literal["paper_like", "derived"] = "paper_like"
+    perturbation: dict[str, Annotated[float, _quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]] = {}
+
+
+class InitialTable(_Table):
+    """Where the flight starts, in trim."""
+
+    altitude: Altitude
+    velocity: Velocity
+
+
+class CommandTable(_Table):
+    """Steps of the commands at t = 0."""
+
+    altitude_step: Annotated[float, _quantity("m")] = 0.0
+    velocity_step: Annotated[float, _quantity("m/s")] = 0.0
+
+
+class NotchTable(_Table):
+    """The notch filter in flight; its parameters are the design's."""
+
+    enabled: bool = True
+
+
+class FaultTable(_Table):
+    """A scheduled fault."""
+
+    channel: str
+    type: str
+    value: Annotated[float, _quantity("1")]
+    start: Time
+
+
+class Scenario(_Table):
+    """A flight: vehicle, initial point, commands, controller design, faults, and what is expected of it."""
+
+    name: str
+    title: str
+    design: str = "baseline"
+    duration: Time
+    vehicle: VehicleTable = VehicleTable()
+    initial: InitialTable
+    command: CommandTable = CommandTable()
+    notch: NotchTable = NotchTable()
+    fault: tuple[FaultTable, ...] = ()
+    limits: dict[str, float] = Field(default_factory=dict)
+    """Largest magnitude expected of a metric, SI."""
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the flat parameters of this scenario; with those of its design they determine the flight."""
+        values: dict[str, Any] = {
+            "duration": self.duration,
+            "vehicle.model": self.vehicle.model,
+            "vehicle.coupling": self.vehicle.coupling,
+            "initial.altitude": self.initial.altitude,
+            "initial.velocity": self.initial.velocity,
+            "reference.altitude": self.initial.altitude + self.command.altitude_step,
+            "reference.velocity": self.initial.velocity + self.command.velocity_step,
+            "notch.enabled": self.notch.enabled,
+        }
+        values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
+        if self.fault:
+            values["fault.channels"] = [fault.channel for fault in self.fault]
+            values["fault.types"] = [fault.type for fault in self.fault]
+            values["fault.values"] = [fault.value for fault in self.fault]
+            values["fault.starts"] = [fault.start for fault in self.fault]
+        return values
+
+
+def scenario_names() -> list[str]:
+    """Return the names of the shipped scenarios."""
+    return sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml"))
+
+
+def scenario_text(name: str) -> str:
+    """Return the text of a shipped scenario (by name) or of a file (by path).
+
+    Raises:
+        ScenarioError: No such scenario or file.
+    """
+    if "/" in name or name.endswith(".toml"):
+        try:
+            return Path(name).read_text(encoding="utf-8")
+        except OSError as error:
+            raise ScenarioError(f"scenario {name!r}: cannot be read ({error.strerror}), expected a TOML file") from error
+    if name not in scenario_names():
+        raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
+    return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
+
+
+def load_scenario(name: str) -> Scenario:
+    """Return a shipped scenario (by name) or one from a file (by path).
+
+    Raises:
+        ScenarioError: Missing, or a field is wrong; the message names it, its value and what was expected.
+    """
+    return parse_scenario(scenario_text(name), Path(name).stem)
+
+
+def parse_scenario(text: str, name: str) -> Scenario:
+    """Return the scenario written in ``text``; errors as in :func:`load_scenario`."""
+    try:
+        table = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"scenario {name!r}: {error}") from error
+    try:
+        scenario = Scenario.model_validate({**table, "name": name, "limits": _limits(table.get("limits", {}))})
+        _check(scenario)
+    except ValidationError as error:
+        raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
+    except HsvError as error:
+        raise ScenarioError(f"scenario {name!r}: {error}") from error
+    return scenario
+
+
+def _shipped() -> Any:
+    return files("hsv.simulation").joinpath("scenarios")
+
+
+def _limits(table: object) -> dict[str, float]:
+    if not isinstance(table, dict):
+        raise ScenarioError(f"limits = {table!r}: expected a table of metrics")
+    for name in table:
+        if name not in METRICS:
+            raise ScenarioError(f"limits.{name}: no such metric, expected one of {', '.join(METRICS)}")
+    return {name: parse_quantity(value, METRICS[name].unit, f"limits.{name}") for name, value in table.items()}
+
+
+def _check(scenario: Scenario) -> None:
+    for name, value in scenario.vehicle.perturbation.items():
+        if name not in uncertainty_bounds():
+            expected = ", ".join(uncertainty_bounds())
+            raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
+    for fault in scenario.fault:
+        Fault(fault.channel, fault.type, fault.value)
+    for axis, limits, unit in (("altitude", ALTITUDE_RANGE, "ft"), ("velocity", VELOCITY_RANGE, "ft/s")):
+        start = getattr(scenario.initial, axis)
+        goal = start + getattr(scenario.command, f"{axis}_step")
+        if not limits[0] <= goal <= limits[1]:
+            raise ScenarioError(
+                f"command.{axis}_step leads to {goal / FOOT:.0f} {unit}: expected {_range(limits, unit)}"
+            )
+
+
+def _first_problem(error: ValidationError) -> str:
+    problem = error.errors()[0]
+    field = _dotted(problem["loc"])
+    if problem["type"] == "extra_forbidden":
+        return f"{field}: unknown key, expected one of {', '.join(_siblings(problem['loc']))}"
+    if problem["type"] == "missing":
+        return f"{field}: missing"
+    if problem["type"] == "value_error":
+        cause = str(problem["ctx"]["error"])
+        name = str(problem["loc"][-1])
+        return field + cause[len(name) :] if cause.startswith(f"{name} = ") else f"{field}: {cause}"
+    return f"{field} = {problem['input']!r}: {problem['msg'][0].lower()}{problem['msg'][1:]}"
+
+
+def _dotted(location: Iterable[int | str]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _siblings(location: tuple[int | str, ...]) -> list[str]:
+    model: Any = Scenario
+    for part in location[:-1]:
+        if isinstance(part, str):
+            annotation = model.model_fields[part].annotation
+            model = getattr(annotation, "__args__", (annotation,))[0] if not isinstance(annotation, type) else annotation
+    return [name for name in model.model_fields if name != "name"]

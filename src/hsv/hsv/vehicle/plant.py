@@ -1,0 +1,101 @@
+"""The simulated vehicle, one control period at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Self
+
+import numpy as np
+
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import forces
+from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE, in_model_range
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.parameters import COUPLING_SETS, MODELS, VehicleParameters, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.trim import Trim, trim
+
+
+class FlightStatus(IntEnum):
+    """Whether more states follow; values of VehicleState.status."""
+
+    RUNNING = 0
+    FINISHED = 1
+    DIVERGED = 2
+
+
+PLANT_PARAMETERS = (
+    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    Parameter("substeps", 2, "Runge-Kutta steps per control period", "", 1, 100),
+    Parameter("duration", 200.0, "simulated time to fly", "s", 0.0, 1e5),
+    Parameter("vehicle.model", "CM", "coupled model (paper eq. 1) or decoupled model (eq. 4)", choices=MODELS),
+    Parameter("vehicle.coupling", "paper_like", "set of inertial coupling", choices=COUPLING_SETS),
+    Parameter("initial.altitude", 26060.4, "altitude of the initial trim", "m", *ALTITUDE_RANGE),
+    Parameter("initial.velocity", 2407.92, "velocity of the initial trim", "m/s", *VELOCITY_RANGE),
+    *(
+        Parameter(f"vehicle.perturbation.{name}", 0.0, f"relative change of {name.replace('_', ' ')}", "", -0.9, 10.0)
+        for name in uncertainty_bounds()
+    ),
+)
+
+
+@dataclass(frozen=True)
+class PlantResult:
+    """One state: x (9), the forces lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa, and the status."""
+
+    step: int
+    state: np.ndarray
+    forces: tuple[float, float, float, float, float]
+    status: FlightStatus
+
+
+class Plant:
+    """The vehicle under held inputs. It starts in the trim of the *nominal* vehicle, perturbed or not."""
+
+    def __init__(
+        self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2
+    ) -> None:
+        self.vehicle = vehicle
+        self.initial = initial
+        self.period = period
+        self.steps = steps
+        self.substeps = substeps
+        self._work = workspace()
+        self.reset()
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+        """Build from :data:`PLANT_PARAMETERS`.
+
+        Raises:
+            ParameterError, TrimError: A wrong value, named.
+        """
+        v = check_all(PLANT_PARAMETERS, values)
+        nominal = vehicle_parameters(v["vehicle.coupling"])
+        if v["vehicle.model"] == "DM":
+            nominal = nominal.decoupled()
+        vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in uncertainty_bounds()})
+        initial = trim(nominal, v["initial.altitude"], v["initial.velocity"])
+        return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"])
+
+    def reset(self) -> PlantResult:
+        """Return to the initial trim; return that state."""
+        self._state = self.initial.state.copy()
+        self._step = 0
+        return self._result(self.initial.input)
+
+    def step(self, actuator: np.ndarray) -> PlantResult:
+        """Hold ``actuator`` (2) over one period and return the state at its end."""
+        advance(self._state, actuator, self.vehicle, self.period, self.substeps, self._work)
+        self._step += 1
+        return self._result(actuator)
+
+    def _result(self, held: np.ndarray) -> PlantResult:
+        if not in_model_range(self._state):
+            status = FlightStatus.DIVERGED
+        elif self._step >= self.steps:
+            status = FlightStatus.FINISHED
+        else:
+            status = FlightStatus.RUNNING
+        return PlantResult(self._step, self._state.copy(), forces(self._state, held, self.vehicle), status)
