@@ -1,0 +1,35 @@
+# The bench's commands. Each sets up what it needs first; "make" alone lists them.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help setup run test lint clean
+
+SCENARIO ?= case1
+ARGS ?=
+IN_ENVIRONMENT := source ./env.sh && exec
+PYTHON_SOURCES := src ros_ws/src tests tools
+
+help: ## list these commands
+	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
+
+setup: ## set everything up (PYTHON=/path/to/python3 chooses the interpreter)
+	@python="$${PYTHON:-python3}"; \
+	if ! command -v "$$python" > /dev/null; then \
+		echo "make setup: there is no $$python: sudo apt-get install python3 python3-venv python3-dev g++ make cmake" >&2; \
+		exit 1; \
+	fi; \
+	exec "$$python" tools/setup.py
+
+run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
+	@$(IN_ENVIRONMENT) hsv run $(SCENARIO) $(ARGS)
+
+test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
+	@$(IN_ENVIRONMENT) python3 -m pytest $(ARGS)
+
+lint: setup ## set up, then check style and types
+	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
+
+clean: ## remove what set-up and tools made; recorded runs stay
+	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

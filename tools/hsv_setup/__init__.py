@@ -1,0 +1,1 @@
+"""Sets the bench up: virtual environment, ROS 2 packages, workspace, compiled caches."""

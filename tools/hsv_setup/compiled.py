@@ -1,0 +1,50 @@
+"""The stage that compiles the numerical code ahead of its first use.
+
+Five nodes that start at once on two cores should not each compile it. numba notices a changed source file, but not
+that a function it calls from another file has changed: so all caches go when any of the compiled sources changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from hsv_setup.console import Stage
+from hsv_setup.environment import PYTHON
+from hsv_setup.paths import ROOT, STAMPS, fingerprint, read_stamp, write_stamp
+
+_LIBRARY = ROOT / "src" / "hsv" / "hsv"
+_PROGRAM = _LIBRARY / "warm.py"
+_STAMP = STAMPS / "compiled"
+
+
+def _sources() -> list[Path]:
+    return [path for path in sorted(_LIBRARY.rglob("*.py")) if "numba" in path.read_text()]
+
+
+def _caches() -> list[Path]:
+    return [path for suffix in ("nbi", "nbc") for path in _LIBRARY.rglob(f"__pycache__/*.{suffix}")]
+
+
+def _key() -> str:
+    parts: list[str | bytes] = [read_stamp(STAMPS / "identity"), read_stamp(STAMPS / "environment")]
+    for path in _sources():
+        parts += [str(path.relative_to(_LIBRARY)), path.read_bytes()]
+    return fingerprint(*parts)
+
+
+def is_current() -> bool:
+    """Return whether the compiled caches fit the sources, or there is nothing to compile."""
+    return not _PROGRAM.exists() or (read_stamp(_STAMP) == _key() and bool(_caches()))
+
+
+def warm(env: Mapping[str, str], stage: Stage) -> None:
+    """Compile everything once, as `python -m hsv.warm` does it.
+
+    Raises:
+        SetupError: the numerical code does not compile.
+    """
+    for path in _caches():
+        path.unlink()
+    stage.run(["bash", "-c", 'source ./env.sh && exec "$0" -m hsv.warm', PYTHON], env)
+    write_stamp(_STAMP, _key())

@@ -1,0 +1,104 @@
+"""The stage that makes the virtual environment and installs the pinned packages into it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+
+from hsv_setup.console import Stage
+from hsv_setup.interpreter import Interpreter
+from hsv_setup.paths import BUILD, INSTALL, ROOT, STAMPS, VENV, fingerprint, read_stamp, write_stamp
+from hsv_setup.relocate import relocate
+from hsv_setup.routes import Route
+
+PYTHON = VENV / "bin" / "python3"
+_IDENTITY, _CONTENTS, _ROUTE = STAMPS / "identity", STAMPS / "environment", STAMPS / "route"
+_HERE = Path(__file__).parent
+
+
+def identity(route: Route, python: Interpreter) -> str:
+    """Return what an environment cannot outlive: its interpreter, its place, its route."""
+    return fingerprint(route.name, python.executable, python.version_text, str(ROOT))
+
+
+def contents(route: Route) -> str:
+    """Return a fingerprint of all that decides what is installed."""
+    files = [ROOT / name for name in (*route.requirements, route.constraints)]
+    files += [_HERE / "environment.py", _HERE / "relocate.py"]
+    return fingerprint(*(path.read_bytes() for path in files))
+
+
+def is_current(route: Route, python: Interpreter) -> bool:
+    """Return whether the environment is complete and what the checkout asks for."""
+    made_for = read_stamp(_IDENTITY) == identity(route, python)
+    return made_for and read_stamp(_CONTENTS) == contents(route) and PYTHON.exists()
+
+
+def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: Stage) -> None:
+    """Make the environment, or bring the existing one up to date.
+
+    Raises:
+        SetupError: venv or pip failed.
+    """
+    # Without a contents stamp an installation was interrupted: pip may have left half a package behind.
+    if read_stamp(_IDENTITY) != identity(route, python) or not _CONTENTS.is_file():
+        _discard()
+        option = ["--system-site-packages"] if route.system_site_packages else []
+        stage.run([python.executable, "-m", "venv", *option, VENV], env)
+        write_stamp(_IDENTITY, identity(route, python))
+        write_stamp(_ROUTE, route.name)
+    _CONTENTS.unlink(missing_ok=True)
+
+    pip: list[str | Path] = [
+        PYTHON,
+        "-m",
+        "pip",
+        "--disable-pip-version-check",
+        "--no-input",
+        "install",
+        "--progress-bar",
+        "off",
+    ]
+    pinned = ["--constraint", route.constraints]
+    if route.wheels:
+        # First, because empy comes as source only and is built with this pinned setuptools, not with the newest.
+        stage.run([*pip, *pinned, "setuptools"], env)
+    named = [option for name in route.requirements for option in ("--requirement", name)]
+    stage.run([*pip, *pinned, "--use-pep517", "--no-build-isolation", *named], env, _pip_progress)
+    if route.wheels:
+        relocate(VENV, python.include, _numpy_include(env))
+        _install_ros2_command()
+    write_stamp(_CONTENTS, contents(route))
+
+
+def _discard() -> None:
+    # What was built against the old environment goes with it.
+    for path in (VENV, BUILD, INSTALL):
+        shutil.rmtree(path, ignore_errors=True)
+
+
+def _pip_progress(log: str) -> str:
+    if "\nInstalling collected packages" in log:
+        return "installing"
+    return f"{len(re.findall('^Collecting ', log, re.MULTILINE))} packages found"
+
+
+def _numpy_include(env: Mapping[str, str]) -> str:
+    command = [str(PYTHON), "-c", "import numpy; print(numpy.get_include())"]
+    return subprocess.run(command, env=dict(env), capture_output=True, text=True, check=True).stdout.strip()
+
+
+def _install_ros2_command() -> None:
+    """Put the `ros2` stand-in on the environment's PATH.
+
+    It is started through a shell script because a #! line allows no spaces in a path, and without site-packages (-S)
+    because it needs none and starts twice as fast.
+    """
+    command = VENV / "bin" / "ros2"
+    program = ROOT / "tools" / "ros2.py"
+    command.write_text(f'#!/bin/sh\nexec {shlex.quote(str(PYTHON))} -S {shlex.quote(str(program))} "$@"\n')
+    command.chmod(0o755)

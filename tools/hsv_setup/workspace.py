@@ -1,0 +1,124 @@
+"""The stage that builds the packages of src/ and ros_ws/src with colcon, those that need it only.
+
+Packages are built with --symlink-install: a changed Python module is live at once. What needs a build is a changed
+interface, CMakeLists.txt, package.xml, setup.py or setup.cfg, or a file that was added or removed outside the Python
+modules (launch files and other data are linked one by one).
+"""
+
+from __future__ import annotations
+
+import shutil
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hsv_setup.console import SetupError, Stage
+from hsv_setup.environment import PYTHON
+from hsv_setup.paths import BUILD, INSTALL, LOG, ROOT, fingerprint, read_stamp, write_stamp
+from hsv_setup.routes import Route
+
+BASE_PATHS = ("src", "ros_ws/src")
+# Read from the sources at build time; everything else of a Python package is a link to the source.
+_COPIED = ("package.xml", "setup.py", "setup.cfg")
+# Generated code is compiled against these.
+_BINARY_INTERFACE = ("ros-", "numpy=")
+_MADE = ("__pycache__", ".egg-info")
+_COLCON = "import sys; from colcon_core.command import main; sys.argv[0] = 'colcon'; sys.exit(main())"
+
+
+@dataclass(frozen=True)
+class Package:
+    """A package of the workspace."""
+
+    name: str
+    path: Path
+    is_python: bool
+
+    @property
+    def stamp(self) -> Path:
+        """The file that says what the package was last built from."""
+        return BUILD / self.name / "hsv-setup"
+
+    def key(self, route: Route) -> str:
+        """Return a fingerprint of everything that makes a build necessary."""
+        parts: list[str | bytes] = [route.name]
+        for path in self._files():
+            name = path.relative_to(self.path)
+            module = self.is_python and name.parts[0] == self.name
+            if not module:
+                parts.append(str(name))
+            if not self.is_python or str(name) in _COPIED:
+                parts.append(path.read_bytes())
+        if not self.is_python:
+            pins = (ROOT / route.constraints).read_text().splitlines()
+            parts += [line for line in pins if line.startswith(_BINARY_INTERFACE)]
+        return fingerprint(*parts)
+
+    def _files(self) -> Iterator[Path]:
+        for path in sorted(self.path.rglob("*")):
+            made = any(part.startswith(".") or part.endswith(_MADE) for part in path.relative_to(self.path).parts)
+            if path.is_file() and not made:
+                yield path
+
+    def is_current(self, route: Route) -> bool:
+        """Return whether the installed package is what the sources would give."""
+        installed = INSTALL / self.name / "share" / self.name / "package.xml"
+        return installed.exists() and read_stamp(self.stamp) == self.key(route)
+
+
+def packages() -> list[Package]:
+    """Return the packages of the workspace, by name.
+
+    Raises:
+        SetupError: a package.xml cannot be read.
+    """
+    found = []
+    for base in BASE_PATHS:
+        for manifest in sorted((ROOT / base).glob("*/package.xml")):
+            try:
+                tree = ElementTree.parse(manifest)
+            except ElementTree.ParseError as error:
+                raise SetupError(f"{manifest.relative_to(ROOT)}: {error}") from error
+            name = tree.findtext("name") or manifest.parent.name
+            found.append(Package(name, manifest.parent, tree.findtext("export/build_type") == "ament_python"))
+    return sorted(found, key=lambda package: package.name)
+
+
+def outdated(route: Route) -> list[Package]:
+    """Return the packages that have to be built."""
+    return [package for package in packages() if not package.is_current(route)]
+
+
+def removed() -> list[str]:
+    """Return the names of installed packages whose sources are gone."""
+    names = {package.name for package in packages()}
+    markers = INSTALL.glob("*/share/colcon-core/packages/*")
+    return sorted(marker.name for marker in markers if marker.name not in names)
+
+
+def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage: Stage) -> None:
+    """Build packages, and take away what removed ones left behind.
+
+    Raises:
+        SetupError: colcon failed.
+    """
+    for name in removed():
+        shutil.rmtree(INSTALL / name)
+        shutil.rmtree(BUILD / name, ignore_errors=True)
+    if not wanted:
+        return
+    keys = {package: package.key(route) for package in wanted}
+    for package in wanted:
+        package.stamp.unlink(missing_ok=True)
+        if package.is_python:
+            # "develop" leaves the links of files that no longer exist.
+            shutil.rmtree(BUILD / package.name, ignore_errors=True)
+            shutil.rmtree(INSTALL / package.name, ignore_errors=True)
+    command: list[str | Path] = [PYTHON, "-c", _COLCON, "--log-base", LOG, "build", "--symlink-install"]
+    command += ["--base-paths", *BASE_PATHS, "--build-base", BUILD, "--install-base", INSTALL]
+    command += ["--packages-select", *(package.name for package in wanted)]
+    command += ["--cmake-args", "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", f"-DPython3_EXECUTABLE={PYTHON}"]
+    stage.run(command, env, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
+    for package, key in keys.items():
+        write_stamp(package.stamp, key)
