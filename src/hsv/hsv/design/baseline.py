@@ -1,0 +1,153 @@
+"""The baseline design: from inputs to the gains a Tube-MPC controller flies with, and the evidence for them."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import NotchSection
+from hsv.design.feedback import FeedbackGain, feedback_gain
+from hsv.design.inputs import DesignInputs, FlightPoint
+from hsv.design.lmi import spectral_radii
+from hsv.design.nominal import NominalGain, NominalProblem, nested_gains
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.lpv.grid import grid_polytope, linearise
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
+from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.trim import trim
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how many parts of it are done, and how many there are."""
+
+
+@dataclass(frozen=True)
+class DesignResult:
+    """What flies, and the report behind it (ready for JSON, SI)."""
+
+    design: ControlDesign
+    report: dict[str, Any]
+
+
+def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
+    """Return the baseline design (paper section 3): polytopic model, feedback gain F, nominal gains K.
+
+    Args:
+        inputs: What :func:`hsv.design.inputs.read_inputs` returns.
+        progress: Told of every part that is done.
+
+    Raises:
+        DesignError: A problem without a solution, or a solution that fails when recomputed.
+        TrimError: A flight point of ``inputs`` outside the trimmable envelope.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    vehicle = vehicle_parameters("decoupled")
+    altitudes = np.linspace(*ALTITUDE_RANGE, inputs.model.altitude_vertices)
+    velocities = np.linspace(*VELOCITY_RANGE, inputs.model.velocity_vertices)
+
+    tell("polytopic model", 0, 1)
+    polytope = grid_polytope(vehicle, altitudes, velocities, inputs.model.period)
+    # The flexible states of the decoupled model follow the rigid ones: gains act on the rigid states alone.
+    A, B = polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID]
+    tell("polytopic model", 1, 1)
+
+    tell("feedback gain", 0, 1)
+    feedback = feedback_gain(
+        A,
+        B,
+        disturbance_columns(inputs, vehicle),
+        inputs.feedback.state_scale.array(),
+        inputs.feedback.input_scale.array(),
+        inputs.feedback.method,
+    )
+    tell("feedback gain", 1, 1)
+
+    problem = NominalProblem(
+        A,
+        B,
+        inputs.model.period,
+        inputs.nominal.state_scale.array(),
+        inputs.nominal.input_scale.array(),
+        inputs.nominal.input_bound.array(),
+    )
+    nominal = nested_gains(
+        problem,
+        initial_deviation(inputs, vehicle),
+        inputs.nominal.scales,
+        lambda done, total: tell("nominal gains", done, total),
+    )
+
+    design = ControlDesign(
+        name=inputs.name,
+        period=inputs.model.period,
+        polytope=polytope,
+        interpolation="linear",
+        altitude_samples=(altitudes, np.eye(len(altitudes))),
+        velocity_samples=(velocities, np.eye(len(velocities))),
+        feedback_gain=_all_states(feedback.F),
+        nominal_gains=np.stack([_all_states(gain.K) for gain in nominal]),
+        nominal_ellipsoids=np.stack([_inverse(gain.Q) for gain in nominal]),
+        input_minimum=INPUT_MINIMUM.copy(),
+        input_maximum=INPUT_MAXIMUM.copy(),
+        notch=tuple(NotchSection(**section.model_dump()) for section in inputs.notch),
+    )
+    return DesignResult(design, _report(inputs, design, feedback, nominal))
+
+
+def initial_deviation(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
+    """Return x_n(0) (5) of the design's step: trim at its start less trim at its target, SI."""
+
+    def rigid(point: FlightPoint) -> np.ndarray:
+        return trim(vehicle, point.altitude, point.velocity).state[:N_RIGID]
+
+    return rigid(inputs.nominal.start) - rigid(inputs.nominal.target)
+
+
+def disturbance_columns(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
+    """Return the columns (5, 4) whose response F makes cheap, at mid-envelope, SI per period.
+
+    The lost share of the trim elevator, and steady errors of the velocity, angle-of-attack and pitch-rate equations.
+    """
+    altitude, velocity = float(np.mean(ALTITUDE_RANGE)), float(np.mean(VELOCITY_RANGE))
+    A, B = (matrix[:N_RIGID] for matrix in linearise(vehicle, altitude, velocity))
+    d = inputs.feedback.disturbance
+    fault = B[:, 1:] * d.elevator_loss * trim(vehicle, altitude, velocity).input[1]
+    channels = np.zeros((N_RIGID, 3))
+    channels[[1, 2, 4], [0, 1, 2]] = d.acceleration, d.angle_of_attack_rate, d.pitch_acceleration
+    return zero_order_hold(A[:, :N_RIGID], np.hstack((fault, channels)), inputs.model.period)[1]
+
+
+def _all_states(gain: np.ndarray) -> np.ndarray:
+    full = np.zeros((N_INPUTS, N_STATES))
+    full[:, :N_RIGID] = gain
+    return full
+
+
+def _inverse(Q: np.ndarray) -> np.ndarray:
+    P = np.linalg.inv(Q)
+    return np.asarray(0.5 * (P + P.T))
+
+
+def _report(
+    inputs: DesignInputs, design: ControlDesign, feedback: FeedbackGain, nominal: list[NominalGain]
+) -> dict[str, Any]:
+    A, B = design.polytope.A, design.polytope.B
+    closed = [A + B @ gain for gain in (design.feedback_gain, *design.nominal_gains)]
+    radii = [float(spectral_radii(matrices).max()) for matrices in closed]
+    return {
+        "name": inputs.name,
+        "units": "SI",
+        "inputs": inputs.model_dump(),
+        "inputs_sha256": hashlib.sha256(inputs.model_dump_json().encode()).hexdigest(),
+        "vertices": len(A),
+        "feedback": {**feedback.report(), "spectral_radius_all_states": radii[0]},
+        "nominal": [
+            {"scale": scale, **gain.report(), "spectral_radius_all_states": radius}
+            for scale, gain, radius in zip(inputs.nominal.scales, nominal, radii[1:], strict=True)
+        ],
+    }

@@ -1,0 +1,172 @@
+"""The inputs of an offline design: one TOML file, every quantity with its unit, checked before anything is computed."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
+
+from hsv.errors import DesignError
+from hsv.units import parse_quantity
+
+
+def _quantity(unit: str) -> BeforeValidator:
+    def parse(value: Any, info: ValidationInfo) -> float:
+        return parse_quantity(value, unit, info.field_name or "value")
+
+    return BeforeValidator(parse)
+
+
+Number = Annotated[float, _quantity("1")]
+Length = Annotated[float, _quantity("m")]
+Speed = Annotated[float, _quantity("m/s")]
+Acceleration = Annotated[float, _quantity("m/s^2")]
+Angle = Annotated[float, _quantity("rad")]
+AngularRate = Annotated[float, _quantity("rad/s")]
+AngularAcceleration = Annotated[float, _quantity("rad/s^2")]
+Duration = Annotated[float, _quantity("s")]
+Positive = Field(gt=0.0)
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class RigidScale(_Table):
+    """Sizes of the five rigid states that count as equal."""
+
+    altitude: Length = Positive
+    velocity: Speed = Positive
+    angle_of_attack: Angle = Positive
+    pitch_angle: Angle = Positive
+    pitch_rate: AngularRate = Positive
+
+    def array(self) -> np.ndarray:
+        """Return the scales (5), SI."""
+        return np.array([self.altitude, self.velocity, self.angle_of_attack, self.pitch_angle, self.pitch_rate], float)
+
+
+class InputSize(_Table):
+    """Sizes of the two inputs."""
+
+    fuel_equivalence_ratio: Number = Positive
+    elevator_deflection: Angle = Positive
+
+    def array(self) -> np.ndarray:
+        """Return the sizes (2), SI."""
+        return np.array([self.fuel_equivalence_ratio, self.elevator_deflection], float)
+
+
+class FlightPoint(_Table):
+    """Level flight at an altitude and a velocity."""
+
+    altitude: Length
+    velocity: Speed = Positive
+
+
+class ModelInputs(_Table):
+    """The polytopic model of the decoupled vehicle: vertices on a grid over the envelope."""
+
+    period: Duration = Positive
+    altitude_vertices: int = Field(ge=2, le=20)
+    velocity_vertices: int = Field(ge=2, le=20)
+
+
+class FeedbackDisturbance(_Table):
+    """What the feedback gain is to reject, each constant over a period; only their proportions matter."""
+
+    acceleration: Acceleration = Positive
+    angle_of_attack_rate: AngularRate = Positive
+    pitch_acceleration: AngularAcceleration = Positive
+    elevator_loss: Number = Field(gt=0.0, lt=1.0)
+    """Lost share of the trim elevator."""
+
+
+class FeedbackInputs(_Table):
+    """The feedback gain F (paper eq. 24)."""
+
+    method: Literal["guaranteed_cost", "feasibility"]
+    state_scale: RigidScale
+    input_scale: InputSize
+    disturbance: FeedbackDisturbance
+
+
+class NominalInputs(_Table):
+    """The nominal gains K (paper eq. 32-35): one for each of ``scales`` times the step from ``start`` to ``target``."""
+
+    start: FlightPoint
+    target: FlightPoint
+    scales: list[Annotated[float, Field(gt=0.0, le=1.0)]] = Field(min_length=1, max_length=20)
+    state_scale: RigidScale
+    input_scale: InputSize
+    input_bound: InputSize
+
+
+class NotchInputs(_Table):
+    """One section of the notch filter that the design is meant for (paper eq. 38)."""
+
+    zero_frequency: AngularRate = Positive
+    zero_damping: Number = Field(ge=0.0)
+    pole_frequency: AngularRate = Positive
+    pole_damping: Number = Positive
+
+
+class DesignInputs(_Table):
+    """All inputs of a baseline design, SI after reading."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
+    description: str
+    model: ModelInputs
+    notch: list[NotchInputs] = Field(min_length=1, max_length=4)
+    feedback: FeedbackInputs
+    nominal: NominalInputs
+
+
+def parse_inputs(table: dict[str, Any]) -> DesignInputs:
+    """Return the design inputs in a table as TOML gives it, with units.
+
+    Raises:
+        DesignError: A field that is missing, unknown or has a wrong value; the message names it.
+    """
+    try:
+        return DesignInputs.model_validate(table)
+    except ValidationError as error:
+        raise DesignError(_first_line(error, table)) from error
+
+
+def read_inputs(path: Path) -> DesignInputs:
+    """Return the design inputs in a TOML file.
+
+    Raises:
+        DesignError: The file is missing or is not TOML, or a field is wrong.
+    """
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design input file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: {error}, expected TOML") from error
+    try:
+        return parse_inputs(table)
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from error
+
+
+def _first_line(error: ValidationError, table: dict[str, Any]) -> str:
+    first = error.errors()[0]
+    *parents, leaf = (str(part) for part in first["loc"])
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, ValueError):  # parse_quantity has named the field, not the tables it is in
+        return ".".join((*parents, str(cause)))
+    field = ".".join((*parents, leaf))
+    if first["type"] == "missing":
+        return f"{field}: missing, expected a value"
+    if first["type"] == "extra_forbidden":
+        return f"{field}: unknown field, expected none of that name"
+    written: Any = table
+    for part in first["loc"]:
+        written = written[part]
+    return f"{field} = {written!r}: {first['msg'][0].lower()}{first['msg'][1:]}"

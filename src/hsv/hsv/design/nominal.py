@@ -1,0 +1,245 @@
+"""Nominal gains by the min-max LMI with input bounds (paper eq. 31-35), one gain or a nested family.
+
+The problem is Kothare, Balakrishnan and Morari's (Automatica 32, 1996); the look-up over nested ellipsoids is Wan and
+Kothare's (Automatica 39, 2003): the smallest ellipsoid that holds the state names the gain, and because each ellipsoid
+is invariant under its own gain and lies in the one before, the state only ever moves inwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+from cvxpy.atoms.affine.bmat import bmat
+
+from hsv.design.lmi import SolverReport, smallest_eigenvalues, solve, spectral_radii
+from hsv.design.scaling import Whitening, lqr_whitening
+from hsv.errors import DesignError
+
+_MARGIN = 1e-5
+"""Relative margin inside which (33) and the nesting are solved, so that they hold exactly afterwards."""
+
+_INPUT_MARGIN = 1e-3
+"""The same for (35), of which the solver's accuracy is lower where the bound is tight."""
+
+
+@dataclass(frozen=True)
+class NominalGain:
+    """K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
+
+    ``K`` (m, n), ``Y`` (m, n), ``Q`` (n, n) in SI; ``gamma`` the solver's bound of (32); ``certified_gamma`` the bound
+    recomputed (s): the cost from any state of the ellipsoid is at most this. Residuals are those of the returned matrices:
+    ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit diagonal; ``state`` 1 minus
+    the level of the design state, (33); ``input`` (m) 1 minus the largest squared input over its squared bound, (35);
+    ``nesting`` smallest eigenvalue of 1 - Q against the ellipsoid outside; ``radii`` (r) closed-loop spectral radii.
+    """
+
+    K: np.ndarray
+    Y: np.ndarray
+    Q: np.ndarray
+    gamma: float
+    certified_gamma: float
+    state: float
+    decrease: np.ndarray
+    input: np.ndarray
+    nesting: float | None
+    radii: np.ndarray
+    solver: SolverReport
+
+    def report(self) -> dict[str, Any]:
+        """Return everything a stranger needs to check the gain, for JSON."""
+        return {
+            "solver": self.solver.as_dict(),
+            "Y": self.Y.tolist(),
+            "Q": self.Q.tolist(),
+            "gamma": self.gamma,
+            "certified_gamma": self.certified_gamma,
+            "state_residual": self.state,
+            "lmi_smallest_eigenvalues": self.decrease.tolist(),
+            "input_residuals": self.input.tolist(),
+            "nesting_residual": self.nesting,
+            "spectral_radii": self.radii.tolist(),
+        }
+
+
+@dataclass(frozen=True)
+class NominalProblem:
+    """The data of (31)-(35).
+
+    ``A`` (r, n, n) and ``B`` (r, n, m) the vertices at sampling ``period``; ``state_scale`` (n) and ``input_scale`` (m)
+    the deviations that cost as much as each other: psi = period diag(1 / state_scale^2) and sigma likewise, so that
+    costs are in seconds and do not depend on the period; ``input_bound`` (m) the largest |u_n|. All SI.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    period: float
+    state_scale: np.ndarray
+    input_scale: np.ndarray
+    input_bound: np.ndarray
+
+
+def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
+    """Return the gain whose worst cost from ``state`` is least, verified after solving.
+
+    Args:
+        problem: Vertices, weights and input bounds.
+        state: (n) nominal deviation x_n to start from, SI.
+        outside: (n, n) Q of an ellipsoid that the new one must lie in, or None.
+
+    Raises:
+        DesignError: No solution, or a solution that fails one of its inequalities when recomputed.
+    """
+    white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
+    return _solve(problem, white, state, outside, "nominal gain K, LMI (32)-(35)")
+
+
+def nested_gains(
+    problem: NominalProblem,
+    state: np.ndarray,
+    scales: Sequence[float],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[NominalGain]:
+    """Return one gain for each of ``scales`` times ``state``, ellipsoids nested, outermost first.
+
+    Args:
+        problem: Vertices, weights and input bounds.
+        state: (n) the largest nominal deviation x_n, SI.
+        scales: Decreasing factors, the first usually 1.
+        progress: Called with (solved, total).
+
+    Raises:
+        DesignError: Scales that do not decrease, no solution, or one that fails an inequality when recomputed.
+    """
+    if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
+        raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")
+    white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
+    gains: list[NominalGain] = []
+    for index, scale in enumerate(scales):
+        outside = gains[-1].Q if gains else None
+        name = f"nominal gain {index + 1} of {len(scales)}, LMI (32)-(35)"
+        gains.append(_solve(problem, white, scale * state, outside, name))
+        if progress:
+            progress(index + 1, len(scales))
+    return gains
+
+
+def _solve(
+    problem: NominalProblem, white: Whitening, state: np.ndarray, outside: np.ndarray | None, name: str
+) -> NominalGain:
+    n, m = problem.B.shape[1:]
+    # With the state at unit length and inputs in units of their bounds, everything sought comes out near one.
+    x = (1.0 + _MARGIN) * white.to_white @ state
+    size = float(np.linalg.norm(x))
+    x /= size
+    bound = (1.0 - _INPUT_MARGIN) * problem.input_bound / (white.input_scale * size)
+    A, B = white.dynamics(problem.A, problem.B)
+    B = B * bound
+    state_root = white.from_white / problem.state_scale[:, None]
+    input_root = np.diag(bound)
+    Q = cp.Variable((n, n), symmetric=True)
+    Y = cp.Variable((m, n))
+    gamma = cp.Variable()
+    # X of (35) at its bound, which loses nothing.
+    constraints = [
+        bmat([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]) >> 0,
+        bmat([[np.eye(m), Y], [Y.T, Q]]) >> 0,
+    ]
+    for A_i, B_i in zip(A, B, strict=True):
+        S = A_i @ Q + B_i @ Y
+        blocks = [
+            [Q, S.T, (state_root @ Q).T, (input_root @ Y).T],
+            [S, Q, np.zeros((n, n)), np.zeros((n, m))],
+            [state_root @ Q, np.zeros((n, n)), gamma * np.eye(n), np.zeros((n, m))],
+            [input_root @ Y, np.zeros((m, n)), np.zeros((m, n)), gamma * np.eye(m)],
+        ]
+        constraints.append(bmat(blocks) >> 0)
+    if outside is not None:
+        limit = white.to_white @ outside @ white.to_white.T / size**2
+        constraints.append(Q << (1.0 - _MARGIN) * 0.5 * (limit + limit.T))
+    solver = solve(cp.Problem(cp.Minimize(gamma), constraints), name)
+    Q_white, Y_white = np.asarray(Q.value) * size**2, bound[:, None] * np.asarray(Y.value) * size**2
+    K = white.gain(np.linalg.solve(Q_white, Y_white.T).T)
+    cost = float(np.asarray(gamma.value)) * size**2 * problem.period
+    return _verified(problem, state, outside, K, white.cross(Y_white), white.covariance(Q_white), cost, solver, name)
+
+
+def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: str) -> tuple[float, np.ndarray]:
+    """Return the cost that no state of the ellipsoid exceeds under K, and the residuals (r) of (34) with it.
+
+    The least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex: (34) for the given matrices.
+
+    Args:
+        problem: Vertices and weights.
+        K: (m, n) gain, SI.
+        Q: (n, n) ellipsoid, SI.
+        name: What is being verified, for the error message.
+
+    Raises:
+        DesignError: Q is not positive definite, or x' Q^-1 x does not decrease at a vertex.
+    """
+    try:
+        factor = np.linalg.cholesky(Q)
+    except np.linalg.LinAlgError as error:
+        raise DesignError(f"{name}: Q = {Q.tolist()}, expected a positive definite matrix") from error
+    contraction = np.linalg.solve(factor, (problem.A + problem.B @ K) @ factor)
+    decrease = np.eye(len(Q)) - np.swapaxes(contraction, 1, 2) @ contraction
+    margins = smallest_eigenvalues(decrease)
+    worst = int(np.argmin(margins))
+    if not margins[worst] > 0.0:
+        raise DesignError(f"{name}: decrease at vertex {worst} = {margins[worst]:.3g}, expected above zero")
+    weighted = np.vstack((factor / problem.state_scale[:, None], K @ factor / problem.input_scale[:, None]))
+    weighted *= np.sqrt(problem.period)
+    root = np.linalg.inv(np.linalg.cholesky(0.5 * (decrease + np.swapaxes(decrease, 1, 2))))
+    cost = root @ (weighted.T @ weighted) @ np.swapaxes(root, 1, 2)
+    # A part in 1e9 more than the least bound, so that its residuals are not negative by rounding.
+    gamma = float(np.linalg.eigvalsh(cost).max()) * (1.0 + 1e-9)
+    scaled = weighted / np.sqrt(gamma)
+    residuals = smallest_eigenvalues(_decrease_blocks(contraction, scaled))
+    return gamma, residuals
+
+
+def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarray:
+    r, n, _ = contraction.shape
+    k = n + len(weighted)
+    blocks = np.zeros((r, n + k, n + k))
+    blocks[:] = np.eye(n + k)
+    blocks[:, n : 2 * n, :n] = contraction
+    blocks[:, 2 * n :, :n] = weighted
+    blocks[:, :n, n : 2 * n] = np.swapaxes(contraction, 1, 2)
+    blocks[:, :n, 2 * n :] = weighted.T
+    return blocks
+
+
+def _verified(
+    problem: NominalProblem,
+    state: np.ndarray,
+    outside: np.ndarray | None,
+    K: np.ndarray,
+    Y: np.ndarray,
+    Q: np.ndarray,
+    gamma: float,
+    solver: SolverReport,
+    name: str,
+) -> NominalGain:
+    certified, decrease = certified_cost(problem, K, Q, name)
+    if not decrease.min() > -1e-9:
+        raise DesignError(f"{name}: smallest eigenvalue of (34) = {decrease.min():.3g}, expected not below zero")
+    level = 1.0 - float(state @ np.linalg.solve(Q, state))
+    if level < 0.0:
+        raise DesignError(f"{name}: level of the initial state = {1.0 - level:.9g}, expected at most 1")
+    inputs = 1.0 - np.einsum("ij,jk,ik->i", K, Q, K) / problem.input_bound**2
+    if inputs.min() < 0.0:
+        raise DesignError(f"{name}: largest input over its bound = {np.sqrt(1.0 - inputs)}, expected at most 1")
+    nesting = None
+    if outside is not None:
+        factor = np.linalg.inv(np.linalg.cholesky(outside))
+        nesting = float(smallest_eigenvalues(np.eye(len(Q)) - factor @ Q @ factor.T))
+        if nesting < 0.0:
+            raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
+    radii = spectral_radii(problem.A + problem.B @ K)
+    return NominalGain(K, Y, Q, gamma, certified, level, decrease, inputs, nesting, radii, solver)

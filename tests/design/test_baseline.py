@@ -1,0 +1,39 @@
+import json
+
+import numpy as np
+import pytest
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.baseline import design_baseline
+from hsv.errors import DesignError
+
+
+def test_the_design_passes_the_check_of_the_nodes(design):
+    checked = ControlDesign.from_parameters(design.to_parameters())
+    assert not checked.modified
+    assert np.array_equal(checked.nominal_gains, design.nominal_gains)
+
+
+def test_the_report_is_json_and_carries_the_inputs(result, inputs):
+    report = json.loads(json.dumps(result.report, allow_nan=False))
+    assert report["vertices"] == 20
+    assert report["inputs"] == inputs.model_dump()
+
+
+def test_progress_is_told_and_ends_complete(inputs):
+    single = inputs.model_copy(update={"nominal": inputs.nominal.model_copy(update={"scales": [1.0]})})
+    told = []
+    result = design_baseline(single, lambda *event: told.append(event))
+    assert [stage for stage, done, total in told if done == total] == [
+        "polytopic model",
+        "feedback gain",
+        "nominal gains",
+    ]
+    assert result.design.nominal_gains.shape == (1, 2, 9)
+
+
+def test_an_infeasible_design_says_which_part(inputs):
+    bound = inputs.nominal.input_bound.model_copy(update={"elevator_deflection": 1e-4})
+    nominal = inputs.nominal.model_copy(update={"input_bound": bound})
+    with pytest.raises(DesignError, match="nominal gain 1 of 7"):
+        design_baseline(inputs.model_copy(update={"nominal": nominal}))

@@ -1,0 +1,72 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.design.baseline import disturbance_columns
+from hsv.design.feedback import feedback_gain, lyapunov_residuals
+from hsv.errors import DesignError
+from hsv.vehicle.parameters import vehicle_parameters
+
+FOOT = 0.3048
+
+
+def rigid(design):
+    return design.polytope.A[:, :5, :5], design.polytope.B[:, :5]
+
+
+def test_gain_agrees_with_the_control_study(design):
+    # Control study, section 0, design R; per foot.
+    expected = [[-0.0028, -0.0144, 50.30, -54.27, -1.409], [0.0033, -0.0024, -52.89, 61.48, 3.819]]
+    gain = design.feedback_gain[:, :5] * [FOOT, FOOT, 1.0, 1.0, 1.0]
+    assert_allclose(gain, expected, rtol=0.02, atol=6e-5)
+    assert np.all(design.feedback_gain[:, 5:] == 0.0)
+
+
+def test_lyapunov_inequality_holds_at_every_vertex_with_the_reported_matrices(design, result):
+    A, B = rigid(design)
+    M, N = np.array(result.report["feedback"]["M"]), np.array(result.report["feedback"]["N"])
+    assert_allclose(M @ np.linalg.inv(N), design.feedback_gain[:, :5], rtol=1e-8)
+    # A second way: the Schur complement of (24), with N as the measure.
+    for a, b in zip(A, B, strict=True):
+        step = a @ N + b @ M
+        drop = N - step @ np.linalg.solve(N, step.T)
+        assert np.linalg.eigvals(np.linalg.solve(N, drop)).real.min() > 0.0
+    assert min(result.report["feedback"]["lmi_smallest_eigenvalues"]) > 1e-4
+
+
+def test_spectral_radii(result):
+    radii = result.report["feedback"]["spectral_radii"]
+    assert min(radii) > 0.993 and max(radii) < 0.994
+    assert result.report["feedback"]["spectral_radius_all_states"] < 0.9940
+
+
+def test_residual_refuses_an_unstable_vertex(design, result):
+    A, B = rigid(design)
+    N = np.array(result.report["feedback"]["N"])
+    with pytest.raises(DesignError, match="at vertex"):
+        lyapunov_residuals(A, N, "no feedback")
+    with pytest.raises(DesignError, match="positive definite"):
+        lyapunov_residuals(A + B @ design.feedback_gain[:, :5], -N, "negative N")
+
+
+def test_pure_feasibility_gives_a_certified_but_unusable_gain(design, inputs):
+    A, B = rigid(design)
+    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    scales = inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array()
+    literal = feedback_gain(A, B, columns, *scales, method="feasibility")
+    assert literal.residuals.min() > 0.0
+    assert np.abs(literal.F[:, 2]).max() > 1000.0
+    assert literal.F[1, 4] > 20.0
+
+
+def test_the_same_input_gives_the_same_bits(design, inputs):
+    A, B = rigid(design)
+    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    again = feedback_gain(A, B, columns, inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array())
+    assert np.array_equal(again.F, design.feedback_gain[:, :5])
+
+
+def test_unknown_method_is_refused(design):
+    A, B = rigid(design)
+    with pytest.raises(DesignError, match=r"feedback.method = 'lucky'"):
+        feedback_gain(A, B, np.eye(5), np.ones(5), np.ones(2), method="lucky")
