@@ -1,7 +1,8 @@
 """Coordinates in which the linear matrix inequalities are well conditioned.
 
 Unscaled, or scaled by typical sizes only, the inequalities of a fast-sampled integrator chain defeat interior-point
-solvers. In coordinates whitened by a central LQR problem the sought Lyapunov matrices are near multiples of the identity.
+solvers. In coordinates whitened by a central LQR problem the sought Lyapunov matrices are near multiples of the
+identity.
 """
 
 from __future__ import annotations
