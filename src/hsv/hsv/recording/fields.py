@@ -1,0 +1,88 @@
+"""The fields of message types, as a bag's own definitions state them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from rosbags.interfaces import Nodetype
+from rosbags.interfaces.typing import FieldDesc, Typesdict
+
+TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
+"""Two fields each, int32 sec and uint32 nanosec, which are worth one number together."""
+_FORMATS = {"bool": "?", "byte": "u1", "char": "u1", "float32": "<f4", "float64": "<f8"} | {
+    f"{sign}int{bits}": f"<{code}{bits // 8}" for sign, code in (("", "i"), ("u", "u")) for bits in (8, 16, 32, 64)
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A field of a message type."""
+
+    name: str
+    type: str
+    """``package/msg/Type`` or the name of a base type."""
+    format: str | None
+    """What numpy calls a number of this type; None for text and messages."""
+    count: Literal["one", "array", "sequence"]
+    length: int
+    """Number of elements of an array; 0 otherwise."""
+
+    @property
+    def is_text(self) -> bool:
+        """Whether this is text (of unbounded or bounded length)."""
+        return self.type == "string"
+
+    @property
+    def is_time(self) -> bool:
+        """Whether this is a time or a duration."""
+        return self.type in TIMES
+
+    @property
+    def is_message(self) -> bool:
+        """Whether this is a message of its own type."""
+        return "/" in self.type
+
+
+def fields_of(types: Typesdict, message_type: str) -> list[Field]:
+    """Return the fields of a type in their order."""
+    return [_field(name, desc) for name, desc in types[message_type][1]]
+
+
+def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, Any]:
+    """Return a deserialized message as plain dictionaries, lists and numbers; times in nanoseconds."""
+    return {field.name: _plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
+
+
+def nanoseconds(time: Any) -> int:
+    """Return a deserialized Time or Duration as one number."""
+    return int(time.sec) * 10**9 + int(time.nanosec)
+
+
+def _field(name: str, desc: FieldDesc) -> Field:
+    kind: int
+    inner: Any
+    kind, inner = desc
+    count: Literal["one", "array", "sequence"] = "one"
+    length = 0
+    if kind == Nodetype.ARRAY:
+        count = "array"
+        (kind, inner), length = inner
+    elif kind == Nodetype.SEQUENCE:
+        count = "sequence"
+        (kind, inner), _bound = inner
+    field_type = str(inner if kind == Nodetype.NAME else inner[0])
+    return Field(name, field_type, _FORMATS.get(field_type), count, length)
+
+
+def _plain(types: Typesdict, field: Field, value: Any) -> Any:
+    if field.count != "one":
+        if field.format:
+            return value.tolist()
+        single = Field(field.name, field.type, None, "one", 0)
+        return [_plain(types, single, element) for element in value]
+    if field.is_time:
+        return nanoseconds(value)
+    if field.format or field.is_text:
+        return value
+    return as_dict(types, field.type, value)

@@ -1,0 +1,96 @@
+"""What is in a bag, as plain data that can become JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.recording.reader import Bag
+
+FAULT_STATUS = "/hsv/fault_status"
+TUBE_STATUS = "/hsv/tube_status"
+
+
+def describe(bag: Bag) -> dict[str, Any]:
+    """Return what a bag holds and what happened in it; a caller may add to it, such as metrics.
+
+    Returns:
+    -------
+    dict
+        ``path``, ``complete``, ``start_s``, ``duration_s``, ``messages``, ``topics``, ``custom_data``,
+        ``attachments``, ``faults`` (one entry per interval of a channel), ``saturation`` and ``tube``; the last three
+        are None without the topic that tells. Times are simulated, in seconds; ``end_s`` of what lasts until the end
+        of the bag is None.
+    """
+    start, end = bag.span
+    topics = [_topic(bag, name) for name in sorted(bag.topics)]
+    return {
+        "path": str(bag.path),
+        "complete": bag.complete,
+        "start_s": start / 1e9,
+        "duration_s": (end - start) / 1e9,
+        "messages": sum(topic["messages"] for topic in topics),
+        "topics": topics,
+        "custom_data": bag.custom_data,
+        "attachments": [
+            {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
+            for name, data in sorted(bag.attachments.items())
+        ],
+        "faults": _faults(bag) if FAULT_STATUS in bag.topics else None,
+        "saturation": _saturation(bag) if TUBE_STATUS in bag.topics else None,
+        "tube": _tube(bag) if TUBE_STATUS in bag.topics else None,
+    }
+
+
+def _topic(bag: Bag, name: str) -> dict[str, Any]:
+    topic, times = bag.topics[name], bag.times(name)
+    span = int(times.max() - times.min()) if len(times) else 0
+    rate = (len(times) - 1) / (span / 1e9) if span else None
+    return {"name": name, "type": topic.type, "messages": topic.count, "rate_hz": rate}
+
+
+def _faults(bag: Bag) -> list[dict[str, Any]]:
+    columns = bag.columns(FAULT_STATUS)
+    stamps, active = columns["header.stamp"], columns["active"]
+    keys = sorted({(fault["channel"], fault["type"], fault["value"]) for faults in active for fault in faults})
+    intervals = []
+    for channel, kind, value in keys:
+        acting = np.array(
+            [any((f["channel"], f["type"], f["value"]) == (channel, kind, value) for f in faults) for faults in active]
+        )
+        entry = {"channel": channel, "type": kind, "value": value}
+        intervals += [entry | interval for interval in _intervals(stamps, acting)]
+    return sorted(intervals, key=lambda interval: interval["start_s"])
+
+
+def _saturation(bag: Bag) -> dict[str, Any]:
+    saturated = bag.columns(TUBE_STATUS)["saturated"]
+    return {
+        "steps": int(saturated.any(axis=1).sum()),
+        "fuel_equivalence_ratio_steps": int(saturated[:, 0].sum()),
+        "elevator_deflection_steps": int(saturated[:, 1].sum()),
+    }
+
+
+def _tube(bag: Bag) -> dict[str, Any]:
+    columns, constants = bag.columns(TUBE_STATUS), bag.constants(TUBE_STATUS)
+    checked = columns["status"] != constants["NO_SET"]
+    outside = checked & ~columns["inside"]
+    levels = columns["level"][checked & np.isfinite(columns["level"])]
+    return {
+        "checked_steps": int(checked.sum()),
+        "outside_steps": int(outside.sum()),
+        "largest_level": float(levels.max()) if len(levels) else None,
+        "excursions": _intervals(columns["header.stamp"], outside),
+    }
+
+
+def _intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, float | None]]:
+    """Return the intervals in which a condition holds: from its first step to the first in which it is over."""
+    edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
+    return [
+        {"start_s": float(stamps[first]) / 1e9, "end_s": float(stamps[over]) / 1e9 if over < len(stamps) else None}
+        for first, over in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    ]

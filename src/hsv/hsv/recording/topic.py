@@ -1,0 +1,64 @@
+"""What a bag knows about a topic: name, type, definition, type hash and the quality of service it was offered with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+INFINITE = 2**63 - 1
+"""An endless duration in nanoseconds; rendered as ROS 2 does: sec 9223372036, nsec 854775807."""
+
+
+def _duration(nanoseconds: int) -> dict[str, int]:
+    sec, nsec = divmod(nanoseconds, 10**9)
+    return {"sec": sec, "nsec": nsec}
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """A quality-of-service profile in the words of rosbag2; the durations in nanoseconds."""
+
+    history: str = "keep_last"
+    depth: int = 10
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    """``transient_local`` for latched topics: a player must offer them so again."""
+    deadline: int = INFINITE
+    lifespan: int = INFINITE
+    liveliness: str = "automatic"
+    liveliness_lease_duration: int = INFINITE
+    avoid_ros_namespace_conventions: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the nine keys that rosbag2 demands of a profile."""
+        return {
+            "history": self.history,
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "deadline": _duration(self.deadline),
+            "lifespan": _duration(self.lifespan),
+            "liveliness": self.liveliness,
+            "liveliness_lease_duration": _duration(self.liveliness_lease_duration),
+            "avoid_ros_namespace_conventions": self.avoid_ros_namespace_conventions,
+        }
+
+    def as_yaml(self) -> str:
+        """Return the profile as the list of one profile that the metadata of an MCAP channel carries as text."""
+        return yaml.safe_dump([self.as_dict()], sort_keys=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic of a bag."""
+
+    name: str
+    type: str
+    """``package/msg/Type``."""
+    definition: str
+    """The .msg text with its dependencies; see :func:`hsv.recording.definitions.definition`."""
+    type_hash: str
+    """``RIHS01_`` and 64 hexadecimal digits, or empty where it is not known."""
+    qos: Qos

@@ -1,0 +1,262 @@
+"""What is written is read back: by us, and by what others use."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import yaml
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.rosbag2 import Reader
+
+from hsv.errors import RecordingError
+from hsv.recording.reader import Bag
+from hsv.recording.topic import INFINITE, Qos
+from hsv.recording.writer import BagWriter
+
+Written = tuple[Path, list[tuple[str, int, bytes]]]
+STEPS = 120
+REQUIRED = {
+    "version",
+    "storage_identifier",
+    "duration",
+    "starting_time",
+    "message_count",
+    "topics_with_message_count",
+    "compression_format",
+    "compression_mode",
+    "relative_file_paths",
+    "files",
+    "custom_data",
+    "ros_distro",
+}
+QOS = {
+    "history",
+    "depth",
+    "reliability",
+    "durability",
+    "deadline",
+    "lifespan",
+    "liveliness",
+    "liveliness_lease_duration",
+    "avoid_ros_namespace_conventions",
+}
+
+
+@pytest.fixture
+def written(kit: SimpleNamespace, tmp_path: Path) -> Written:
+    """A bag of all our message types, a latched topic and one first seen in flight, and what was written to it."""
+    names = {f"/hsv/{name.rpartition('/')[2].lower()}": name for name in kit.types}
+    topics = [kit.topic(name, kind, kit.latched if kind.endswith("/Ready") else None) for name, kind in names.items()]
+    writer = BagWriter(tmp_path / "run", topics, {"run_id": "17e5", "commit": "0123"})
+    writer.attach("scenario.toml", "application/toml", b"duration = '4 s'\n")
+    writer.attach("empty", "text/plain", b"")
+    log = []
+    for step in range(STEPS):
+        if step == 30:
+            writer.add_topic(kit.topic("/clock", "rosgraph_msgs/msg/Clock"))
+            names["/clock"] = "rosgraph_msgs/msg/Clock"
+        for name, kind in names.items():
+            if not kind.endswith("/Ready") or step == 0:
+                data = kit.messages.serialize(kit.messages.make(kind))
+                log.append((name, step * 10**7, data))
+                writer.write(*log[-1])
+    writer.close({"outcome": ""})
+    return tmp_path / "run", log
+
+
+def test_round_trip(written: Written) -> None:
+    path, log = written
+    for given in (path, path / "run_0.mcap"):
+        bag = Bag(given)
+        assert bag.complete
+        assert bag.custom_data == {"run_id": "17e5", "commit": "0123", "outcome": ""}
+        assert bag.attachments == {"scenario.toml": b"duration = '4 s'\n", "empty": b""}
+        assert bag.span == (0, (STEPS - 1) * 10**7)
+        for name, topic in bag.topics.items():
+            expected = [(time, data) for other, time, data in log if other == name]
+            assert bag.messages(name) == expected
+            assert topic.count == len(expected)
+            assert bag.times(name).tolist() == [time for time, _ in expected]
+
+
+def test_metadata_has_every_key_that_jazzy_demands(written: Written) -> None:
+    path, log = written
+    text = (path / "metadata.yaml").read_text()
+    assert 'compression_format: ""\n' in text and 'compression_mode: ""\n' in text and 'outcome: ""\n' in text
+    assert 'run_id: "17e5"\n' in text and "~" not in text and "null" not in text
+    data = yaml.safe_load(text)["rosbag2_bagfile_information"]
+    assert set(data) == REQUIRED
+    assert (data["version"], data["storage_identifier"], data["ros_distro"]) == (9, "mcap", "jazzy")
+    assert data["message_count"] == len(log)
+    assert data["duration"] == {"nanoseconds": (STEPS - 1) * 10**7}
+    assert data["starting_time"] == {"nanoseconds_since_epoch": 0}
+    assert data["relative_file_paths"] == ["run_0.mcap"]
+    (file,) = data["files"]
+    assert set(file) == {"path", "starting_time", "duration", "message_count"} and file["message_count"] == len(log)
+    endless = {"sec": 9223372036, "nsec": 854775807}
+    for entry in data["topics_with_message_count"]:
+        topic = entry["topic_metadata"]
+        assert set(topic) == {
+            "name",
+            "type",
+            "serialization_format",
+            "offered_qos_profiles",
+            "type_description_hash",
+        }
+        (profile,) = topic["offered_qos_profiles"]
+        assert set(profile) == QOS
+        assert profile["durability"] == ("transient_local" if topic["type"].endswith("/Ready") else "volatile")
+        assert profile["deadline"] == profile["lifespan"] == profile["liveliness_lease_duration"] == endless
+        assert topic["type_description_hash"].startswith("RIHS01_") and len(topic["type_description_hash"]) == 71
+
+
+def test_rosbags_reads_it_all(written: Written) -> None:
+    path, log = written
+    with Reader(path) as reader:
+        assert reader.message_count == len(log)
+        assert sorted((c.topic, time, bytes(data)) for c, time, data in reader.messages()) == sorted(log)
+        qos = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
+        assert qos["/hsv/ready"].durability == QosDurability.TRANSIENT_LOCAL
+        assert qos["/hsv/vehiclestate"].reliability == QosReliability.RELIABLE
+
+
+def test_mcap_ros2_decodes_it_alike(written: Written) -> None:
+    path, log = written
+    bag = Bag(path)
+    with (path / "run_0.mcap").open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        assert summary is not None and summary.statistics is not None
+        assert summary.statistics.message_count == len(log)
+        assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 5
+        # The first chunk holds all definitions besides its messages.
+        assert max(index.uncompressed_size for index in summary.chunk_indexes[1:]) < 20_000
+        for topic in ("/hsv/vehiclestate", "/hsv/nominalstate"):
+            theirs = [message.decoded_message for message in reader.iter_decoded_messages([topic])]
+            columns = bag.columns(topic)
+            assert [message.step for message in theirs] == columns["step"].tolist()
+            path_ = "elastic_rate" if topic == "/hsv/vehiclestate" else "deviation.elastic_rate"
+            values = [message if path_ == "elastic_rate" else message.deviation for message in theirs]
+            np.testing.assert_array_equal([value.elastic_rate for value in values], columns[path_])
+
+
+def test_bag_without_messages(kit: SimpleNamespace, tmp_path: Path) -> None:
+    BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")]).close()
+    data = yaml.safe_load((tmp_path / "bag/metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert data["starting_time"] == {"nanoseconds_since_epoch": 9223372036854775807}
+    assert data["duration"] == {"nanoseconds": 0} and data["custom_data"] == {}
+    bag = Bag(tmp_path / "bag")
+    assert bag.complete and bag.topics["/hsv/state"].count == 0 and bag.span == (0, 0)
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 0
+
+
+def test_qos_is_rendered_in_words() -> None:
+    (profile,) = yaml.safe_load(Qos(deadline=1_500_000_000, lifespan=INFINITE).as_yaml())
+    assert profile["deadline"] == {"sec": 1, "nsec": 500_000_000}
+    assert set(profile) == QOS
+
+
+def test_writer_refuses(kit: SimpleNamespace, tmp_path: Path) -> None:
+    topic = kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")
+    writer = BagWriter(tmp_path / "bag", [topic])
+    for refused, word in [
+        (lambda: BagWriter(tmp_path / "bag"), "exists already"),
+        (lambda: writer.add_topic(topic), "/hsv/state"),
+        (lambda: writer.write("/hsv/other", 0, b""), "/hsv/other"),
+    ]:
+        with pytest.raises(RecordingError, match=word):
+            refused()
+
+
+def test_full_disk_is_one_clear_line(kit: SimpleNamespace, tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        with pytest.raises(RecordingError, match=r"bag_0\.mcap: cannot be written: File too large"):
+            for step in range(1000):
+                writer.write("/hsv/state", step, kit.messages.random.bytes(200))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def _foreign(path: Path, kit: SimpleNamespace) -> Path:
+    writer = BagWriter(path / "other", [kit.topic("/clock", "rosgraph_msgs/msg/Clock")])
+    writer.write("/clock", 0, kit.messages.serialize(kit.messages.make("rosgraph_msgs/msg/Clock")))
+    writer.close()
+    return path / "other"
+
+
+def _file(data: bytes) -> Callable[[Path, SimpleNamespace], Path]:
+    def make(path: Path, kit: SimpleNamespace) -> Path:
+        (path / "bag.mcap").write_bytes(data)
+        return path / "bag.mcap"
+
+    return make
+
+
+def _cut(length: int) -> Callable[[Path, SimpleNamespace], Path]:
+    def make(path: Path, kit: SimpleNamespace) -> Path:
+        file = next(_foreign(path, kit).glob("*.mcap"))
+        file.write_bytes(file.read_bytes()[:length])
+        return file.parent
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("make", "word"),
+    [
+        (lambda path, kit: path, "holds 0 files"),
+        (lambda path, kit: path / "nowhere", "does not exist"),
+        (_foreign, "no topic below /hsv/"),
+        (_file(b""), "is empty"),
+        (_file(b"SQLite format 3\0"), "not an MCAP"),
+        (_cut(8), "cut off"),
+        (_cut(20), "cut off"),
+        (_cut(60), "cut off"),
+    ],
+    ids=["empty directory", "missing", "foreign", "empty file", "other format", "magic only", "header", "first chunk"],
+)
+def test_unusable_input_is_one_clear_line(
+    make: Callable[[Path, SimpleNamespace], Path], word: str, kit: SimpleNamespace, tmp_path: Path
+) -> None:
+    path = make(tmp_path, kit)
+    with pytest.raises(RecordingError, match=word) as error:
+        Bag(path)
+    assert "\n" not in str(error.value) and str(path) in str(error.value)
+
+
+def test_missing_topic_and_damage_are_named(written: Written) -> None:
+    path, _ = written
+    bag = Bag(path)
+    for ask in (bag.columns, bag.messages, bag.times, bag.constants):
+        with pytest.raises(RecordingError, match="no topic /hsv/nowhere, expected one of /clock"):
+            ask("/hsv/nowhere")
+    file = path / "run_0.mcap"
+    with file.open("rb") as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[3]  # type: ignore[union-attr]
+    data = bytearray(file.read_bytes())
+    data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0xFF
+    file.write_bytes(data)
+    with pytest.raises(RecordingError, match=f"chunk at byte {chunk.chunk_start_offset} is damaged") as error:
+        Bag(path)
+    assert "\n" not in str(error.value)
+
+
+def test_message_that_does_not_fit_its_definition_is_named(kit: SimpleNamespace, tmp_path: Path) -> None:
+    writer = BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
+    writer.write("/hsv/state", 5, b"\x00\x01\x00\x00" + bytes(20))
+    writer.close()
+    with pytest.raises(RecordingError, match="topic /hsv/state: message at 5 ns") as error:
+        Bag(tmp_path / "bag").columns("/hsv/state")
+    assert "\n" not in str(error.value)

@@ -1,0 +1,79 @@
+"""The description of a bag tells what happened in it."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hsv.recording.info import describe
+from hsv.recording.reader import Bag
+from hsv.recording.writer import BagWriter
+
+PERIOD = 10**7
+
+
+@pytest.fixture
+def described(kit: SimpleNamespace, tmp_path: Path) -> dict[str, object]:
+    fault_type, tube_type = "hsv_msgs/msg/FaultStatus", "hsv_msgs/msg/TubeStatus"
+    writer = BagWriter(
+        tmp_path / "bag",
+        [kit.topic("/hsv/fault_status", fault_type), kit.topic("/hsv/tube_status", tube_type)],
+        {"scenario": "case1", "seed": "3"},
+    )
+    writer.attach("scenario.toml", "application/toml", b"12345")
+    make = kit.messages.store.types["hsv_msgs/msg/Fault"]
+    elevator = make(channel="elevator_deflection", type="loss_of_effectiveness", value=0.9)
+    fuel = make(channel="fuel_equivalence_ratio", type="loss_of_effectiveness", value=0.5)
+    for step in range(100):
+        time = step * PERIOD
+        active = [fuel] * (20 <= step < 30 or 40 <= step < 50) + [elevator] * (step >= 60)
+        writer.write("/hsv/fault_status", time, kit.messages.stamped(fault_type, time, step, active=active))
+        outside = 70 <= step < 75
+        tube = {
+            "status": 1 if step < 10 else 2 if outside else 0,
+            "level": math.nan if step < 10 else 1.5 if outside else 0.5,
+            "inside": step >= 10 and not outside,
+            "saturated": np.array([80 <= step < 90, step == 85]),
+        }
+        writer.write("/hsv/tube_status", time, kit.messages.stamped(tube_type, time, step, **tube))
+    writer.close()
+    return describe(Bag(tmp_path / "bag"))
+
+
+def test_description(described: dict[str, object]) -> None:
+    described = json.loads(json.dumps(described, allow_nan=False))
+    assert described["complete"] and described["messages"] == 200
+    assert described["duration_s"] == pytest.approx(0.99)
+    assert described["custom_data"] == {"scenario": "case1", "seed": "3"}
+    assert described["attachments"] == [{"name": "scenario.toml", "media_type": "application/toml", "size_bytes": 5}]
+    assert [topic["name"] for topic in described["topics"]] == ["/hsv/fault_status", "/hsv/tube_status"]
+    assert all(topic["rate_hz"] == pytest.approx(100) and topic["messages"] == 100 for topic in described["topics"])
+    loss = {"type": "loss_of_effectiveness"}
+    assert described["faults"] == [
+        {"channel": "fuel_equivalence_ratio", "value": 0.5, "start_s": 0.2, "end_s": 0.3} | loss,
+        {"channel": "fuel_equivalence_ratio", "value": 0.5, "start_s": 0.4, "end_s": 0.5} | loss,
+        {"channel": "elevator_deflection", "value": 0.9, "start_s": 0.6, "end_s": None} | loss,
+    ]
+    assert described["saturation"] == {
+        "steps": 10,
+        "fuel_equivalence_ratio_steps": 10,
+        "elevator_deflection_steps": 1,
+    }
+    assert described["tube"] == {
+        "checked_steps": 90,
+        "outside_steps": 5,
+        "largest_level": 1.5,
+        "excursions": [{"start_s": 0.7, "end_s": 0.75}],
+    }
+
+
+def test_what_the_bag_cannot_tell_is_none(kit: SimpleNamespace, tmp_path: Path) -> None:
+    BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")]).close()
+    described = describe(Bag(tmp_path / "bag"))
+    assert described["faults"] is described["saturation"] is described["tube"] is None
+    assert described["topics"][0]["rate_hz"] is None
