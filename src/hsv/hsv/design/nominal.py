@@ -31,8 +31,8 @@ _INPUT_MARGIN = 1e-3
 class NominalGain:
     """K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
 
-    ``K`` (m, n), ``Y`` (m, n), ``Q`` (n, n) in SI; ``gamma`` (s) the solver's bound of (32); ``certified_gamma`` (s) that
-    recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those of the returned
+    ``K`` (m, n), ``Y`` (m, n), ``Q`` (n, n) in SI; ``gamma`` (s) the bound of (32) as solved, ``certified_gamma`` (s)
+    as recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those of the returned
     matrices: ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit diagonal;
     ``state`` 1 minus the level of the design state, (33); ``input`` (m) 1 minus the largest squared input over its
     squared bound, (35); ``nesting`` smallest eigenvalue of 1 - Q, Q measured in the ellipsoid outside; ``radii`` (r)
