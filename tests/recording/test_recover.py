@@ -43,7 +43,6 @@ for step in itertools.count():
 def killed(tmp_path: Path) -> tuple[Path, int]:
     """A bag whose writing process was killed, and the last step it said to have written."""
     path = tmp_path / "killed"
-    # An interpreter that starts itself again (as that of the ROS wheels does) must not be outlived by the writer.
     process = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
     for line in process.stdout:
