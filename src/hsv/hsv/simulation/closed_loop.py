@@ -12,6 +12,7 @@ from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance, n
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.tube_law import TubeLaw, tube_input
 from hsv.faults.actuator import FaultInjector, apply_faults
+from hsv.simulation.metrics import FlightData
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.plant import FlightStatus, Plant
@@ -101,18 +102,32 @@ def _fly(
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight: ``period`` (s), what happened at each step, the reference x_r (9), u_r (2), and how it ended."""
+    """A flight: ``period`` (s), what happened at each step, reference x_r (9) and u_r (2), the time of the first fault."""
 
     period: float
     history: History
     reference: np.ndarray
     reference_input: np.ndarray
+    fault_start: float | None
     status: FlightStatus
 
     @property
     def time(self) -> np.ndarray:
         """Simulated time (n + 1), s."""
         return np.arange(len(self.history.state)) * self.period
+
+    def data(self) -> FlightData:
+        """Return what the metrics are made of."""
+        h = self.history
+        return FlightData(
+            time=self.time,
+            state=h.state,
+            reference=np.broadcast_to(self.reference, h.state.shape),
+            deviation=h.deviation,
+            command=h.command,
+            saturated=h.command != h.u_unsaturated,
+            fault_start=self.fault_start,
+        )
 
 
 def fly(components: Components) -> Flight:
@@ -137,4 +152,6 @@ def fly(components: Components) -> Flight:
     history = History(*(column[:rows] for column in history))
     diverged = not in_model_range(history.state[-1])
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
-    return Flight(plant.period, history, reference.state, reference.input, status)
+    starts = components.fault_injector.schedule.start
+    fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < rows else None
+    return Flight(plant.period, history, reference.state, reference.input, fault_start, status)

@@ -1,0 +1,130 @@
+"""Base of all nodes: parameters, links of the graph description, the ready barrier, diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from hsv_msgs.msg import Ready, Run
+from rclpy.node import Node
+from hsv.graph import description
+from hsv.parameters import Parameter
+from hsv_node.messages import message_class
+from hsv_node.parameters import declare
+from hsv_node.qos import LATCHED, STEP
+
+LOCKSTEP_PARAMETERS = (Parameter("recorder", True, "whether a recorder belongs to the graph"),)
+
+
+class LockstepNode(Node):
+    """A node of the graph description that reacts to the messages of a step and never to timers."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.exit_code: int | None = None
+        """Set when the node wants to end, to the exit code of the process."""
+        self.recorded = bool(declare(self, LOCKSTEP_PARAMETERS)["recorder"])
+        self._inputs: dict[str, Any] = {}
+        self._outputs: dict[str, Any] = {}
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
+        self._diagnosed_second = -1
+
+    def listen(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
+        """Subscribe a step topic of the graph description."""
+        kind = message_class(description.TOPICS[topic])
+        self._inputs[topic] = self.create_subscription(kind, topic, callback, STEP, raw=raw)
+
+    def talk(self, topic: str) -> Any:
+        """Return the publisher of a step topic of the graph description."""
+        self._outputs[topic] = self.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
+        return self._outputs[topic]
+
+    def missing_links(self) -> list[str]:
+        """Return what this node still waits for, e.g. ``"tube_mpc (/hsv/nominal)"``; empty when all is matched."""
+        missing = []
+        expected: dict[str, int] = {}
+        for topic, peer in description.links(self.get_name(), self.recorded):
+            expected[topic] = expected.get(topic, 0) + 1
+            if topic in self._outputs:
+                seen = self.get_subscriptions_info_by_topic(topic)
+                matched = self._outputs[topic].get_subscription_count()
+            else:
+                seen = self.get_publishers_info_by_topic(topic)
+                matched = self._inputs[topic].get_publisher_count()
+            # Names say who is there, counts that the link itself stands: both are needed before the first message.
+            if peer not in (endpoint.node_name for endpoint in seen) or matched < expected[topic]:
+                missing.append(f"{peer} ({topic})")
+        return missing
+
+    def finish(self, code: int) -> None:
+        """End the process with ``code`` once the current callback has returned."""
+        self.exit_code = code
+
+    def poll(self) -> None:
+        """Called between messages, at least four times a second; overridden where something must be watched."""
+
+    def close(self) -> None:
+        """Called once before the process ends; overridden where something must be saved."""
+
+    def patience(self) -> float:
+        """Return how long (s) to wait for a message before :meth:`poll` is due."""
+        return 0.25
+
+    def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
+        """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""
+        if step_stamp.sec == self._diagnosed_second and not warning:
+            return
+        self._diagnosed_second = step_stamp.sec
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
+            name=self.get_name(),
+            message=summary,
+            hardware_id="hsv",
+            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+        )
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = step_stamp
+        self._diagnostics.publish(message)
+
+
+class PeerNode(LockstepNode):
+    """A node other than the plant: it announces itself ready to every run that the plant announces."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._run: Run | None = None
+        self._announced = False
+        self._waiting_for: list[str] | None = None
+        self._ready = self.create_publisher(Ready, "/hsv/ready", LATCHED)
+        self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
+
+    def start_run(self, run: Run) -> None:
+        """Forget the run before; overridden by every node."""
+
+    def poll(self) -> None:
+        """Announce this node as ready as soon as all its links are matched; until then say for whom it waits."""
+        if self._announced:
+            return
+        missing = self.missing_links()
+        if self._run is not None and not missing:
+            self._announced = True
+            self._ready.publish(Ready(node=self.get_name(), run_id=self._run.run_id))
+        elif missing != self._waiting_for:
+            self._waiting_for = missing
+            if missing:
+                self.get_logger().info("waiting for " + ", ".join(missing))
+
+    def patience(self) -> float:
+        """Look at the links more often until they stand."""
+        return 0.25 if self._announced else 0.02
+
+    def _on_run(self, run: Run) -> None:
+        period = self.get_parameter("period").value if self.has_parameter("period") else run.period
+        if period != run.period:
+            self.get_logger().fatal(f"parameter period = {period}: expected the plant's, {run.period}")
+            self.finish(2)
+            return
+        self._run = run
+        self._announced = False
+        self.start_run(run)

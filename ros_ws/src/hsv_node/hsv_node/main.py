@@ -1,0 +1,55 @@
+"""Start and stop of a node process."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+
+import rclpy
+from rclpy.exceptions import ParameterException
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
+
+from hsv.errors import HsvError
+from hsv_node.lockstep import LockstepNode
+
+
+def run_node(build: Callable[[], LockstepNode], name: str, args: Sequence[str] | None = None) -> int:
+    """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
+
+    Bad parameters end it before it joins the graph, with one line on standard error and exit code 2.
+    """
+    try:
+        rclpy.init(args=args, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    except Exception as error:  # rcl reports a malformed command line or parameter file by several exception types
+        return _refuse(name, error)
+    # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
+    stop: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, _frame: stop.append(received))
+    node = None
+    try:
+        node = build()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        # The executor runs nothing while it waits without a limit.
+        while node.exit_code is None and not stop:
+            node.poll()
+            executor.spin_once(timeout_sec=node.patience())
+        return node.exit_code or 0
+    except (HsvError, ParameterException, rclpy_implementation.RCLError) as error:
+        return _refuse(name, error)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return 0
+    finally:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+
+
+def _refuse(name: str, error: BaseException) -> int:
+    print(f"{name}: error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+    return 2

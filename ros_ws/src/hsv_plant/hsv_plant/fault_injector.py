@@ -1,0 +1,72 @@
+"""The fault injector node: between the controller's command and the actuator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hsv_msgs.msg import ControlInput, FaultStatus, Run
+from hsv_msgs.msg import Fault as FaultMessage
+from hsv_msgs.srv import ClearFault, InjectFault
+
+from hsv.errors import ParameterError
+from hsv.faults.actuator import FAULT_PARAMETERS, Fault, FaultInjector
+from hsv_node.lockstep import PeerNode
+from hsv_node.main import run_node
+from hsv_node.messages import fill_input, input_vector
+from hsv_node.parameters import declare
+
+
+class FaultInjectorNode(PeerNode):
+    """Turns /hsv/command into /hsv/actuator, and says on /hsv/fault_status which faults act."""
+
+    def __init__(self) -> None:
+        super().__init__("fault_injector")
+        self.injector = FaultInjector.from_parameters(declare(self, FAULT_PARAMETERS))
+        self._actuator_message = ControlInput()
+        self._actuator = self.talk("/hsv/actuator")
+        self._status = self.talk("/hsv/fault_status")
+        self.listen("/hsv/command", self._on_command)
+        self.create_service(InjectFault, "/hsv/inject_fault", self._inject)
+        self.create_service(ClearFault, "/hsv/clear_fault", self._clear)
+
+    def start_run(self, run: Run) -> None:
+        """Return to the scheduled faults."""
+        self.injector.reset()
+
+    def _on_command(self, command: ControlInput) -> None:
+        result = self.injector.step(command.step, input_vector(command))
+        message = self._actuator_message
+        message.header, message.step = command.header, command.step
+        fill_input(message, result.actuator)
+        self._actuator.publish(message)
+        active = [FaultMessage(channel=f.channel, type=f.type, value=f.value) for f in result.active]
+        self._status.publish(FaultStatus(header=command.header, step=command.step, active=active))
+        self.diagnose(command.header.stamp, "faults act" if active else "no fault", step=command.step)
+
+    def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
+        try:
+            fault = Fault(request.fault.channel, request.fault.type, request.fault.value)
+        except ParameterError as error:
+            response.accepted, response.message = False, str(error)
+            return response
+        response.step = self.injector.inject(fault)
+        response.accepted = True
+        response.message = f"{fault.type} {fault.value:g} of {fault.channel} from step {response.step} on"
+        self.get_logger().info(response.message)
+        return response
+
+    def _clear(self, request: ClearFault.Request, response: ClearFault.Response) -> ClearFault.Response:
+        try:
+            response.step = self.injector.clear(request.channel)
+        except ParameterError as error:
+            response.accepted, response.message = False, str(error)
+            return response
+        response.accepted = True
+        response.message = f"no fault of {request.channel or 'any channel'} from step {response.step} on"
+        self.get_logger().info(response.message)
+        return response
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the fault injector node."""
+    return run_node(FaultInjectorNode, "fault_injector", args)

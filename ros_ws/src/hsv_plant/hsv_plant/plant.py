@@ -1,0 +1,175 @@
+"""The plant node: owns simulated time, publishes the state of a step and integrates when its input has come."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections.abc import Sequence
+
+import numpy as np
+from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
+from rosgraph_msgs.msg import Clock
+
+from hsv.parameters import Parameter
+from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
+from hsv_node.lockstep import LockstepNode
+from hsv_node.main import run_node
+from hsv_node.messages import fill_state, input_vector
+from hsv_node.parameters import declare
+from hsv_node.qos import LATCHED, STEP
+from hsv_plant.liveness import unresponsive
+
+NODE_PARAMETERS = (
+    Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
+    Parameter("start_timeout", 30.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
+    Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
+    Parameter("nodes", ["notch_filter", "nominal_trajectory", "tube_mpc", "fault_injector"], "nodes to wait for"),
+    Parameter("progress", False, "print the step to standard output, for a progress bar"),
+)
+
+MAX_AHEAD = 100
+"""Steps that the plant may be ahead of the recorder."""
+
+EXIT_DIVERGED = 3
+"""Exit code after a flight that left the range of the model."""
+
+
+class PlantNode(LockstepNode):
+    """Publishes /hsv/state, /hsv/forces and /clock; one step per message on /hsv/actuator."""
+
+    def __init__(self) -> None:
+        super().__init__("plant")
+        self.values = declare(self, (*PLANT_PARAMETERS, *NODE_PARAMETERS))
+        self.plant = Plant.from_parameters(self.values)
+        self._peers = [*self.values["nodes"], *(["recorder"] if self.recorded else [])]
+        self._ready: set[str] = set()
+        self._waiting_for: list[str] | None = None
+        self._state_message, self._forces_message = VehicleState(), VehicleForces()
+        self._clock_message = Clock()
+        self._state = self.talk("/hsv/state")
+        self._clock = self.talk("/clock")
+        self._forces = self.talk("/hsv/forces")
+        self.listen("/hsv/actuator", self._on_actuator)
+        self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
+        self.create_subscription(RecorderProgress, "/hsv/recorder_progress", self._on_progress, STEP)
+        self._run = Run(run_id=uuid.uuid4().hex, period=self.plant.period, last_step=self.plant.steps)
+        self._announcer = self.create_publisher(Run, "/hsv/run", LATCHED)
+        self._announcer.publish(self._run)
+        self._result = self.plant.reset()
+        self._started = False
+        self._recorded_step = -1
+        self._actuator: np.ndarray | None = None
+        self._flown = False
+        self._heard = self._begun = time.monotonic()
+
+    def _on_ready(self, ready: Ready) -> None:
+        if ready.run_id == self._run.run_id:
+            self._ready.add(ready.node)
+
+    def _on_progress(self, progress: RecorderProgress) -> None:
+        self._recorded_step = progress.step
+        self._heard = time.monotonic()
+        self._continue()
+
+    def _on_actuator(self, message: ControlInput) -> None:
+        if message.step != self._result.step:
+            self.get_logger().error(f"/hsv/actuator of step {message.step}: expected {self._result.step}, ignored")
+            return
+        self._heard = time.monotonic()
+        if self._result.status is FlightStatus.RUNNING:
+            self._actuator = input_vector(message)
+        else:
+            self._flown = True
+        self._continue()
+
+    def _continue(self) -> None:
+        """Take the next step, unless its input, the recorder or the wall clock has to be waited for."""
+        if self._flown and (not self.recorded or self._recorded_step >= self._result.step):
+            self._land()
+        elif self._actuator is not None and self._delay() <= 0.0 and self._room():
+            actuator, self._actuator = self._actuator, None
+            self._result = self.plant.step(actuator)
+            self._publish()
+
+    def _room(self) -> bool:
+        return not self.recorded or self._result.step < self._recorded_step + MAX_AHEAD
+
+    def _delay(self) -> float:
+        """Return the wall time (s) until the next state is due."""
+        factor = self.values["real_time_factor"]
+        if factor == 0.0:
+            return 0.0
+        return self._begun + (self._result.step + 1) * self.plant.period / factor - time.monotonic()
+
+    def _publish(self) -> None:
+        result = self._result
+        nanoseconds = round(result.step * self.plant.period * 1e9)
+        seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
+        state, forces, clock = self._state_message, self._forces_message, self._clock_message
+        for stamp in (state.header.stamp, forces.header.stamp, clock.clock):
+            stamp.sec, stamp.nanosec = seconds, nanoseconds
+        state.step = forces.step = result.step
+        fill_state(state, result.state)
+        state.status = int(result.status)
+        # The state first: the other nodes work on it while the rest is published.
+        self._state.publish(state)
+        forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = result.forces
+        self._forces.publish(forces)
+        self._clock.publish(clock)
+        if self.values["progress"] and (result.step % 50 == 0 or result.status is not FlightStatus.RUNNING):
+            print(f"step {result.step} of {self.plant.steps}", flush=True)
+        self.diagnose(state.header.stamp, step=result.step, status=result.status.name)
+
+    def poll(self) -> None:
+        """Start when everybody is ready, keep the pace, and name whoever is silent for too long."""
+        if not self._started:
+            self._try_start()
+        else:
+            self._continue()
+            waited = time.monotonic() - self._heard
+            if waited > self.values["step_timeout"] + max(self._delay(), 0.0):
+                self._give_up(waited)
+
+    def patience(self) -> float:
+        """Wake in time for the next state when paced."""
+        if not self._started:
+            return 0.02
+        return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
+
+    def _try_start(self) -> None:
+        missing = [f"{peer} (/hsv/ready)" for peer in self._peers if peer not in self._ready] or self.missing_links()
+        if not missing:
+            self._started = True
+            self._heard = self._begun = time.monotonic()
+            self._publish()
+            return
+        if missing != self._waiting_for:
+            self._waiting_for = missing
+            self.get_logger().info("waiting for " + ", ".join(missing))
+        limit = self.values["start_timeout"]
+        if limit and time.monotonic() - self._begun > limit:
+            self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(missing))
+            self.finish(1)
+
+    def _give_up(self, waited: float) -> None:
+        step = self._result.step
+        behind_recorder = self._flown or not self._room()
+        what = "the recorder's confirmation" if behind_recorder else "/hsv/actuator (from fault_injector)"
+        silent = unresponsive(self, self._peers)
+        blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
+        self.get_logger().fatal(f"step {step}: no {what} for {waited:.1f} s; {blame}")
+        self.finish(1)
+
+    def _land(self) -> None:
+        result = self._result
+        if result.status is FlightStatus.DIVERGED:
+            self.get_logger().error(
+                f"flight diverged at t = {result.step * self.plant.period:.2f} s: "
+                f"angle of attack {result.state[2]:.3g} rad, pitch angle {result.state[3]:.3g} rad"
+            )
+        self.finish(EXIT_DIVERGED if result.status is FlightStatus.DIVERGED else 0)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the plant node."""
+    return run_node(PlantNode, "plant", args)

@@ -1,0 +1,95 @@
+"""From a scenario to the files that a run of the graph needs: parameters, attachments, a name for the bag."""
+
+from __future__ import annotations
+
+import datetime
+import subprocess
+import tempfile
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hsv.control.design_file import find_design, read_parameters
+from hsv.simulation.assembly import assemble
+from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A checked scenario with its parameter files (design first, scenario over it) and the bag it will be recorded to."""
+
+    scenario: Scenario
+    run_id: str
+    bag: Path
+    parameter_files: tuple[Path, ...]
+
+
+def prepare(
+    scenario_name: str, *, bags: Path = Path("bags"), bag: Path | None = None, real_time_factor: float = 0.0
+) -> PreparedRun:
+    """Check scenario and design and write the parameter files of a run to a temporary folder.
+
+    Everything that can be refused is refused here, before any process starts or anything is written beside ``bags``.
+
+    Raises:
+        ScenarioError, DesignError, ParameterError, TrimError: Names the field that is wrong.
+    """
+    text = scenario_text(scenario_name)
+    scenario = parse_scenario(text, Path(scenario_name).stem)
+    design_file = find_design(scenario.design)
+    design = read_parameters(design_file)
+    assemble({**design, **scenario.parameters()})
+    now = datetime.datetime.now(datetime.UTC)
+    bag = bag or bags / f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
+    run_id = uuid.uuid4().hex
+    folder = Path(tempfile.mkdtemp(prefix="hsv_run_"))
+    files = {
+        "scenario.toml": text,
+        "design.yaml": design_file.read_text(encoding="utf-8"),
+        "scenario.yaml": _yaml(scenario.parameters()),
+    }
+    certificate = design_file.with_suffix(".certificate.json")
+    if certificate.is_file():
+        files["certificate.json"] = certificate.read_text(encoding="utf-8")
+    for name, content in files.items():
+        (folder / name).write_text(content, encoding="utf-8")
+    run = {
+        "real_time_factor": float(real_time_factor),
+        "recorder": True,
+        "bag.directory": str(bag.absolute()),
+        "bag.attachments": [str(folder / name) for name in files],
+        "bag.custom_data": [
+            f"{key}={value}"
+            for key, value in {
+                "run_id": run_id,
+                "scenario": scenario.name,
+                "title": scenario.title,
+                "commit": commit(),
+                "design": scenario.design,
+                "design_hash": str(design.get("design.hash", "")),
+                "seed": "none",
+                "started": now.isoformat(timespec="seconds"),
+            }.items()
+        ],
+    }
+    (folder / "run.yaml").write_text(_yaml(run), encoding="utf-8")
+    return PreparedRun(
+        scenario, run_id, bag, tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
+    )
+
+
+def commit() -> str:
+    """Return the git commit of this source tree, marked if it has changes; ``unknown`` outside a checkout."""
+    command = ["git", "-C", str(Path(__file__).resolve().parent), "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+
+
+def _yaml(parameters: dict[str, Any]) -> str:
+    # Dotted names need no nesting: rcl takes them as they are.
+    return yaml.safe_dump({"/**": {"ros__parameters": parameters}}, sort_keys=False)
