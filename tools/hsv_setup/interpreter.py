@@ -20,7 +20,7 @@ _PROBE = """
 import importlib.util, json, os, platform, sys, sysconfig
 paths = sysconfig.get_paths()
 print(json.dumps({
-    "executable": getattr(sys, "_base_executable", sys.executable),
+    "executable": os.path.realpath(getattr(sys, "_base_executable", sys.executable)),
     "version": list(sys.version_info[:3]),
     "machine": platform.machine(),
     "libc": list(platform.libc_ver()),

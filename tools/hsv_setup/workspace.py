@@ -7,6 +7,7 @@ modules (launch files and other data are linked one by one).
 
 from __future__ import annotations
 
+import os
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +16,7 @@ from pathlib import Path
 
 from hsv_setup.console import SetupError, Stage
 from hsv_setup.environment import PYTHON
-from hsv_setup.paths import BUILD, INSTALL, LOG, ROOT, fingerprint, read_stamp, write_stamp
+from hsv_setup.paths import BUILD, INSTALL, LOG, ROOT, VENV, fingerprint, read_stamp, write_stamp
 from hsv_setup.routes import Route
 
 BASE_PATHS = ("src", "ros_ws/src")
@@ -39,6 +40,11 @@ class Package:
     def stamp(self) -> Path:
         """The file that says what the package was last built from."""
         return BUILD / self.name / "hsv-setup"
+
+    @property
+    def exit_code(self) -> Path:
+        """The file in which colcon leaves the exit code of the package's last build."""
+        return BUILD / self.name / "colcon_build.rc"
 
     def key(self, route: Route) -> str:
         """Return a fingerprint of everything that makes a build necessary."""
@@ -111,14 +117,22 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
     keys = {package: package.key(route) for package in wanted}
     for package in wanted:
         package.stamp.unlink(missing_ok=True)
+        package.exit_code.unlink(missing_ok=True)
         if package.is_python:
             # "develop" leaves the links of files that no longer exist.
             shutil.rmtree(BUILD / package.name, ignore_errors=True)
             shutil.rmtree(INSTALL / package.name, ignore_errors=True)
+    search = {"PATH": f"{PYTHON.parent}{os.pathsep}{env['PATH']}"}
+    if route.wheels:
+        # The virtual environment is the ament prefix under the workspace.
+        search.update(AMENT_PREFIX_PATH=str(VENV), CMAKE_PREFIX_PATH=str(VENV))
     command: list[str | Path] = [PYTHON, "-c", _COLCON, "--log-base", LOG, "build", "--symlink-install"]
     command += ["--base-paths", *BASE_PATHS, "--build-base", BUILD, "--install-base", INSTALL]
     command += ["--packages-select", *(package.name for package in wanted)]
     command += ["--cmake-args", "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", f"-DPython3_EXECUTABLE={PYTHON}"]
-    stage.run(command, env, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
-    for package, key in keys.items():
-        write_stamp(package.stamp, key)
+    try:
+        stage.run(command, {**env, **search}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
+    finally:
+        for package, key in keys.items():
+            if read_stamp(package.exit_code).strip() == "0":
+                write_stamp(package.stamp, key)
