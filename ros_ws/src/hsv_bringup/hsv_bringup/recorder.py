@@ -106,8 +106,8 @@ class RecorderNode(PeerNode):
         self._complete = round(stamp / self._nanoseconds_per_step)
         final = self._complete >= self._last_step or self._is_last(messages["/hsv/state"])
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
-            if final:
-                self.bag.flush()
+            # What is confirmed is on its way to the disk, whatever happens to this process.
+            self.bag.flush()
             self._progress_message.step = self._complete
             self._progress.publish(self._progress_message)
 

@@ -199,17 +199,24 @@ def find_design(name: str) -> Path:
     Raises:
         DesignError: No such file.
     """
-    if "/" in name or name.endswith(".yaml"):
+    return find_file(name, ".yaml")
+
+
+def find_file(name: str, suffix: str) -> Path:
+    """Return a design's file of the given ``suffix``; see :func:`find_design`."""
+    if "/" in name or name.endswith(suffix):
         candidates = [Path(name)]
     else:
         folders = [Path(folder) for folder in os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep) if folder]
         # A source checkout, or a symlinked build of one, has the designs beside it.
         folders += [parent / "offline_design" for parent in Path(__file__).resolve().parents]
-        candidates = [folder / f"{name}.yaml" for folder in folders]
+        candidates = [folder / f"{name}{suffix}" for folder in folders]
     for candidate in candidates:
         if candidate.is_file():
             return candidate
-    raise DesignError(f"design = {name!r}: no such file, expected a parameter file or a name in HSV_DESIGN_PATH")
+    raise DesignError(
+        f"design = {name!r}: no such file, expected the path of a {suffix} file or a name in HSV_DESIGN_PATH"
+    )
 
 
 def _flatten(branch: Mapping[str, Any], prefix: str, into: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
 
+from hsv.control.design_file import find_file
 from hsv.errors import DesignError
 from hsv.units import parse_quantity
 
@@ -153,6 +154,15 @@ def read_inputs(path: Path) -> DesignInputs:
         return parse_inputs(table)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from error
+
+
+def find_inputs(name: str) -> Path:
+    """Return the design TOML given by path, or by name in ``HSV_DESIGN_PATH`` or the source checkout.
+
+    Raises:
+        DesignError: No such file.
+    """
+    return find_file(name, ".toml")
 
 
 def _first_line(error: ValidationError, table: dict[str, Any]) -> str:

@@ -1,0 +1,49 @@
+"""The hsv command: one file a command, errors on one line, exit code 0 only on success."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from hsv.cli.design import design
+from hsv.cli.info import info
+from hsv.cli.linearise import linearise
+from hsv.cli.output import errors
+from hsv.cli.run import run
+from hsv.cli.scenarios import scenarios
+from hsv.cli.simulate import simulate
+from hsv.cli.trim import trim
+from hsv.errors import HsvError, RunError
+
+app = typer.Typer(
+    name="hsv",
+    help="Software-in-the-loop flight of a flexible air-breathing hypersonic vehicle under Tube-MPC.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+)
+for command in (trim, linearise, design, scenarios, simulate, run, info):
+    app.command()(command)
+
+
+def main() -> None:
+    """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
+    try:
+        app()
+    except RunError as error:
+        _fail(error, 1)
+    except HsvError as error:
+        _fail(error, 2)
+    except KeyboardInterrupt:
+        _fail("interrupted", 130)
+
+
+def _fail(problem: object, code: int) -> None:
+    errors.print(f"[bold red]hsv: error:[/] {str(problem).replace('[', chr(92) + '[')}", soft_wrap=True)
+    sys.exit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,16 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from hsv.cli.output import Units
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every key carries its unit.")]
+UnitsOption = Annotated[Units, typer.Option(help="Units of what is printed: SI, or the paper's ft, ft/s, deg.")]
+AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '85000 ft'.")]
+VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
+CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
+ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]

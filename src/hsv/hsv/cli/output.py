@@ -1,0 +1,88 @@
+"""Printing numbers with their units: a table for people, JSON with the unit in every key for programs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from hsv.units import to_paper
+
+console = Console(highlight=False)
+errors = Console(stderr=True, highlight=False)
+
+
+class Units(StrEnum):
+    """Which units are printed."""
+
+    si = "si"
+    paper = "paper"
+
+
+UNIT_KEYS = {
+    "1": "",
+    "m": "m",
+    "ft": "ft",
+    "m/s": "m_per_s",
+    "ft/s": "ft_per_s",
+    "rad": "rad",
+    "deg": "deg",
+    "rad/s": "rad_per_s",
+    "deg/s": "deg_per_s",
+    "s": "s",
+    "m s": "m_s",
+    "ft s": "ft_s",
+    "N": "N",
+    "lbf": "lbf",
+    "N m": "N_m",
+    "lbf ft": "lbf_ft",
+    "Pa": "Pa",
+    "lbf/ft^2": "psf",
+    "kg^0.5 m": "sqrt_kg_m",
+    "kg^0.5 m/s": "sqrt_kg_m_per_s",
+    "slug^0.5 ft": "sqrt_slug_ft",
+    "slug^0.5 ft/s": "sqrt_slug_ft_per_s",
+}
+"""How a unit is spelled at the end of a JSON key."""
+
+Quantity = tuple[float, str]
+"""A number and its SI unit."""
+
+
+def shown(quantity: Quantity, units: Units) -> Quantity:
+    """Return ``quantity`` in the units asked for."""
+    return to_paper(*quantity) if units is Units.paper else quantity
+
+
+def to_json(quantities: Mapping[str, Quantity], units: Units) -> dict[str, float]:
+    """Return the numbers with the unit appended to every key, e.g. ``altitude_ft``."""
+    values = {}
+    for name, quantity in quantities.items():
+        value, unit = shown(quantity, units)
+        values["_".join(filter(None, (name, UNIT_KEYS[unit])))] = value
+    return values
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print ``values`` as JSON on standard output."""
+    sys.stdout.write(json.dumps(values, indent=2) + "\n")
+
+
+def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:
+    """Print name, value and unit of every quantity, with an optional remark."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table.add_column("quantity")
+    table.add_column("value", justify="right")
+    table.add_column("unit")
+    if remarks:
+        table.add_column("")
+    for name, quantity in quantities.items():
+        value, unit = shown(quantity, units)
+        row = [name.replace("_", " "), f"{value:.5g}", "" if unit == "1" else unit]
+        table.add_row(*row, *([remarks.get(name, "")] if remarks else []))
+    console.print(table)

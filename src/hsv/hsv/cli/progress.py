@@ -1,0 +1,56 @@
+"""Progress of long work, on a terminal only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from hsv.cli.output import errors
+
+
+def _bar() -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TextColumn("{task.fields[note]}"),
+        TimeElapsedColumn(),
+        console=errors,
+        transient=True,
+        disable=not errors.is_terminal,
+    )
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a callback (stage, done, total) that shows one bar a stage."""
+    with _bar() as bar:
+        tasks: dict[str, int] = {}
+
+        def report(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, note="")
+            bar.update(tasks[stage], completed=done, total=total)  # type: ignore[arg-type]
+
+        yield report
+
+
+@contextmanager
+def flight(title: str, duration: float, steps: int) -> Iterator[Callable[[int], None]]:
+    """Yield a callback (step) that shows the simulated time flown and the real-time factor."""
+    import time
+
+    with _bar() as bar:
+        task = bar.add_task(title, total=steps, note="starting the nodes")
+        started: list[float] = []
+
+        def report(step: int) -> None:
+            started[:1] = started[:1] or [time.monotonic()]
+            simulated = duration * step / steps
+            elapsed = time.monotonic() - started[0]
+            factor = f", {simulated / elapsed:.1f} x real time" if elapsed > 0.5 else ""
+            bar.update(task, completed=step, note=f"{simulated:.0f} of {duration:.0f} s{factor}")
+
+        yield report

@@ -1,0 +1,82 @@
+"""hsv run"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
+from hsv.cli.output import Units, errors
+
+
+def run(
+    scenario: ScenarioArgument = "case1",
+    real_time_factor: Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")] = 0.0,
+    bag: Annotated[Path | None, typer.Option(help="Bag to write; default: bags/<scenario>_<UTC>.")] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
+    units: UnitsOption = Units.si,
+    json: JsonOption = False,
+) -> None:
+    """Fly a scenario with the graph of ROS 2 nodes as separate processes, recorded to an MCAP bag.
+
+    Example: hsv run case1 --units paper
+    """
+    import time
+
+    from hsv.cli.progress import flight as flight_bar
+    from hsv.cli.summary import report_flight
+    from hsv.errors import QuantityError, RunError
+    from hsv.graph.launcher import Launcher
+    from hsv.graph.preparation import prepare
+    from hsv.recording.flight import flight_data
+    from hsv.recording.metadata import FILE_NAME
+    from hsv.recording.reader import Bag
+    from hsv.recording.recover import recover
+    from hsv.simulation.metrics import flight_metrics
+
+    if not 0.0 <= real_time_factor <= 1000.0:
+        raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
+    prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor)
+    if prepared.bag.exists():
+        raise QuantityError(f"bag = {str(prepared.bag)!r}: exists already, expected a new directory")
+    loaded = prepared.scenario
+    arguments = [word for path in prepared.parameter_files for word in ("--params-file", str(path))]
+    clock: dict[str, float] = {}
+
+    def line(node: str, text: str) -> None:
+        if verbose or " [WARN] " in text:
+            errors.print(f"[dim]{node}:[/] {text}", markup=True, soft_wrap=True)
+
+    from hsv.control.design_file import read_parameters
+
+    period = read_parameters(prepared.parameter_files[0])["period"]
+    with flight_bar(loaded.name, loaded.duration, max(1, round(loaded.duration / period))) as show:
+
+        def step(number: int) -> None:
+            clock.setdefault("start", time.monotonic())
+            clock["end"] = time.monotonic()
+            show(number)
+
+        try:
+            with Launcher(arguments, step, line) as launcher:
+                ending = launcher.wait()
+        finally:
+            # A recorder that was killed could not finish its bag.
+            if prepared.bag.is_dir() and not (prepared.bag / FILE_NAME).exists():
+                recover(prepared.bag)
+    if ending.culprit:
+        words = "".join(f"\n  {word}" for word in ending.last_words)
+        raise RunError(f"{ending.culprit} {ending.reason}; the bag is {prepared.bag}. Its last words:{words}")
+    data = flight_data(Bag(prepared.bag))
+    report_flight(
+        loaded,
+        flight_metrics(data),
+        diverged_at=float(data.time[-1]) if ending.plant_code == 3 else None,
+        wall_time=clock["end"] - clock["start"],
+        simulated_time=float(data.time[-1]),
+        units=units,
+        json=json,
+        extra={"bag": str(prepared.bag)},
+    )

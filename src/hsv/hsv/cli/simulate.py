@@ -1,0 +1,51 @@
+"""hsv simulate"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
+from hsv.cli.output import Units
+
+
+def simulate(
+    scenario: ScenarioArgument = "case1",
+    units: UnitsOption = Units.si,
+    out: Annotated[Path | None, typer.Option(help="Also save the time histories to this .npz file (SI).")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Fly a scenario in this process, without ROS; the same numbers as the graph, bit for bit.
+
+    Example: hsv simulate case1 --units paper
+    """
+    import time
+
+    import numpy as np
+
+    from hsv.cli.summary import report_flight
+    from hsv.simulation.assembly import assemble, flight_parameters
+    from hsv.simulation.closed_loop import fly
+    from hsv.simulation.metrics import flight_metrics
+    from hsv.simulation.scenario import load_scenario
+    from hsv.vehicle.plant import FlightStatus
+
+    loaded = load_scenario(scenario)
+    components = assemble(flight_parameters(loaded))
+    started = time.perf_counter()
+    flight = fly(components)
+    wall = time.perf_counter() - started
+    if out:
+        with out.open("wb") as stream:
+            np.savez_compressed(stream, time=flight.time, **flight.history._asdict())
+    report_flight(
+        loaded,
+        flight_metrics(flight.data()),
+        diverged_at=flight.time[-1] if flight.status is FlightStatus.DIVERGED else None,
+        wall_time=wall,
+        simulated_time=float(flight.time[-1]),
+        units=units,
+        json=json,
+    )

@@ -1,0 +1,32 @@
+"""Fill the compiled caches once, so that nodes starting together do not all compile: ``python -m hsv.warm``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+
+def warm() -> None:
+    """Step every component and fly every compiled loop once."""
+    components = assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1})
+    fly(components)
+    state = components.plant.reset()
+    filtered = components.notch_filter.step(float(state.state[4]))
+    nominal = components.nominal_trajectory.step(state.state)
+    tube = components.tube_law.step(
+        state.state,
+        filtered.filtered_pitch_rate,
+        nominal.reference,
+        nominal.reference_input,
+        nominal.deviation,
+        nominal.input,
+    )
+    actuator = components.fault_injector.step(0, tube.input).actuator
+    components.plant.step(np.asarray(actuator))
+
+
+if __name__ == "__main__":
+    warm()
