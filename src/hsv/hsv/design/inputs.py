@@ -115,6 +115,36 @@ class NotchInputs(_Table):
     pole_damping: Number = Positive
 
 
+class DisturbanceInputs(_Table):
+    """The declared region over which disturbances are measured (paper eq. 13-19): the nominal step, every corner."""
+
+    coupling: Literal["paper_like", "derived"]
+    duration: Duration = Positive
+    elevator_effectiveness: Number = Field(gt=0.0, lt=1.0)
+    fault_start: Duration = Positive
+    inflation: Number = Field(ge=1.0)
+    """Factor on everything measured."""
+    share: Number = Field(gt=0.0, le=1.0)
+    """Share of the inflated set that the invariant set is certified for."""
+
+
+class InvariantSetInputs(_Table):
+    """The invariant set (paper eq. 25-28) and what it is to keep small."""
+
+    method: Literal["ellipsoid", "zonotope", "modal", "box"]
+    contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)
+    """Multipliers of the S-procedure to try."""
+    state_scale: RigidScale
+    input_scale: InputSize
+
+
+class TighteningInputs(_Table):
+    """How the nominal input is bounded (paper eq. 30 and 35)."""
+
+    chain: Literal["design_bounds", "literal"]
+    """"literal": the bounds of (35) are those that (30) leaves; "design_bounds": as given, the plan checked by (30)."""
+
+
 class DesignInputs(_Table):
     """All inputs of a baseline design, SI after reading."""
 
@@ -124,6 +154,9 @@ class DesignInputs(_Table):
     notch: list[NotchInputs] = Field(min_length=1, max_length=4)
     feedback: FeedbackInputs
     nominal: NominalInputs
+    disturbance: DisturbanceInputs
+    invariant_set: InvariantSetInputs
+    tightening: TighteningInputs
 
 
 def parse_inputs(table: dict[str, Any]) -> DesignInputs:
