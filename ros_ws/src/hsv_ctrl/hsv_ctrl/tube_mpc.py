@@ -65,10 +65,10 @@ class TubeMpcNode(PeerNode):
         status.u_nominal, status.u_reference = nominal.input, nominal.reference_input
         fill_input(status.u_feedback, result.u_feedback)
         fill_input(status.u_unsaturated, result.u_unsaturated)
-        status.saturated[:] = result.saturated
+        status.saturated = result.saturated.tolist()
         status.tau, status.status = result.tau, int(result.status)
         self._status.publish(status)
-        self.diagnose(state.header.stamp, result.status.name, step=state.step, saturated=result.saturated.any())
+        self.diagnose(state.header.stamp, result.status.name, step=state.step, saturated=bool(result.saturated.any()))
 
 
 def main(args: Sequence[str] | None = None) -> int:

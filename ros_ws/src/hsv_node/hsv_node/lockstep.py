@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -17,6 +18,10 @@ from hsv_node.qos import LATCHED, STEP
 LOCKSTEP_PARAMETERS = (Parameter("recorder", True, "whether a recorder belongs to the graph"),)
 
 
+SAY_AFTER = 2.0
+"""Seconds of waiting for peers before this is said, and between saying it again."""
+
+
 class LockstepNode(Node):
     """A node of the graph description that reacts to the messages of a step and never to timers."""
 
@@ -29,6 +34,7 @@ class LockstepNode(Node):
         self._outputs: dict[str, Any] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
         self._diagnosed_second = -1
+        self._patience_ends = time.monotonic() + SAY_AFTER
 
     def listen(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe a step topic of the graph description."""
@@ -56,6 +62,12 @@ class LockstepNode(Node):
             if peer not in (endpoint.node_name for endpoint in seen) or matched < expected[topic]:
                 missing.append(f"{peer} ({topic})")
         return missing
+
+    def say_waiting(self, missing: Sequence[str]) -> None:
+        """Log now and then for whom this node waits."""
+        if missing and time.monotonic() > self._patience_ends:
+            self._patience_ends = time.monotonic() + SAY_AFTER
+            self.get_logger().info("waiting for " + ", ".join(missing))
 
     def finish(self, code: int) -> None:
         """End the process with ``code`` once the current callback has returned."""
@@ -95,7 +107,6 @@ class PeerNode(LockstepNode):
         super().__init__(name)
         self._run: Run | None = None
         self._announced = False
-        self._waiting_for: list[str] | None = None
         self._ready = self.create_publisher(Ready, "/hsv/ready", LATCHED)
         self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
 
@@ -110,10 +121,8 @@ class PeerNode(LockstepNode):
         if self._run is not None and not missing:
             self._announced = True
             self._ready.publish(Ready(node=self.get_name(), run_id=self._run.run_id))
-        elif missing != self._waiting_for:
-            self._waiting_for = missing
-            if missing:
-                self.get_logger().info("waiting for " + ", ".join(missing))
+        else:
+            self.say_waiting(missing or ["plant (/hsv/run)"])
 
     def patience(self) -> float:
         """Look at the links more often until they stand."""

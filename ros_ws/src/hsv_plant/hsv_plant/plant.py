@@ -43,7 +43,6 @@ class PlantNode(LockstepNode):
         self.plant = Plant.from_parameters(self.values)
         self._peers = [*self.values["nodes"], *(["recorder"] if self.recorded else [])]
         self._ready: set[str] = set()
-        self._waiting_for: list[str] | None = None
         self._state_message, self._forces_message = VehicleState(), VehicleForces()
         self._clock_message = Clock()
         self._state = self.talk("/hsv/state")
@@ -143,9 +142,7 @@ class PlantNode(LockstepNode):
             self._heard = self._begun = time.monotonic()
             self._publish()
             return
-        if missing != self._waiting_for:
-            self._waiting_for = missing
-            self.get_logger().info("waiting for " + ", ".join(missing))
+        self.say_waiting(missing)
         limit = self.values["start_timeout"]
         if limit and time.monotonic() - self._begun > limit:
             self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(missing))

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
-from scipy.signal import cont2discrete, tf2ss
 
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
@@ -35,17 +34,14 @@ class NotchSection:
     pole_frequency: float
     pole_damping: float
 
-    def transfer_function(self) -> tuple[list[float], list[float]]:
-        """Return numerator and denominator in s, highest power first, with unit gain at zero frequency."""
-        return (
-            [1.0 / self.zero_frequency**2, 2.0 * self.zero_damping / self.zero_frequency, 1.0],
-            [1.0 / self.pole_frequency**2, 2.0 * self.pole_damping / self.pole_frequency, 1.0],
-        )
-
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """Return A (2, 2), B (2), C (2), D of the continuous filter (paper eq. 39), controller canonical form."""
-        A, B, C, D = tf2ss(*self.transfer_function())
-        return A, B[:, 0], C[0], float(D[0, 0])
+        w_z, e_z, w_p, e_p = self.zero_frequency, self.zero_damping, self.pole_frequency, self.pole_damping
+        gain = (w_p / w_z) ** 2
+        A = np.array([[-2.0 * e_p * w_p, -(w_p**2)], [1.0, 0.0]])
+        B = np.array([1.0, 0.0])
+        C = gain * np.array([2.0 * e_z * w_z - 2.0 * e_p * w_p, w_z**2 - w_p**2])
+        return A, B, C, gain
 
 
 class NotchData(NamedTuple):
@@ -74,10 +70,14 @@ def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
                 f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
             )
         A, B, C, D = section.state_space()
+        # Bilinear rule s = (2 / warped) (z - 1) / (z + 1), with the step that maps the centre frequency onto itself.
         warped = 2.0 * math.tan(angle) / section.zero_frequency
-        Ad, Bd, Cd, Dd, _ = cont2discrete((A, B[:, None], C[None, :], [[D]]), warped, method="bilinear")
-        data.A[i], data.B[i], data.C[i], data.D[i] = Ad, Bd[:, 0], Cd[0], Dd[0, 0]
-        data.G[i] = np.linalg.solve(np.eye(2) - Ad, Bd[:, 0])
+        inverse = np.linalg.inv(np.eye(2) - 0.5 * warped * A)
+        data.A[i] = inverse @ (np.eye(2) + 0.5 * warped * A)
+        data.B[i] = warped * inverse @ B
+        data.C[i] = C @ inverse
+        data.D[i] = D + 0.5 * warped * C @ inverse @ B
+        data.G[i] = np.linalg.solve(np.eye(2) - data.A[i], data.B[i])
     return data
 
 

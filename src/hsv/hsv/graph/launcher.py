@@ -42,7 +42,7 @@ def executable(node: NodeDescription) -> Path:
 class _Process:
     description: NodeDescription
     popen: subprocess.Popen[str]
-    words: deque[str] = field(default_factory=lambda: deque(maxlen=20))
+    words: deque[str] = field(default_factory=lambda: deque(maxlen=10))
     reader: threading.Thread | None = None
 
 
@@ -138,7 +138,9 @@ class Launcher:
             if process.description is PLANT and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
             elif text:
-                process.words.append(text)
+                # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
+                if not text.startswith("Extension modules:"):
+                    process.words.append(text)
                 self._on_line(process.description.name, text)
 
     def _ending(self, process: _Process, code: int) -> Ending:

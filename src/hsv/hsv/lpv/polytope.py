@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy.interpolate import CubicSpline, PPoly
 
 from hsv.errors import DesignError
 
@@ -45,6 +44,8 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
         slope = np.diff(samples, axis=0) / np.diff(breakpoints)[:, None]
         coefficients = np.stack((np.zeros_like(slope), np.zeros_like(slope), slope, samples[:-1]))
     elif interpolation == "cubic":
+        from scipy.interpolate import CubicSpline  # half a second of imports that a grid does not need
+
         coefficients = CubicSpline(breakpoints, samples).c
     else:
         raise DesignError(f"interpolation = {interpolation!r}: expected one of {', '.join(INTERPOLATIONS)}")
@@ -53,6 +54,8 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
 
 def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
     """Return the weights (n, r) at many ``values`` (n), clamped to the breakpoints; for design and plots."""
+    from scipy.interpolate import PPoly
+
     clamped = np.clip(values, weights.breakpoints[0], weights.breakpoints[-1])
     return np.asarray(PPoly(weights.coefficients, weights.breakpoints)(clamped))
 
