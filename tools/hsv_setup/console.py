@@ -32,15 +32,13 @@ class Stage:
         if not self._live:
             print(f"{title} ...", flush=True)
 
-    def show(self, detail: str) -> None:
-        """Refresh the live line (on a terminal only)."""
-        if self._live:
-            print(f"\r\x1b[K{self.title} ... {detail} {self._elapsed:.0f} s", end="", flush=True)
-
     def done(self, detail: str) -> None:
         """Print the stage's one lasting line."""
         start = "\r\x1b[K" if self._live else ""
         print(f"{start}{self.title}: {detail} ({self._elapsed:.1f} s)", flush=True)
+
+    def _show(self, detail: str) -> None:
+        print(f"\r\x1b[K{self.title} ... {detail} {self._elapsed:.0f} s", end="", flush=True)
 
     @property
     def _elapsed(self) -> float:
@@ -72,7 +70,8 @@ class Stage:
             )
             try:
                 while not _ended(process):
-                    self.show(progress(self.log.read_text(errors="replace")))
+                    if self._live:
+                        self._show(progress(self.log.read_text(errors="replace")))
             except BaseException:
                 _stop(process)
                 raise

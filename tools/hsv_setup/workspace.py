@@ -24,6 +24,7 @@ BASE_PATHS = ("src", "ros_ws/src")
 _COPIED = ("package.xml", "setup.py", "setup.cfg")
 # Generated code is compiled against these.
 _BINARY_INTERFACE = ("ros-", "numpy=")
+_JOBS_AT_MOST = 8
 _MADE = ("__pycache__", ".egg-info")
 _COLCON = "import sys; from colcon_core.command import main; sys.argv[0] = 'colcon'; sys.exit(main())"
 
@@ -122,16 +123,18 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
             # "develop" leaves the links of files that no longer exist.
             shutil.rmtree(BUILD / package.name, ignore_errors=True)
             shutil.rmtree(INSTALL / package.name, ignore_errors=True)
-    search = {"PATH": f"{PYTHON.parent}{os.pathsep}{env['PATH']}"}
+    # Named here, because colcon's own choice also limits by load and crawls on a busy machine.
+    jobs = f"-j{min(os.cpu_count() or 1, _JOBS_AT_MOST)}"
+    own = {"PATH": f"{PYTHON.parent}{os.pathsep}{env['PATH']}", "MAKEFLAGS": jobs}
     if route.wheels:
         # The virtual environment is the ament prefix under the workspace.
-        search.update(AMENT_PREFIX_PATH=str(VENV), CMAKE_PREFIX_PATH=str(VENV))
+        own.update(AMENT_PREFIX_PATH=str(VENV), CMAKE_PREFIX_PATH=str(VENV))
     command: list[str | Path] = [PYTHON, "-c", _COLCON, "--log-base", LOG, "build", "--symlink-install"]
     command += ["--base-paths", *BASE_PATHS, "--build-base", BUILD, "--install-base", INSTALL]
     command += ["--packages-select", *(package.name for package in wanted)]
     command += ["--cmake-args", "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", f"-DPython3_EXECUTABLE={PYTHON}"]
     try:
-        stage.run(command, {**env, **search}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
+        stage.run(command, {**env, **own}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
     finally:
         for package, key in keys.items():
             if read_stamp(package.exit_code).strip() == "0":
