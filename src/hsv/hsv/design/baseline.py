@@ -14,9 +14,10 @@ from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs, FlightPoint
 from hsv.design.lmi import spectral_radii
+from hsv.design.model import DesignModel, design_model
 from hsv.design.nominal import NominalGain, NominalProblem, nested_gains
 from hsv.lpv.discretisation import zero_order_hold
-from hsv.lpv.grid import grid_polytope, linearise
+from hsv.lpv.grid import linearise
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
@@ -47,11 +48,10 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
     """
     tell = progress or (lambda stage, done, total: None)
     vehicle = vehicle_parameters("decoupled")
-    altitudes = np.linspace(*ALTITUDE_RANGE, inputs.model.altitude_vertices)
-    velocities = np.linspace(*VELOCITY_RANGE, inputs.model.velocity_vertices)
 
     tell("polytopic model", 0, 1)
-    polytope = grid_polytope(vehicle, altitudes, velocities, inputs.model.period)
+    model = design_model(inputs.model, vehicle)
+    polytope = model.polytope
     # The flexible states of the decoupled model follow the rigid ones: gains act on the rigid states alone.
     A, B = polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID]
     tell("polytopic model", 1, 1)
@@ -86,9 +86,9 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         name=inputs.name,
         period=inputs.model.period,
         polytope=polytope,
-        interpolation="linear",
-        altitude_samples=(altitudes, np.eye(len(altitudes))),
-        velocity_samples=(velocities, np.eye(len(velocities))),
+        interpolation=model.interpolation,
+        altitude_samples=model.altitude_samples,
+        velocity_samples=model.velocity_samples,
         feedback_gain=_all_states(feedback.F),
         nominal_gains=np.stack([_all_states(gain.K) for gain in nominal]),
         nominal_ellipsoids=np.stack([_inverse(gain.Q) for gain in nominal]),
@@ -96,7 +96,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         input_maximum=INPUT_MAXIMUM.copy(),
         notch=tuple(NotchSection(**section.model_dump()) for section in inputs.notch),
     )
-    return DesignResult(design, _report(inputs, design, feedback, nominal))
+    return DesignResult(design, _report(inputs, design, model, feedback, nominal))
 
 
 def initial_deviation(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
@@ -134,7 +134,11 @@ def _inverse(Q: np.ndarray) -> np.ndarray:
 
 
 def _report(
-    inputs: DesignInputs, design: ControlDesign, feedback: FeedbackGain, nominal: list[NominalGain]
+    inputs: DesignInputs,
+    design: ControlDesign,
+    model: DesignModel,
+    feedback: FeedbackGain,
+    nominal: list[NominalGain],
 ) -> dict[str, Any]:
     A, B = design.polytope.A, design.polytope.B
     closed = [A + B @ gain for gain in (design.feedback_gain, *design.nominal_gains)]
@@ -145,6 +149,7 @@ def _report(
         "inputs": inputs.model_dump(),
         "inputs_sha256": hashlib.sha256(inputs.model_dump_json().encode()).hexdigest(),
         "vertices": len(A),
+        "model": model.report,
         "feedback": {**feedback.report(), "spectral_radius_all_states": radii[0]},
         "nominal": [
             {"scale": scale, **gain.report(), "spectral_radius_all_states": radius}

@@ -28,6 +28,8 @@ Acceleration = Annotated[float, _quantity("m/s^2")]
 Angle = Annotated[float, _quantity("rad")]
 AngularRate = Annotated[float, _quantity("rad/s")]
 AngularAcceleration = Annotated[float, _quantity("rad/s^2")]
+ElasticCoordinate = Annotated[float, _quantity("kg^0.5 m")]
+ElasticRate = Annotated[float, _quantity("kg^0.5 m/s")]
 Duration = Annotated[float, _quantity("s")]
 Positive = Field(gt=0.0)
 
@@ -68,12 +70,44 @@ class FlightPoint(_Table):
     velocity: Speed = Positive
 
 
-class ModelInputs(_Table):
-    """The polytopic model of the decoupled vehicle: vertices on a grid over the envelope."""
+class StateScale(RigidScale):
+    """Sizes of all nine states that count as equal."""
 
-    period: Duration = Positive
+    elastic_coordinate_1: ElasticCoordinate = Positive
+    elastic_rate_1: ElasticRate = Positive
+    elastic_coordinate_2: ElasticCoordinate = Positive
+    elastic_rate_2: ElasticRate = Positive
+
+    def array(self) -> np.ndarray:
+        """Return the scales (9), SI."""
+        elastic = [self.elastic_coordinate_1, self.elastic_rate_1, self.elastic_coordinate_2, self.elastic_rate_2]
+        return np.append(super().array(), elastic)
+
+
+class GridInputs(_Table):
+    """Vertices at grid points over the envelope, weights linear between them."""
+
     altitude_vertices: int = Field(ge=2, le=20)
     velocity_vertices: int = Field(ge=2, le=20)
+
+
+class TensorProductInputs(_Table):
+    """Vertices by the tensor-product model transformation: ranks by ``tolerance``, relative, over the scales."""
+
+    tolerance: Number = Field(gt=0.0, lt=1.0)
+    altitude_samples: int = Field(ge=5, le=100)
+    velocity_samples: int = Field(ge=5, le=100)
+    state_scale: StateScale
+    input_scale: InputSize
+
+
+class ModelInputs(_Table):
+    """The polytopic model of the decoupled vehicle over the envelope (paper eq. 10-12)."""
+
+    period: Duration = Positive
+    representation: Literal["tensor_product", "grid"]
+    grid: GridInputs
+    tensor_product: TensorProductInputs
 
 
 class FeedbackDisturbance(_Table):
