@@ -15,10 +15,10 @@ def rigid(design):
 
 
 def test_gain_agrees_with_the_control_study(design):
-    # Control study, section 0, design R; per foot.
+    # Control study, section 0, design R, found on grid vertices; per foot.
     expected = [[-0.0028, -0.0144, 50.30, -54.27, -1.409], [0.0033, -0.0024, -52.89, 61.48, 3.819]]
     gain = design.feedback_gain[:, :5] * [FOOT, FOOT, 1.0, 1.0, 1.0]
-    assert_allclose(gain, expected, rtol=0.02, atol=6e-5)
+    assert_allclose(gain, expected, rtol=0.04, atol=6e-5)
     assert np.all(design.feedback_gain[:, 5:] == 0.0)
 
 

@@ -46,7 +46,11 @@ def test_two_designs_differ_only_in_name_description_and_scales():
         ("model.period", "nan s", "model.period = 'nan s'"),
         ("model.representation", "lucky", "model.representation = 'lucky': input should be"),
         ("model.tensor_product.tolerance", 0.0, "model.tensor_product.tolerance = 0.0: input should be greater than 0"),
-        ("model.grid.altitude_vertices", 1, "model.grid.altitude_vertices = 1: input should be greater than or equal to 2"),
+        (
+            "model.grid.altitude_vertices",
+            1,
+            "model.grid.altitude_vertices = 1: input should be greater than or equal to 2",
+        ),
         ("model.grid.altitude_vertices", 4.5, "model.grid.altitude_vertices = 4.5"),
         ("feedback.method", "lucky", "feedback.method = 'lucky': input should be 'guaranteed_cost' or"),
         ("nominal.scales", [1.0, float("nan")], "nominal.scales.1 = nan"),

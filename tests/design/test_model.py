@@ -35,8 +35,9 @@ def test_weights_are_non_negative_between_all_samples(model):
 def test_vertices_have_the_unstable_pole_of_the_vehicle(model):
     # Control study, section 1: 1.64 to 1.81 rad/s at the vertices.
     radii = [np.log(np.abs(np.linalg.eigvals(A)).max()) / 0.02 for A in model.polytope.A]
-    assert 1.63 < min(radii) and max(radii) < 1.82
-    assert np.all(model.polytope.A[:, :5, 5:] == 0.0)
+    assert min(radii) > 1.63 and max(radii) < 1.82
+    # The matrix exponential leaves rounding where the rigid states do not depend on the elastic ones.
+    assert np.abs(model.polytope.A[:, :5, 5:]).max() < 1e-15
 
 
 def test_a_coarser_tolerance_keeps_six_vertices(inputs):

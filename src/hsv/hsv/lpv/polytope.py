@@ -37,7 +37,9 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
     breakpoints = np.ascontiguousarray(breakpoints, float)
     samples = np.asarray(samples, float)
     if samples.ndim != 2 or breakpoints.shape != samples.shape[:1] or len(breakpoints) < 2:
-        raise DesignError(f"weights of shape {samples.shape} at {breakpoints.shape} breakpoints: expected (s, r) at (s)")
+        raise DesignError(
+            f"weights of shape {samples.shape} at {breakpoints.shape} breakpoints: expected (s, r) at (s)"
+        )
     if not np.all(np.diff(breakpoints) > 0.0):
         raise DesignError("breakpoints of the scheduling weights: expected increasing values")
     if interpolation == "linear":
