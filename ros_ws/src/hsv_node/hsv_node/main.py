@@ -22,7 +22,7 @@ def run_node(build: Callable[[], LockstepNode], name: str, args: Sequence[str] |
     Bad parameters end it before it joins the graph, with one line on standard error and exit code 2.
     """
     try:
-        rclpy.init(args=args, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        rclpy.init(args=None if args is None else list(args), signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except Exception as error:  # rcl reports a malformed command line or parameter file by several exception types
         return _refuse(name, error)
     # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
@@ -35,8 +35,10 @@ def run_node(build: Callable[[], LockstepNode], name: str, args: Sequence[str] |
         executor = EventsExecutor()
         executor.add_node(node)
         # The executor runs nothing while it waits without a limit.
-        while node.exit_code is None and not stop:
+        while not stop:
             node.poll()
+            if node.exit_code is not None:
+                break
             executor.spin_once(timeout_sec=node.patience())
         return node.exit_code or 0
     except (HsvError, ParameterException, rclpy_implementation.RCLError) as error:

@@ -15,6 +15,7 @@ def run(
     scenario: ScenarioArgument = "case1",
     real_time_factor: Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")] = 0.0,
     bag: Annotated[Path | None, typer.Option(help="Bag to write; default: bags/<scenario>_<UTC>.")] = None,
+    step_timeout: Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")] = 10.0,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
@@ -38,7 +39,9 @@ def run(
 
     if not 0.0 <= real_time_factor <= 1000.0:
         raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
-    prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor)
+    if not 0.1 <= step_timeout <= 1e6:
+        raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
+    prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout)
     if prepared.bag.exists():
         raise QuantityError(f"bag = {str(prepared.bag)!r}: exists already, expected a new directory")
     loaded = prepared.scenario

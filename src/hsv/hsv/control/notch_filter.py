@@ -45,7 +45,7 @@ class NotchSection:
 
 
 class NotchData(NamedTuple):
-    """Discrete sections in series for compiled functions: A (n, 2, 2), B, C, G (n, 2), D (n); G: state at rest per input."""
+    """Discrete sections in series, for compiled functions: A (n, 2, 2), B, C (n, 2), D (n), G (n, 2): rest per input."""
 
     A: np.ndarray
     B: np.ndarray
@@ -117,6 +117,8 @@ class NotchFilter:
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
+        self.step(0.0)  # compile now: a cold cache must not stall a flight
+        self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:

@@ -118,6 +118,8 @@ class FaultInjector:
 
     def __post_init__(self) -> None:
         self.reset()
+        self.step(0, np.zeros(2))  # compile now: a cold cache must not stall a flight
+        self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
@@ -134,7 +136,8 @@ class FaultInjector:
         for name, column in zip(names, columns, strict=True):
             if len(column) != len(columns[0]):
                 raise ParameterError(
-                    f"parameter fault.{name}: {len(column)} values, expected as many as fault.channels, {len(columns[0])}"
+                    f"parameter fault.{name}: {len(column)} values, "
+                    f"expected as many as fault.channels, {len(columns[0])}"
                 )
         return cls(
             [

@@ -28,7 +28,12 @@ class PreparedRun:
 
 
 def prepare(
-    scenario_name: str, *, bags: Path = Path("bags"), bag: Path | None = None, real_time_factor: float = 0.0
+    scenario_name: str,
+    *,
+    bags: Path = Path("bags"),
+    bag: Path | None = None,
+    real_time_factor: float = 0.0,
+    step_timeout: float = 10.0,
 ) -> PreparedRun:
     """Check scenario and design and write the parameter files of a run to a temporary folder.
 
@@ -58,6 +63,7 @@ def prepare(
         (folder / name).write_text(content, encoding="utf-8")
     run = {
         "real_time_factor": float(real_time_factor),
+        "step_timeout": float(step_timeout),
         "recorder": True,
         "bag.directory": str(bag.absolute()),
         "bag.attachments": [str(folder / name) for name in files],

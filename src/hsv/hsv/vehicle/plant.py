@@ -42,7 +42,7 @@ PLANT_PARAMETERS = (
 
 @dataclass(frozen=True)
 class PlantResult:
-    """One state: x (9), the forces lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa, and the status."""
+    """One state x (9); lift N, drag N, thrust N, pitching moment N m and dynamic pressure Pa there; the status."""
 
     step: int
     state: np.ndarray
@@ -53,15 +53,15 @@ class PlantResult:
 class Plant:
     """The vehicle under held inputs. It starts in the trim of the *nominal* vehicle, perturbed or not."""
 
-    def __init__(
-        self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2
-    ) -> None:
+    def __init__(self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2) -> None:
         self.vehicle = vehicle
         self.initial = initial
         self.period = period
         self.steps = steps
         self.substeps = substeps
         self._work = workspace()
+        self.reset()
+        self.step(initial.input)  # compile now: a cold cache must not stall a flight
         self.reset()
 
     @classmethod

@@ -1,0 +1,89 @@
+"""Whatever dies, hangs or is interrupted: the run ends, names the cause, and leaves a readable bag."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+import pytest
+from node_processes import Processes, children, short_scenario
+
+from hsv.graph.description import GRAPH
+from hsv.recording.reader import Bag
+
+pytestmark = pytest.mark.graph
+
+
+def _start_and_fly(processes: Processes, bag: Path, pace: str = "1"):  # type: ignore[no-untyped-def]
+    """Start a long flight and return it once some of it is on disk."""
+    scenario = short_scenario(processes.folder, duration=120, fault=100)
+    run = processes.start("hsv", "run", scenario, "--bag", bag, "--real-time-factor", pace)
+    mcap = bag / f"{bag.name}_0.mcap"
+    deadline = time.monotonic() + 60.0
+    while not mcap.exists() or mcap.stat().st_size < 150_000:
+        assert time.monotonic() < deadline and run.poll() is None, "no flight"
+        time.sleep(0.05)
+    return run
+
+
+@pytest.mark.parametrize("name", [node.name for node in GRAPH])
+def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> None:
+    bag = processes.folder / "broken"
+    run = _start_and_fly(processes, bag)
+    nodes = children(run.pid)
+    assert set(nodes) == {node.name for node in GRAPH}
+    killed = time.monotonic()
+    os.kill(nodes[name], signal.SIGKILL)
+    output, _ = run.communicate(timeout=30.0)
+    assert time.monotonic() - killed < 5.0
+    assert run.returncode == 1
+    assert f"{name} was killed by SIGKILL" in output
+    assert len(Bag(bag).columns("/hsv/state")["step"]) > 50
+    assert (bag / "metadata.yaml").is_file()
+    assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
+
+
+def test_interrupt_ends_all_and_closes_the_bag(processes: Processes) -> None:
+    bag = processes.folder / "interrupted"
+    run = _start_and_fly(processes, bag)
+    nodes = children(run.pid)
+    run.send_signal(signal.SIGINT)
+    output, _ = run.communicate(timeout=15.0)
+    assert run.returncode == 130
+    assert "interrupted" in output
+    assert Bag(bag).complete
+    assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
+
+
+def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
+    run = _start_and_fly(processes, processes.folder / "orphaned")
+    nodes = children(run.pid)
+    run.kill()
+    run.wait()
+    deadline = time.monotonic() + 10.0
+    while any(Path(f"/proc/{pid}").exists() for pid in nodes.values()):
+        assert time.monotonic() < deadline, "a node flies on without its launcher"
+        time.sleep(0.1)
+
+
+def test_a_hung_node_is_named(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder, duration=120, fault=100)
+    bag = processes.folder / "hung"
+    run = processes.start("hsv", "run", scenario, "--bag", bag, "--real-time-factor", "1", "--step-timeout", "1")
+    mcap = bag / "hung_0.mcap"
+    deadline = time.monotonic() + 60.0
+    while not mcap.exists() or mcap.stat().st_size < 150_000:
+        assert time.monotonic() < deadline and run.poll() is None, "no flight"
+        time.sleep(0.05)
+    pid = children(run.pid)["notch_filter"]
+    os.kill(pid, signal.SIGSTOP)
+    try:
+        output, _ = run.communicate(timeout=30.0)
+    finally:
+        if Path(f"/proc/{pid}").exists():
+            os.kill(pid, signal.SIGCONT)
+    assert run.returncode == 1
+    assert "no answer from notch_filter" in output
+    assert Bag(bag).complete

@@ -1,0 +1,81 @@
+"""A graph of processes flies exactly what the library flies in one process."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_processes import Processes, short_scenario
+
+from hsv.graph.description import TOPICS
+from hsv.recording.flight import flight_data, input_columns, state_columns
+from hsv.recording.reader import Bag
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+
+def _fly(processes: Processes, scenario: Path, name: str) -> Bag:
+    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / name)
+    assert done.returncode == 0, done.stdout
+    return Bag(processes.folder / name)
+
+
+def test_graph_equals_in_process_bit_for_bit(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder)
+    bag = _fly(processes, scenario, "flown")
+    history = fly(assemble(flight_parameters(load_scenario(str(scenario))))).history
+    nominal, filtered = bag.columns("/hsv/nominal"), bag.columns("/hsv/filtered_state")
+    recorded = {
+        "state": state_columns(bag.columns("/hsv/state")),
+        "filtered_pitch_rate": filtered["filtered_pitch_rate"],
+        "deviation": state_columns(nominal, "deviation."),
+        "nominal_input": input_columns(nominal, "input."),
+        "gain_index": nominal["gain_index"],
+        "u_unsaturated": input_columns(bag.columns("/hsv/tube_status"), "u_unsaturated."),
+        "command": input_columns(bag.columns("/hsv/command")),
+        "actuator": input_columns(bag.columns("/hsv/actuator")),
+    }
+    for name, column in recorded.items():
+        assert np.array_equal(column, getattr(history, name)), name
+    assert flight_data(bag).fault_start == 3.0
+    assert len(history.state) == 251
+    assert all(bag.topics[topic].count == 251 for topic in TOPICS)
+
+
+def test_two_runs_are_bit_identical_whatever_the_load(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder)
+    first = _fly(processes, scenario, "first")
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as load:
+        try:
+            second = _fly(processes, scenario, "second")
+        finally:
+            load.kill()
+    for topic in TOPICS:
+        assert first.messages(topic) == second.messages(topic), topic
+
+
+def test_a_diverging_flight_ends_cleanly_and_says_so(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder, duration=30, fault=29, coupling="derived", notch=False)
+    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / "lost")
+    assert done.returncode == 1
+    assert "flight diverged at t = 17.6" in done.stdout
+    bag = Bag(processes.folder / "lost")
+    assert bag.complete
+    assert bag.columns("/hsv/state")["status"][-1] == 2
+    assert len({bag.topics[topic].count for topic in TOPICS}) == 1
+
+
+def test_pacing_keeps_to_the_wall_clock(processes: Processes) -> None:
+    import json
+
+    scenario = short_scenario(processes.folder, duration=2, fault=1)
+    done = processes.run("hsv", "run", scenario, "--real-time-factor", "1", "--json")
+    assert done.returncode == 0, done.stdout
+    # A lower bound only: a loaded machine may be late, but never early.
+    assert json.loads(done.stdout[done.stdout.index("{") :])["wall_time_s"] >= 1.9
