@@ -1,4 +1,4 @@
-"""hsv design"""
+"""The command ``hsv design``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import check_target, console, print_json
 
 
 def design(
@@ -25,6 +25,8 @@ def design(
     from hsv.design.baseline import design_baseline
     from hsv.design.inputs import find_inputs, read_inputs
 
+    if out:
+        check_target(out, "out")
     source = find_inputs(name)
     inputs = read_inputs(source)
     with stages() as progress:

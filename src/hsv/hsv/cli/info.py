@@ -1,4 +1,4 @@
-"""hsv info"""
+"""The command ``hsv info``."""
 
 from __future__ import annotations
 
@@ -27,9 +27,7 @@ def info(
 
     opened = Bag(bag)
     description = describe(opened)
-    quantities = {
-        name: (value, METRICS[name].unit) for name, value in flight_metrics(flight_data(opened)).items()
-    }
+    quantities = {name: (value, METRICS[name].unit) for name, value in flight_metrics(flight_data(opened)).items()}
     if json:
         print_json(description | {"metrics": to_json(quantities, units)})
         return

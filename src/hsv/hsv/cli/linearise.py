@@ -1,4 +1,4 @@
-"""hsv linearise"""
+"""The command ``hsv linearise``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,10 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, VelocityOption
-from hsv.cli.output import console, print_json
+from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, UnitsOption, VelocityOption
+from hsv.cli.output import Units, console, print_json
+
+UNIT_SYSTEMS = {Units.si: "SI", Units.paper: "ft, ft/s, deg, slug^0.5 ft"}
 
 
 def linearise(
@@ -15,15 +17,18 @@ def linearise(
     velocity: VelocityOption = "7702.0808 ft/s",
     coupling: CouplingOption = "paper_like",
     model: Annotated[str, typer.Option(help="Coupled (CM) or decoupled (DM) model.")] = "CM",
+    units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
-    """Jacobians A, B and poles at a trim point (paper eq. 6-9), SI.
+    """Jacobians A, B and poles at a trim point (paper eq. 6-9).
 
     Example: hsv linearise --coupling derived
     """
+    import numpy as np
+
     from hsv.errors import QuantityError
-    from hsv.units import parse_quantity
-    from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES, jacobian
+    from hsv.units import parse_quantity, to_paper
+    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
     from hsv.vehicle.modes import modes
     from hsv.vehicle.parameters import MODELS, vehicle_parameters
     from hsv.vehicle.trim import trim
@@ -36,13 +41,17 @@ def linearise(
     point = trim(vehicle, parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity"))
     A, B = jacobian(point.state, point.input, vehicle)
     poles = modes(A)
+    if units is Units.paper:
+        state, inputs = (np.array([to_paper(1.0, unit)[0] for unit in row]) for row in (STATE_UNITS, INPUT_UNITS))
+        A = A * state[:, None] / state
+        B = B * state[:, None] / inputs
     if json:
         print_json(
             {
                 "states": STATE_NAMES,
                 "inputs": INPUT_NAMES,
-                "A_si": A.tolist(),
-                "B_si": B.tolist(),
+                f"A_{units}": A.tolist(),
+                f"B_{units}": B.tolist(),
                 "poles": [
                     {
                         "real_rad_per_s": mode.pole.real,
@@ -55,21 +64,28 @@ def linearise(
             }
         )
         return
+    from rich.console import Console
     from rich.table import Table
 
+    # Nine columns need more room than some terminals have: a wrapped line is better than a cut number.
+    wide = Console(highlight=False, width=max(console.width, 130))
     for name, matrix, columns in (("A", A, STATE_NAMES), ("B", B, INPUT_NAMES)):
-        table = Table(title=f"{name} (SI)", title_justify="left", box=None, pad_edge=False, header_style="bold")
-        table.add_column("")
+        title = f"{name} ({UNIT_SYSTEMS[units]})"
+        table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+        table.add_column("", no_wrap=True)
         for column in columns:
-            table.add_column(column.replace("_", "\n"), justify="right")
+            table.add_column(column.replace("_", "\n"), justify="right", no_wrap=True)
         for row, label in zip(matrix, STATE_NAMES, strict=True):
             table.add_row(label, *(f"{value:.4g}" for value in row))
-        console.print(table)
+        wide.print(table)
     table = Table(title="Poles", title_justify="left", box=None, pad_edge=False, header_style="bold")
     for column in ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio"):
         table.add_column(column, justify="right")
     for mode in poles:
         table.add_row(
-            f"{mode.pole.real:.4f}", f"±{mode.pole.imag:.4f}", f"{mode.natural_frequency:.4f}", f"{mode.damping_ratio:.4f}"
+            f"{mode.pole.real:.4f}",
+            f"±{mode.pole.imag:.4f}" if mode.pole.imag else "0",
+            f"{mode.natural_frequency:.4f}",
+            f"{mode.damping_ratio:.4f}",
         )
     console.print(table)

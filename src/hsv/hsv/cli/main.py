@@ -10,6 +10,7 @@ from hsv.cli.design import design
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.output import errors
+from hsv.cli.plot import plot
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
@@ -24,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (trim, linearise, design, scenarios, simulate, run, info):
+for command in (trim, linearise, design, scenarios, simulate, run, info, plot):
     app.command()(command)
 
 

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Mapping
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
+from hsv.errors import ParameterError
 from hsv.units import to_paper
 
 console = Console(highlight=False)
@@ -69,8 +72,26 @@ def to_json(quantities: Mapping[str, Quantity], units: Units) -> dict[str, float
 
 
 def print_json(values: Mapping[str, Any]) -> None:
-    """Print ``values`` as JSON on standard output."""
-    sys.stdout.write(json.dumps(values, indent=2) + "\n")
+    """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
+    sys.stdout.write(json.dumps(_finite(values), indent=2, allow_nan=False) + "\n")
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def check_target(path: Path, field: str) -> None:
+    """Refuse a file that could not be written, before any work is done for it.
+
+    Raises:
+        ParameterError: ``path`` is a folder, or lies in none.
+    """
+    if path.is_dir() or not path.parent.is_dir():
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a file in an existing folder")
 
 
 def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:

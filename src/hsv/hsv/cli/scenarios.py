@@ -1,4 +1,4 @@
-"""hsv scenarios"""
+"""The command ``hsv scenarios``."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""hsv simulate"""
+"""The command ``hsv simulate``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
-from hsv.cli.output import Units
+from hsv.cli.output import Units, check_target
 
 
 def simulate(
@@ -32,6 +32,8 @@ def simulate(
     from hsv.simulation.scenario import load_scenario
     from hsv.vehicle.plant import FlightStatus
 
+    if out:
+        check_target(out, "out")
     loaded = load_scenario(scenario)
     components = assemble(flight_parameters(loaded))
     started = time.perf_counter()

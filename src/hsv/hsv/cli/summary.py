@@ -34,7 +34,7 @@ def report_flight(
             {
                 "scenario": scenario.name,
                 "diverged_at_s": diverged_at,
-                "within_limits": diverged_at is None and not any(text.startswith("over") for text in verdicts.values()),
+                "within_limits": diverged_at is None and all(text.startswith("within") for text in verdicts.values()),
                 "metrics": to_json(quantities, units),
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,

@@ -1,4 +1,4 @@
-"""hsv trim"""
+"""The command ``hsv trim``."""
 
 from __future__ import annotations
 

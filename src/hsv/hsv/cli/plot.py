@@ -1,0 +1,35 @@
+"""hsv plot"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import UnitsOption
+from hsv.cli.output import Units, console
+
+
+def plot(
+    bags: Annotated[list[Path], typer.Argument(help="Bags to lay over one another.")],
+    out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
+    units: UnitsOption = Units.si,
+) -> None:
+    """Plot trajectory, attitude, elastic rates and inputs of recorded flights.
+
+    Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
+    """
+    from hsv.errors import QuantityError
+    from hsv.recording.flight import flight_data
+    from hsv.recording.plots import flight_figure, save_figure
+    from hsv.recording.reader import Bag
+
+    if out.suffix not in (".png", ".svg", ".pdf"):
+        raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")
+    flights = {}
+    for path in bags:
+        bag = Bag(path)
+        flights[bag.custom_data.get("scenario", path.name)] = flight_data(bag)
+    save_figure(flight_figure(flights, units is Units.paper), out)
+    console.print(f"written {out}")

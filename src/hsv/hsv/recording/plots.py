@@ -1,0 +1,60 @@
+"""The paper's panels of a flight in one static figure: trajectory, attitude, elastic rates, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from hsv.simulation.metrics import FlightData
+from hsv.units import to_paper
+
+_PANELS = (
+    ("altitude", "m", "state", 0),
+    ("velocity", "m/s", "state", 1),
+    ("angle of attack", "rad", "state", 2),
+    ("pitch rate", "rad/s", "state", 4),
+    ("elastic rate 1", "kg^0.5 m/s", "state", 6),
+    ("elastic rate 2", "kg^0.5 m/s", "state", 8),
+    ("fuel equivalence ratio", "1", "command", 0),
+    ("elevator deflection", "rad", "command", 1),
+)
+
+
+def flight_figure(flights: Mapping[str, FlightData], paper_units: bool) -> Figure:
+    """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on."""
+    with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(10, 9), layout="constrained")
+        axes = figure.subplots(4, 2, sharex=True).ravel()
+        for axis, (title, unit, group, column) in zip(axes, _PANELS, strict=True):
+            factor, shown = to_paper(1.0, unit) if paper_units else (1.0, unit)
+            for name, flight in flights.items():
+                axis.plot(flight.time, factor * getattr(flight, group)[:, column], linewidth=1.1, label=name)
+            first = next(iter(flights.values()))
+            if group == "state" and column < 2:
+                axis.plot(first.time, factor * first.reference[:, column], "k:", linewidth=1.0, label="reference")
+            if first.fault_start is not None:
+                axis.axvspan(first.fault_start, first.time[-1], color="tab:red", alpha=0.06, linewidth=0)
+            axis.set_title(f"{title}{'' if unit == '1' else f' [{_mathtext(shown)}]'}", loc="left", fontsize=9)
+            axis.grid(alpha=0.25, linewidth=0.5)
+            axis.margins(x=0)
+        axes[0].legend(frameon=False, loc="lower right")
+        for axis in axes[-2:]:
+            axis.set_xlabel("time [s]")
+    return figure
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Save ``figure`` in the format of the file's ending, without a date, so that equal flights give equal files."""
+    metadata: dict[str, str | None] = {}
+    if path.suffix in (".svg", ".pdf"):
+        metadata = {"Date" if path.suffix == ".svg" else "CreationDate": None}
+    with matplotlib.rc_context({"svg.hashsalt": "hsv"}):
+        figure.savefig(path, dpi=110, metadata=metadata)
+
+
+def _mathtext(unit: str) -> str:
+    return unit.replace("^0.5", "$^{1/2}$")
+
