@@ -13,7 +13,7 @@ from hsv_msgs.msg import RecorderProgress, Run
 
 from hsv.errors import ParameterError
 from hsv.graph.description import TOPICS
-from hsv.parameters import Parameter
+from hsv.graph.node_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
@@ -22,12 +22,6 @@ from hsv_node.main import run_node
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
-
-RECORDER_PARAMETERS = (
-    Parameter("bag.directory", "", "bag to write, a new directory; empty: bags/run_<UTC>"),
-    Parameter("bag.attachments", [""], "files to attach"),
-    Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
-)
 
 OTHER_TOPICS = {
     "/hsv/run": "hsv_msgs/msg/Run",

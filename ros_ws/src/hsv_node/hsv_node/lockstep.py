@@ -9,13 +9,12 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run
 from rclpy.node import Node
+
 from hsv.graph import description
-from hsv.parameters import Parameter
+from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
-
-LOCKSTEP_PARAMETERS = (Parameter("recorder", True, "whether a recorder belongs to the graph"),)
 
 
 SAY_AFTER = 2.0

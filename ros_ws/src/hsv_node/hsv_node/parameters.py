@@ -30,7 +30,8 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
         default = (defaults or {}).get(parameter.name, parameter.default)
         try:
             # An empty list has no element type in ROS 2: it is declared by type, and set only if somebody gives it.
-            declared = node.declare_parameter(parameter.name, default if default != [] else None, _descriptor(parameter))
+            value = default if default != [] else None
+            declared = node.declare_parameter(parameter.name, value, _descriptor(parameter))
         except InvalidParameterTypeException as error:
             given = node._parameter_overrides[parameter.name].value
             raise ParameterError(

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
+from rclpy.task import Future
 
 
 def unresponsive(node: Node, peers: Sequence[str], wait: float = 2.0) -> list[str]:
@@ -17,7 +18,7 @@ def unresponsive(node: Node, peers: Sequence[str], wait: float = 2.0) -> list[st
     """
     helper = rclpy.create_node(f"{node.get_name()}_liveness", context=node.context)
     try:
-        futures = {}
+        futures: dict[str, Future] = {}
         deadline = time.monotonic() + wait
         clients = {peer: helper.create_client(ListParameters, f"/{peer}/list_parameters") for peer in peers}
         while time.monotonic() < deadline and not all(peer in futures and futures[peer].done() for peer in peers):

@@ -10,22 +10,14 @@ import numpy as np
 from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
 from rosgraph_msgs.msg import Clock
 
-from hsv.parameters import Parameter
-from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
+from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.vehicle.plant import FlightStatus, Plant
 from hsv_node.lockstep import LockstepNode
 from hsv_node.main import run_node
 from hsv_node.messages import fill_state, input_vector
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
-
-NODE_PARAMETERS = (
-    Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
-    Parameter("start_timeout", 30.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
-    Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
-    Parameter("nodes", ["notch_filter", "nominal_trajectory", "tube_mpc", "fault_injector"], "nodes to wait for"),
-    Parameter("progress", False, "print the step to standard output, for a progress bar"),
-)
 
 MAX_AHEAD = 100
 """Steps that the plant may be ahead of the recorder."""
@@ -39,15 +31,15 @@ class PlantNode(LockstepNode):
 
     def __init__(self) -> None:
         super().__init__("plant")
-        self.values = declare(self, (*PLANT_PARAMETERS, *NODE_PARAMETERS))
+        self.values = declare(self, NODE_PARAMETERS["plant"])
         self.plant = Plant.from_parameters(self.values)
         self._peers = [*self.values["nodes"], *(["recorder"] if self.recorded else [])]
         self._ready: set[str] = set()
         self._state_message, self._forces_message = VehicleState(), VehicleForces()
         self._clock_message = Clock()
-        self._state = self.talk("/hsv/state")
-        self._clock = self.talk("/clock")
-        self._forces = self.talk("/hsv/forces")
+        self._state_publisher = self.talk("/hsv/state")
+        self._clock_publisher = self.talk("/clock")
+        self._forces_publisher = self.talk("/hsv/forces")
         self.listen("/hsv/actuator", self._on_actuator)
         self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
         self.create_subscription(RecorderProgress, "/hsv/recorder_progress", self._on_progress, STEP)
@@ -111,10 +103,10 @@ class PlantNode(LockstepNode):
         fill_state(state, result.state)
         state.status = int(result.status)
         # The state first: the other nodes work on it while the rest is published.
-        self._state.publish(state)
+        self._state_publisher.publish(state)
         forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = result.forces
-        self._forces.publish(forces)
-        self._clock.publish(clock)
+        self._forces_publisher.publish(forces)
+        self._clock_publisher.publish(clock)
         if self.values["progress"] and (result.step % 50 == 0 or result.status is not FlightStatus.RUNNING):
             print(f"step {result.step} of {self.plant.steps}", flush=True)
         self.diagnose(state.header.stamp, step=result.step, status=result.status.name)

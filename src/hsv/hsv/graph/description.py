@@ -52,7 +52,7 @@ def node(name: str) -> NodeDescription:
 
 
 def links(name: str, recorded: bool) -> list[tuple[str, str]]:
-    """Return the (topic, other node) pairs that node ``name`` must be matched with, the recorder's only if ``recorded``."""
+    """Return the (topic, other node) pairs that ``name`` must be matched with, the recorder's only if ``recorded``."""
     me = node(name)
     return [
         (topic, other.name)

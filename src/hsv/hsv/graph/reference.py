@@ -1,0 +1,33 @@
+"""The parameter reference of the documentation: ``python -m hsv.graph.reference > docs/parameters.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
+from hsv.parameters import Parameter
+
+_HEADER = """# Parameters of the nodes
+Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A value
+of the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2; floats need
+a decimal point. All are fixed once a node runs, unless the last column says otherwise.
+"""
+
+
+def reference() -> str:
+    """Return the page: one table a node."""
+    parts = [_HEADER, "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
+    parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
+    return "\n".join(parts)
+
+
+def _table(parameters: Iterable[Parameter]) -> str:
+    rows = ["| parameter | default | expected | meaning | in flight |", "| --- | --- | --- | --- | --- |"]
+    for p in parameters:
+        default = {"[]": "from the design", "": "empty"}.get(str(p.default), f"`{p.default}`")
+        rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
+    return "\n".join(rows) + "\n"
+
+
+if __name__ == "__main__":
+    print(reference(), end="")

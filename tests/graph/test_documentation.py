@@ -1,0 +1,26 @@
+"""What the documentation says of the graph is what the graph is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hsv.graph.description import GRAPH, RECORDER, TOPICS
+from hsv.graph.reference import reference
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_parameter_page_is_up_to_date() -> None:
+    page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
+    assert page == reference(), "run: python -m hsv.graph.reference > docs/parameters.md"
+
+
+def test_readme_names_every_topic_with_its_type_and_ends() -> None:
+    rows = [line for line in (ROOT / "README.md").read_text(encoding="utf-8").splitlines() if line.startswith("| /")]
+    assert len(rows) == len(TOPICS)
+    for row, (topic, kind) in zip(rows, TOPICS.items(), strict=True):
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        publisher = next(node.name for node in GRAPH if topic in node.publishes)
+        subscribers = [node.name for node in GRAPH if topic in node.subscribes and node is not RECORDER]
+        assert cells[0] == topic and kind in cells[1], row
+        assert cells[2] == publisher and cells[3] == ", ".join(subscribers), row
