@@ -3,7 +3,6 @@
 ros2 launch hsv_bringup sil.launch.py scenario:=case1
 """
 
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
@@ -12,6 +11,7 @@ from launch_ros.actions import Node
 
 from hsv.graph.description import GRAPH
 from hsv.graph.preparation import prepare
+from launch import LaunchContext, LaunchDescription
 
 
 def _nodes(context: LaunchContext) -> list[object]:
