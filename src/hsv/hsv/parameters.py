@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from hsv.errors import ParameterError
 
@@ -65,7 +65,7 @@ class Parameter:
             if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
                 raise wrong
             element = str if self.kind == "string_array" else float
-            values = list(value)  # type: ignore[arg-type]
+            values = list(cast(Iterable[Any], value))
             for index, entry in enumerate(values):
                 if not isinstance(entry, element) or (element is float and not self._in_range(entry)):
                     raise ParameterError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hsv.errors import QuantityError
 
@@ -33,6 +33,11 @@ def registry() -> pint.UnitRegistry:
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
 
 
+def rounded(value: float) -> float:
+    """Return ``value`` to 15 digits: what was written, without the last-digit error of a conversion or a sum."""
+    return float(f"{value:.15g}")
+
+
 @cache
 def factor(unit: str, to: str) -> float:
     """Return the number that turns a value in ``unit`` into one in ``to``; both multiplicative."""
@@ -54,7 +59,8 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         field: Name used in the error message.
 
     Raises:
-        QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite.
+        QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Angles are
+            no bare numbers, nor frequencies angular frequencies: "15 Hz" is refused where rad/s are due.
     """
     import math
 
@@ -65,17 +71,27 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         raise QuantityError(f"{field} = {text!r}: {expected}")
     if not isinstance(text, str) and unit != "1":
         raise QuantityError(f"{field} = {text!r}: the unit is missing, {expected}")
+    if isinstance(text, str) and not any(map(str.isdigit, text)):
+        raise QuantityError(f"{field} = {text!r}: no number, {expected}")
     try:
-        value = float(registry().Quantity(str(text).replace("%", " percent")).to(unit).magnitude)
+        quantity: Any = registry().Quantity(str(text).replace("%", " percent"))
+        if quantity.to_root_units().units != _root_units(unit):
+            raise QuantityError(f"{field} = {text!r}: wrong unit, {expected}")
+        value = rounded(float(quantity.to(unit).magnitude))
+    except QuantityError:
+        raise
     except pint.UndefinedUnitError as error:
         raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
-    except pint.DimensionalityError as error:
-        raise QuantityError(f"{field} = {text!r}: wrong unit, {expected}") from error
     except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
         raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
     if not math.isfinite(value):
         raise QuantityError(f"{field} = {text!r}: {expected}")
     return value
+
+
+@cache
+def _root_units(unit: str) -> object:
+    return registry().Quantity(1.0, unit).to_root_units().units
 
 
 _EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}

@@ -42,7 +42,7 @@ METRICS = {
         "rad", "largest difference of angle of attack or pitch angle after the fault from reference + nominal"
     ),
     "attitude_from_nominal": Metric("rad", "the same over the whole flight"),
-    "elastic_rate_1_decay_time": Metric("s", "time after the fault until |rate| stays below 5 % of its post-fault peak"),
+    "elastic_rate_1_decay_time": Metric("s", "time after the fault from which |rate| stays within 5 % of its peak"),
     "elastic_rate_2_decay_time": Metric("s", "the same for the second mode"),
     "elastic_decay_time": Metric("s", "the slower of the two"),
     "fuel_equivalence_ratio_minimum": Metric("1", "least command"),
@@ -56,7 +56,7 @@ METRICS = {
 
 @dataclass(frozen=True)
 class FlightData:
-    """What the metrics are made of, rows k = 0 ... n: time (s), x and x_r, x_n (9), commands (2), limited or not (2)."""
+    """What the metrics are made of, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2)."""
 
     time: np.ndarray
     state: np.ndarray
@@ -85,9 +85,7 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
         start = time[after][0]
         window = before & (time >= start - PRE_FAULT_WINDOW - 1e-9)
         attitude = flight.state[:, 2:4]
-        values["post_fault_attitude_deviation"] = float(
-            np.max(np.abs(attitude[after] - attitude[window].mean(axis=0)))
-        )
+        values["post_fault_attitude_deviation"] = float(np.max(np.abs(attitude[after] - attitude[window].mean(axis=0))))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[after]))
         for mode, column in ((1, 6), (2, 8)):
             values[f"elastic_rate_{mode}_decay_time"] = _decay_time(
@@ -116,5 +114,6 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
-    """Return the last time at which ``magnitude`` exceeds the decay level of its own peak."""
-    return float(time[np.nonzero(magnitude > DECAY_LEVEL * np.max(magnitude))[0][-1]]) if magnitude.any() else 0.0
+    """Return the last time at which ``magnitude`` exceeds the decay level of its own peak; what is no number, too."""
+    above = np.nonzero(~(magnitude <= DECAY_LEVEL * np.max(magnitude)))[0]
+    return float(time[above[-1]]) if len(above) else 0.0

@@ -8,12 +8,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationError, ValidationInfo
 
-from hsv.errors import HsvError, QuantityError, ScenarioError
+from hsv.errors import HsvError, ParameterError, QuantityError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.simulation.metrics import METRICS
-from hsv.units import parse_quantity
+from hsv.units import parse_quantity, rounded
 from hsv.vehicle.envelope import ALTITUDE_RANGE, FOOT, VELOCITY_RANGE
 from hsv.vehicle.parameters import uncertainty_bounds
 
@@ -66,7 +66,7 @@ class CommandTable(_Table):
 class NotchTable(_Table):
     """The notch filter in flight; its parameters are the design's."""
 
-    enabled: bool = True
+    enabled: StrictBool = True
 
 
 class FaultTable(_Table):
@@ -93,6 +93,14 @@ class Scenario(_Table):
     limits: dict[str, float] = Field(default_factory=dict)
     """Largest magnitude expected of a metric, SI."""
 
+    @property
+    def reference(self) -> tuple[float, float]:
+        """Altitude (m) and velocity (m/s) that are commanded from t = 0."""
+        return (
+            rounded(self.initial.altitude + self.command.altitude_step),
+            rounded(self.initial.velocity + self.command.velocity_step),
+        )
+
     def parameters(self) -> dict[str, Any]:
         """Return the flat parameters of this scenario; with those of its design they determine the flight."""
         values: dict[str, Any] = {
@@ -101,8 +109,8 @@ class Scenario(_Table):
             "vehicle.coupling": self.vehicle.coupling,
             "initial.altitude": self.initial.altitude,
             "initial.velocity": self.initial.velocity,
-            "reference.altitude": self.initial.altitude + self.command.altitude_step,
-            "reference.velocity": self.initial.velocity + self.command.velocity_step,
+            "reference.altitude": self.reference[0],
+            "reference.velocity": self.reference[1],
             "notch.enabled": self.notch.enabled,
         }
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
@@ -128,8 +136,9 @@ def scenario_text(name: str) -> str:
     if "/" in name or name.endswith(".toml"):
         try:
             return Path(name).read_text(encoding="utf-8")
-        except OSError as error:
-            raise ScenarioError(f"scenario {name!r}: cannot be read ({error.strerror}), expected a TOML file") from error
+        except (OSError, UnicodeDecodeError) as error:
+            reason = error.strerror if isinstance(error, OSError) else "not text"
+            raise ScenarioError(f"scenario {name!r}: cannot be read ({reason}), expected a TOML file") from error
     if name not in scenario_names():
         raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
     return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
@@ -150,6 +159,8 @@ def parse_scenario(text: str, name: str) -> Scenario:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"scenario {name!r}: {error}") from error
+    if "name" in table:
+        raise ScenarioError(f"scenario {name!r}: name: unknown key, a scenario is called by its file")
     try:
         scenario = Scenario.model_validate({**table, "name": name, "limits": _limits(table.get("limits", {}))})
         _check(scenario)
@@ -170,7 +181,11 @@ def _limits(table: object) -> dict[str, float]:
     for name in table:
         if name not in METRICS:
             raise ScenarioError(f"limits.{name}: no such metric, expected one of {', '.join(METRICS)}")
-    return {name: parse_quantity(value, METRICS[name].unit, f"limits.{name}") for name, value in table.items()}
+    limits = {name: parse_quantity(value, METRICS[name].unit, f"limits.{name}") for name, value in table.items()}
+    for name, limit in limits.items():
+        if limit < 0.0:
+            raise ScenarioError(f"limits.{name} = {table[name]!r}: expected the largest magnitude, not below zero")
+    return limits
 
 
 def _check(scenario: Scenario) -> None:
@@ -178,11 +193,15 @@ def _check(scenario: Scenario) -> None:
         if name not in uncertainty_bounds():
             expected = ", ".join(uncertainty_bounds())
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
-    for fault in scenario.fault:
-        Fault(fault.channel, fault.type, fault.value)
-    for axis, limits, unit in (("altitude", ALTITUDE_RANGE, "ft"), ("velocity", VELOCITY_RANGE, "ft/s")):
-        start = getattr(scenario.initial, axis)
-        goal = start + getattr(scenario.command, f"{axis}_step")
+    for index, fault in enumerate(scenario.fault):
+        try:
+            Fault(fault.channel, fault.type, fault.value)
+        except ParameterError as error:
+            raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
+    goals = zip(
+        ("altitude", "velocity"), scenario.reference, (ALTITUDE_RANGE, VELOCITY_RANGE), ("ft", "ft/s"), strict=True
+    )
+    for axis, goal, limits, unit in goals:
         if not limits[0] <= goal <= limits[1]:
             raise ScenarioError(
                 f"command.{axis}_step leads to {goal / FOOT:.0f} {unit}: expected {_range(limits, unit)}"
@@ -197,9 +216,9 @@ def _first_problem(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"{field}: missing"
     if problem["type"] == "value_error":
-        cause = str(problem["ctx"]["error"])
-        name = str(problem["loc"][-1])
-        return field + cause[len(name) :] if cause.startswith(f"{name} = ") else f"{field}: {cause}"
+        # The cause begins with the field's own name: the path of the field says more.
+        _, equals, rest = str(problem["ctx"]["error"]).partition(" = ")
+        return f"{field}{equals}{rest}"
     return f"{field} = {problem['input']!r}: {problem['msg'][0].lower()}{problem['msg'][1:]}"
 
 
@@ -215,5 +234,5 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
     for part in location[:-1]:
         if isinstance(part, str):
             annotation = model.model_fields[part].annotation
-            model = getattr(annotation, "__args__", (annotation,))[0] if not isinstance(annotation, type) else annotation
+            model = annotation if isinstance(annotation, type) else annotation.__args__[0]
     return [name for name in model.model_fields if name != "name"]
