@@ -102,7 +102,7 @@ def _fly(
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight: ``period`` (s), what happened at each step, reference x_r (9) and u_r (2), the time of the first fault."""
+    """A flight: ``period`` (s), what happened at each step, reference x_r (9) and u_r (2), time of the first fault."""
 
     period: float
     history: History

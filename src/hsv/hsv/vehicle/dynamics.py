@@ -79,9 +79,7 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
     velocity, alpha, pitch, rate = x[1], x[2], x[3], x[4]
     lift, drag, thrust, moment, _ = forces(x, u, p)
     alpha2 = alpha * alpha
-    force_1 = (
-        p.elastic_force_1_alpha_squared * alpha2 + p.elastic_force_1_alpha * alpha + p.elastic_force_1_zero
-    )
+    force_1 = p.elastic_force_1_alpha_squared * alpha2 + p.elastic_force_1_alpha * alpha + p.elastic_force_1_zero
     force_2 = (
         p.elastic_force_2_alpha_squared * alpha2
         + p.elastic_force_2_alpha * alpha

@@ -21,7 +21,7 @@ INPUT_MAXIMUM = np.array([1.5, math.radians(30.0)])
 """Fuel equivalence ratio and elevator deflection (rad); the paper's U."""
 
 ANGLE_LIMIT = math.radians(30.0)
-"""|angle of attack| and |pitch angle| (rad) beyond which the curve fits mean nothing and a flight counts as diverged."""
+"""|angle of attack| and |pitch angle| (rad) beyond which the curve fits mean nothing: the flight has diverged."""
 
 
 @njit(cache=True)

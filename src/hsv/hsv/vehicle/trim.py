@@ -17,7 +17,7 @@ _BALANCED = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Trim:
-    """An equilibrium: ``state`` (9) and ``input`` (2) in SI, and the largest remaining |dx/dt| in SI units per second."""
+    """An equilibrium: ``state`` (9) and ``input`` (2), SI, and the largest remaining |dx/dt| in SI units per second."""
 
     state: np.ndarray
     input: np.ndarray
@@ -62,7 +62,7 @@ def trim(vehicle: VehicleParameters, altitude: float, velocity: float) -> Trim:
         except np.linalg.LinAlgError:
             break
     if not best_size < 1e-9:
-        raise TrimError(f"{where}: no level equilibrium found, expected a flight condition inside the trimmable envelope")
+        raise TrimError(f"{where}: no level equilibrium there, expected a condition inside the trimmable envelope")
     x[2] = x[3] = best[0]
     u = best[1:].copy()
     for name, value, low, high in zip(
