@@ -1,0 +1,229 @@
+"""Disturbance sets of the error system (paper eq. 13-19): boxes, and the structured set with the one-sided fault.
+
+Delta(k) = x(k+1) - A(p) x(k) - B(p) u(k), with x and u relative to the reference equilibrium and u the commanded input,
+is what the polytopic model does not explain. w = B(p) (P - I) u, the fault, is known exactly: u in it is the *total*
+elevator, trim included. f = Delta - w is the rest: linearisation, interpolation, parameters, flexible coupling.
+
+The structured set writes the rigid part of Delta as three accelerations held over a period, the lost elevator through
+the column B_e(p), and what remains in altitude and pitch angle; a seventh channel is the part of the feedback that
+comes from filtering the nominal pitch rate, F_q (notch(q_n) - q_n), which acts through B(p) F_q. Nothing is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hsv.control.notch_filter import NotchData, filter_step, rest
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.lpv.grid import linearise
+from hsv.lpv.polytope import Polytope, schedule
+from hsv.vehicle.dynamics import N_RIGID, N_STATES
+from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
+from hsv.vehicle.parameters import VehicleParameters
+
+
+class Channel(NamedTuple):
+    """One channel of the structured set."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+CHANNELS = (
+    Channel("acceleration", "m/s^2", "held acceleration along the velocity"),
+    Channel("angle_of_attack_rate", "rad/s", "held rate of the angle of attack"),
+    Channel("pitch_acceleration", "rad/s^2", "held pitch acceleration"),
+    Channel("lost_elevator", "rad", "actuator less command; total elevator, trim included"),
+    Channel("filtered_nominal_rate", "rad/s", "notch(q_n) - q_n, known from the plan"),
+    Channel("altitude_residual", "m", "altitude that the accelerations do not explain, per period"),
+    Channel("pitch_angle_residual", "rad", "pitch angle that the accelerations do not explain, per period"),
+)
+"""Order of the columns of G in :class:`hsv.design.error_system.ErrorSystem`."""
+
+_ACCELERATED = (1, 2, 4)
+_REMAINING = (0, 3)
+
+
+def acceleration_channels(vehicle: VehicleParameters, period: float) -> np.ndarray:
+    """Return the effect (5, 3) on the rigid states of unit accelerations held over ``period`` (s), at mid-envelope."""
+    A, _ = linearise(vehicle, float(np.mean(ALTITUDE_RANGE)), float(np.mean(VELOCITY_RANGE)))
+    unit = np.zeros((N_RIGID, 3))
+    unit[list(_ACCELERATED), [0, 1, 2]] = 1.0
+    return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
+
+
+@dataclass(frozen=True)
+class Record:
+    """What membership needs of a flight, rows k = 0 ... n: x (9), x_n (9), command (2), actuator (2), and x_r, u_r."""
+
+    state: np.ndarray
+    deviation: np.ndarray
+    command: np.ndarray
+    actuator: np.ndarray
+    reference: np.ndarray
+    reference_input: np.ndarray
+
+
+class Signals(NamedTuple):
+    """Disturbances of a flight, a row per step: ``channels`` (n, 7), ``delta`` and ``fault`` (n, 9), SI per period."""
+
+    channels: np.ndarray
+    delta: np.ndarray
+    fault: np.ndarray
+
+    @property
+    def remainder(self) -> np.ndarray:
+        """f = Delta - w (n, 9)."""
+        return self.delta - self.fault
+
+
+@dataclass(frozen=True)
+class ChannelModel:
+    """How Delta is split into channels: the model it is measured against, filter, acceleration columns (5, 3)."""
+
+    polytope: Polytope
+    notch: NotchData
+    columns: np.ndarray
+
+    def signals(self, record: Record) -> Signals:
+        """Return the disturbances that acted in a flight."""
+        n = len(record.state) - 1
+        signals = Signals(np.empty((n, len(CHANNELS))), np.empty((n, N_STATES)), np.empty((n, N_STATES)))
+        rows = list(_ACCELERATED)
+        _signals(
+            self.polytope.data(),
+            self.notch,
+            np.linalg.inv(self.columns[rows]),
+            np.ascontiguousarray(self.columns[list(_REMAINING)]),
+            record.state,
+            record.deviation,
+            record.command,
+            record.actuator,
+            record.reference,
+            record.reference_input,
+            *signals,
+        )
+        return signals
+
+
+@njit(cache=True, nogil=True)
+def _signals(
+    polytope: Any,
+    notch: Any,
+    inverse: np.ndarray,
+    remaining: np.ndarray,
+    state: np.ndarray,
+    deviation: np.ndarray,
+    command: np.ndarray,
+    actuator: np.ndarray,
+    x_r: np.ndarray,
+    u_r: np.ndarray,
+    channels: np.ndarray,
+    delta: np.ndarray,
+    fault: np.ndarray,
+) -> None:
+    n, m = state.shape[1], command.shape[1]
+    S = np.empty(n * (n + m))
+    filter_state = np.zeros(2 * len(notch.D))
+    rest(notch, deviation[0, 4] + x_r[4], filter_state)
+    for k in range(len(delta)):
+        schedule(polytope, state[k, 0], state[k, 1], S)
+        lost = actuator[k, 1] - command[k, 1]
+        for i in range(n):
+            row = i * (n + m)
+            predicted = x_r[i]
+            for j in range(n):
+                predicted += S[row + j] * (state[k, j] - x_r[j])
+            for j in range(m):
+                predicted += S[row + n + j] * (command[k, j] - u_r[j])
+            delta[k, i] = state[k + 1, i] - predicted
+            fault[k, i] = S[row + n + 1] * lost
+        for c in range(3):
+            channels[k, c] = 0.0
+            for j, row in enumerate((1, 2, 4)):
+                channels[k, c] += inverse[c, j] * (delta[k, row] - fault[k, row])
+        channels[k, 3] = lost
+        planned = deviation[k, 4] + x_r[4]
+        channels[k, 4] = filter_step(notch, filter_state, planned) - planned
+        for c, row in enumerate((0, 3)):
+            explained = 0.0
+            for j in range(3):
+                explained += remaining[c, j] * channels[k, j]
+            channels[k, 5 + c] = delta[k, row] - fault[k, row] - explained
+
+
+@dataclass(frozen=True)
+class Membership:
+    """Worst ratio of a disturbance to its bound (at most 1: inside), its channel, step, and value (SI)."""
+
+    ratio: float
+    channel: str
+    step: int
+    value: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether every disturbance of the flight lay in the set."""
+        return self.ratio <= 1.0
+
+
+@dataclass(frozen=True)
+class DisturbanceSet:
+    """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI.
+
+    It bounds what it was computed on and nothing else: check :meth:`membership` in every later flight.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Mid-points (7): where the one-sided fault moves the tube's centre to."""
+        return 0.5 * (self.lower + self.upper)
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """Half-widths (7)."""
+        return 0.5 * (self.upper - self.lower)
+
+    def scaled(self, share: float) -> DisturbanceSet:
+        """Return ``share`` times the set, about zero."""
+        return DisturbanceSet(share * self.lower, share * self.upper)
+
+    def membership(self, channels: np.ndarray) -> Membership:
+        """Return how far the disturbances (n, 7) of a flight reach in the set, and where.
+
+        The ratio is that to the bound on the disturbance's own side of zero; beyond a bound of zero it is infinite.
+        """
+        bounds = np.where(channels > 0.0, self.upper, self.lower)
+        ratios = np.full(channels.shape, np.inf)
+        np.divide(channels, bounds, out=ratios, where=bounds != 0.0)
+        ratios[channels == 0.0] = 0.0
+        step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
+        return Membership(
+            float(ratios[step, channel]), CHANNELS[channel].name, int(step), float(channels[step, channel])
+        )
+
+    def report(self) -> dict[str, Any]:
+        """Return the bounds by channel, for JSON."""
+        return {
+            c.name: {"unit": c.unit, "lower": float(low), "upper": float(high)}
+            for c, low, high in zip(CHANNELS, self.lower, self.upper, strict=True)
+        }
+
+    @classmethod
+    def from_report(cls, report: Mapping[str, Any]) -> DisturbanceSet:
+        """Return the set that :meth:`report` wrote."""
+        return cls(*(np.array([report[c.name][side] for c in CHANNELS], float) for side in ("lower", "upper")))
+
+
+def inflated(lower: np.ndarray, upper: np.ndarray, factor: float) -> DisturbanceSet:
+    """Return the set between ``lower`` and ``upper`` (7), widened to hold zero and then scaled by ``factor``."""
+    return DisturbanceSet(factor * np.minimum(lower, 0.0), factor * np.maximum(upper, 0.0))

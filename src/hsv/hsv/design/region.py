@@ -1,0 +1,156 @@
+"""The declared region of a design: the flights over which its disturbances are measured.
+
+The flights are simulated with the real closed loop: the coupled vehicle, the notch filter, the design's own gains, the
+step from the design's start to its target, the fault; parameters nominal and at every corner of their bounds.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.disturbance import CHANNELS, ChannelModel, DisturbanceSet, Record, Signals, inflated
+from hsv.design.inputs import DesignInputs
+from hsv.errors import DesignError
+from hsv.simulation.assembly import assemble
+from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.plant import FlightStatus, Plant
+
+Corner = Mapping[str, float]
+
+
+def corners() -> list[dict[str, float]]:
+    """Return the nominal vehicle (no change) and every corner of the parameter bounds, in a fixed order."""
+    bounds = uncertainty_bounds()
+    signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
+    return [{}, *({name: s * bound for s, (name, bound) in zip(row, bounds.items(), strict=True)} for row in signs)]
+
+
+def fraction() -> list[dict[str, float]]:
+    """Return the nominal vehicle and a quarter of the corners, in a fixed order.
+
+    A regular fraction of resolution VI: two of ten signs are products of five others, so that every three parameters
+    still meet in all their combinations.
+    """
+    names = list(uncertainty_bounds())
+    nominal, *rows = corners()
+    signs = np.array([[np.sign(row[name]) for name in names] for row in rows])
+    kept = (signs[:, 8] == signs[:, :5].prod(axis=1)) & (signs[:, 9] == signs[:, [0, 1, 5, 6, 7]].prod(axis=1))
+    return [nominal, *(row for row, keep in zip(rows, kept, strict=True) if keep)]
+
+
+def region_parameters(inputs: DesignInputs) -> dict[str, Any]:
+    """Return the flat flight parameters of the declared region, the design's own and the perturbation left out."""
+    region = inputs.disturbance
+    return {
+        "duration": region.duration,
+        "vehicle.coupling": region.coupling,
+        "initial.altitude": inputs.nominal.start.altitude,
+        "initial.velocity": inputs.nominal.start.velocity,
+        "reference.altitude": inputs.nominal.target.altitude,
+        "reference.velocity": inputs.nominal.target.velocity,
+        "fault.channels": ["elevator_deflection"],
+        "fault.types": ["loss_of_effectiveness"],
+        "fault.values": [region.elevator_effectiveness],
+        "fault.starts": [region.fault_start],
+    }
+
+
+class Region:
+    """The flights of a design over its declared region."""
+
+    def __init__(self, design: ControlDesign, inputs: DesignInputs) -> None:
+        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs)})
+
+    def fly(self, corner: Corner) -> Flight:
+        """Fly one corner.
+
+        Raises:
+            DesignError: The flight diverged or saturated; no set can be computed from it.
+        """
+        parts = self._parts
+        plant = parts.plant
+        vehicle = plant.vehicle.perturbed(corner)
+        flight = fly(
+            Components(
+                Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps),
+                parts.notch_filter,
+                parts.nominal_trajectory,
+                parts.tube_law,
+                parts.fault_injector,
+            )
+        )
+        saturated = np.count_nonzero(np.any(flight.history.command != flight.history.u_unsaturated, axis=1))
+        if flight.status is not FlightStatus.FINISHED or saturated:
+            raise DesignError(
+                f"flight with perturbation {dict(corner)}: {flight.status.name}, {saturated} saturated steps, "
+                "expected FINISHED without saturation"
+            )
+        return flight
+
+    def map(self, job: Callable[[Flight], Any], over: Sequence[Corner], progress: Callable[[int], None]) -> list[Any]:
+        """Return ``job`` of every flight, in order; compiled flights run in as many threads as there are processors."""
+        results = []
+        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+            for result in pool.map(lambda corner: job(self.fly(corner)), over):
+                results.append(result)
+                progress(len(results))
+        return results
+
+
+def record(flight: Flight) -> Record:
+    """Return the part of ``flight`` that disturbances are computed from."""
+    h = flight.history
+    return Record(h.state, h.deviation, h.command, h.actuator, flight.reference, flight.reference_input)
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Least and largest values over flights, with the flight of each: bounds (c), indices (c) into the corners."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    lower_flight: np.ndarray
+    upper_flight: np.ndarray
+
+    @classmethod
+    def over(cls, lower: np.ndarray, upper: np.ndarray) -> Extremes:
+        """Return the extremes of per-flight ones (flights, c)."""
+        return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
+
+
+@dataclass(frozen=True)
+class RegionResult:
+    """What was measured over the region: extremes of the channels (7), and of f, w, Delta (9 each)."""
+
+    flights: int
+    channels: Extremes
+    remainder: Extremes
+    fault: Extremes
+    delta: Extremes
+
+    def structured(self, inflation: float) -> DisturbanceSet:
+        """Return the structured set."""
+        return inflated(self.channels.lower, self.channels.upper, inflation)
+
+
+def measure(
+    region: Region, model: ChannelModel, over: Sequence[Corner], progress: Callable[[int], None] = lambda done: None
+) -> RegionResult:
+    """Fly ``over`` and return the extremes of every disturbance."""
+
+    def job(flight: Flight) -> list[np.ndarray]:
+        s: Signals = model.signals(record(flight))
+        parts = (s.channels, s.remainder, s.fault, s.delta)
+        return [extreme for part in parts for extreme in (part.min(axis=0), part.max(axis=0))]
+
+    columns = [np.stack(column) for column in zip(*region.map(job, over, progress), strict=True)]
+    return RegionResult(len(over), *(Extremes.over(*columns[i : i + 2]) for i in range(0, 8, 2)))

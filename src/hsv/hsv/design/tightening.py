@@ -1,0 +1,78 @@
+"""Tightened bounds of the nominal input (paper eq. 30): U minus F Z, per side, with the trim.
+
+U is not symmetric about trim and the tube not about zero, so every side has its own bound. What the feedback may add is
+F e over c + Z, and its part from filtering the nominal pitch rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.errors import DesignError
+from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS
+
+
+@dataclass(frozen=True)
+class TightenedInputs:
+    """Least and largest nominal input u_n + u_r (2 each), trim included, that leave room for the feedback; SI."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+
+    def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
+        """Return the room (2 inputs, lower and upper side) that a plan between these inputs leaves; below zero: none."""
+        return np.stack((lowest - self.lower, self.upper - highest), axis=1)
+
+    def symmetric(self, trim_input: np.ndarray) -> np.ndarray:
+        """Return the largest symmetric bound (2) of |u_n| about the trim input, as (35) takes it."""
+        return np.minimum(trim_input - self.lower, self.upper - trim_input)
+
+
+def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> TightenedInputs:
+    """Return U minus F Z for U between ``minimum`` and ``maximum`` (2).
+
+    Raises:
+        DesignError: Nothing is left of an input.
+    """
+    system, disturbance = found.problem.system, found.problem.disturbance
+    middle = system.F @ found.centre + system.F_d @ disturbance.centre
+    half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
+    bounds = TightenedInputs(minimum - middle + half, maximum - middle - half)
+    for name, unit, low, high in zip(INPUT_NAMES, INPUT_UNITS, bounds.lower, bounds.upper, strict=True):
+        if not low < high:
+            raise DesignError(
+                f"tightening: the feedback needs {low - high:.4g} {unit} more of {name} than there is, "
+                "expected room for the nominal input"
+            )
+    return bounds
+
+
+def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> dict[str, Any]:
+    """Return the room that the nominal plan leaves, for JSON.
+
+    Args:
+        bounds: The tightened bounds.
+        lowest: (2) least u_n + u_r of the plan over all its steps.
+        highest: (2) the largest.
+
+    Raises:
+        DesignError: The plan does not fit; the message says by how much.
+    """
+    margins = bounds.margins(lowest, highest)
+    for name, unit, sides in zip(INPUT_NAMES, INPUT_UNITS, margins, strict=True):
+        if sides.min() < 0.0:
+            side = ("lower", "upper")[int(np.argmin(sides))]
+            raise DesignError(
+                f"tightening: the nominal plan passes the {side} tightened bound of {name} by {-sides.min():.4g} {unit}, "
+                "expected it inside"
+            )
+    return {
+        "lowest": lowest.tolist(),
+        "highest": highest.tolist(),
+        "margin_to_lower": margins[:, 0].tolist(),
+        "margin_to_upper": margins[:, 1].tolist(),
+    }

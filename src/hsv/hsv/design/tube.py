@@ -1,0 +1,184 @@
+"""The tube of a design: disturbances over the declared region, invariant set, tightened inputs, and their evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import NotchData, discretise
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
+from hsv.design.error_system import error_system, tube_errors
+from hsv.design.inputs import DesignInputs, InvariantSetInputs
+from hsv.design.region import Region, RegionResult, corners, fraction, measure, record
+from hsv.design.sets.box import box
+from hsv.design.sets.ellipsoid import EllipsoidSet, ellipsoid
+from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
+from hsv.design.sets.modal import modal_box
+from hsv.design.sets.sampling import sample
+from hsv.design.sets.zonotope import zonotope
+from hsv.design.tightening import TightenedInputs, check_plan, tighten
+from hsv.simulation.closed_loop import Flight
+from hsv.simulation.metrics import flight_metrics
+from hsv.vehicle.parameters import vehicle_parameters
+
+Progress = Callable[[str, int, int], None]
+
+SEQUENCES, STEPS, SEED = 100_000, 600, 1
+"""Size and seed of the sampling evidence."""
+
+_SHOWN = ("altitude_end_error", "velocity_end_error", "post_fault_attitude_deviation", "post_fault_attitude_from_nominal")
+
+
+@dataclass(frozen=True)
+class Tube:
+    """Disturbance set, invariant set and tightened inputs of a design, with the ``report`` behind them (for JSON)."""
+
+    disturbance: DisturbanceSet
+    found: InvariantSet
+    bounds: TightenedInputs
+    report: dict[str, Any]
+
+
+def channel_model(design: ControlDesign) -> ChannelModel:
+    """Return how disturbances are measured against the model of ``design``."""
+    columns = acceleration_channels(vehicle_parameters("decoupled"), design.period)
+    return ChannelModel(design.polytope, discretise(design.notch, design.period), columns)
+
+
+def tube_problem(design: ControlDesign, disturbance: DisturbanceSet) -> TubeProblem:
+    """Return the error system of ``design`` under ``disturbance``."""
+    model = channel_model(design)
+    polytope = design.polytope
+    return TubeProblem(
+        error_system(polytope.A, polytope.B, design.feedback_gain, model.notch, model.columns), disturbance
+    )
+
+
+def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> InvariantSet:
+    """Return the set by the method asked for.
+
+    Raises:
+        DesignError: The method finds none.
+    """
+    if inputs.method == "ellipsoid":
+        return ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), inputs.contraction)
+    return {"zonotope": zonotope, "modal": modal_box, "box": box}[inputs.method](problem)
+
+
+def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
+    """Return the tube of ``design`` over the declared region, certified.
+
+    Disturbances are measured at the nominal vehicle and a regular quarter of the corners; the finished tube is then
+    flown at all corners, most of which it has not seen.
+
+    Raises:
+        DesignError: No invariant set, a set that fails when recomputed, or a nominal plan that does not fit.
+    """
+    region, model = Region(design, inputs), channel_model(design)
+    seen = fraction()
+    measured = measure(region, model, seen, lambda done: progress("disturbances", done, len(seen)))
+    disturbance = measured.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
+
+    progress("invariant set", 0, 1)
+    found = invariant_set(tube_problem(design, disturbance), inputs.invariant_set)
+    certified = found.certify()
+    progress("invariant set", 1, 1)
+    bounds = tighten(found, design.input_minimum, design.input_maximum)
+
+    sampling = None
+    if isinstance(found, EllipsoidSet):
+        progress("random sequences", 0, 1)
+        sampling = sample(found, SEQUENCES, STEPS, SEED)
+        progress("random sequences", 1, 1)
+
+    everyone = corners()
+    flown = region.map(
+        lambda flight: _evidence(flight, found, disturbance, model),
+        everyone,
+        lambda done: progress("flights in the tube", done, len(everyone)),
+    )
+    plan = check_plan(bounds, *_plan(flown))
+    report = {
+        "disturbance": _disturbance_report(measured, disturbance),
+        "invariant_set": {**_set_report(found), "certificate": certified, "sampling": sampling},
+        "tightening": {"lower": bounds.lower.tolist(), "upper": bounds.upper.tolist(), "plan": plan},
+        "flights": _flights_report(flown),
+    }
+    return Tube(disturbance, found, bounds, report)
+
+
+def _evidence(flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel) -> dict[str, Any]:
+    """Return what one flight shows of the tube."""
+    h = flight.history
+    errors = tube_errors(h.state, h.deviation, flight.reference, model.notch)
+    plan = h.nominal_input + flight.reference_input
+    membership = disturbance.membership(model.signals(record(flight)).channels)
+    metrics = flight_metrics(flight.data())
+    return {
+        "level": float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
+        "ratios": np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
+        "membership": membership,
+        "lowest": plan.min(axis=0),
+        "highest": plan.max(axis=0),
+        "metrics": [abs(metrics[name]) for name in _SHOWN],
+    }
+
+
+def _plan(flown: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
+    return np.min([f["lowest"] for f in flown], axis=0), np.max([f["highest"] for f in flown], axis=0)
+
+
+def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> dict[str, Any]:
+    extremes = {"f": measured.remainder, "w": measured.fault, "delta": measured.delta}
+    return {
+        "statement": "bounds of the declared region only; every other flight is to be checked for membership",
+        "flights": measured.flights,
+        "channels": disturbance.report(),
+        "measured": {
+            "lower": measured.channels.lower.tolist(),
+            "upper": measured.channels.upper.tolist(),
+            "lower_flight": measured.channels.lower_flight.tolist(),
+            "upper_flight": measured.channels.upper_flight.tolist(),
+        },
+        "boxes": {name: {"lower": e.lower.tolist(), "upper": e.upper.tolist()} for name, e in extremes.items()},
+    }
+
+
+def _set_report(found: InvariantSet) -> dict[str, Any]:
+    report: dict[str, Any] = {
+        "kind": found.kind,
+        "states": list(found.problem.system.names),
+        "centre": found.centre.tolist(),
+        "half_width": found.half_width.tolist(),
+        "feedback_half_range": found.feedback.tolist(),
+    }
+    if isinstance(found, EllipsoidSet):
+        report |= {
+            "Q": found.Q.tolist(),
+            "contraction": found.contraction,
+            "multipliers": found.multipliers.tolist(),
+            "solver": found.solver.as_dict(),
+        }
+    return report
+
+
+def _flights_report(flown: list[dict[str, Any]]) -> dict[str, Any]:
+    worst = max(flown, key=lambda f: float(f["membership"].ratio))["membership"]
+    levels = [f["level"] for f in flown if f["level"] is not None]
+    return {
+        "flights": len(flown),
+        "worst_level": max(levels) if levels else None,
+        "worst_ratio_to_half_width": np.max([f["ratios"] for f in flown], axis=0).tolist(),
+        "disturbance_membership": {
+            "outside": sum(not f["membership"].inside for f in flown),
+            "worst_ratio": worst.ratio,
+            "channel": worst.channel,
+            "step": worst.step,
+        },
+        "saturated_steps": 0,
+        "worst": dict(zip(_SHOWN, np.max([f["metrics"] for f in flown], axis=0).tolist(), strict=True)),
+    }
