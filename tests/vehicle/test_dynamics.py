@@ -1,0 +1,134 @@
+import numpy as np
+import published_model as published
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.vehicle.dynamics import derivative, forces, jacobian
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+COUPLINGS = {"derived": published.DERIVED, "paper_like": published.PAPER_LIKE, "decoupled": published.DECOUPLED}
+INPUT_UNITS = np.ones(2)
+
+
+def random_points(count=20, seed=3):
+    """States and inputs all over the envelope, in motion: nothing is zero and no term drops out."""
+    rng = np.random.default_rng(seed)
+    low = np.array([85000, 7700, -0.1, -0.1, -0.2, -2, -20, -2, -20]) * published.STATE_UNITS
+    high = np.array([86500, 8300, 0.2, 0.2, 0.2, 3, 20, 3, 20]) * published.STATE_UNITS
+    return [(rng.uniform(low, high), rng.uniform([0.0, -0.5], [1.5, 0.5])) for _ in range(count)]
+
+
+def rates(x, u, vehicle):
+    out = np.empty(9)
+    derivative(x, u, vehicle, out)
+    return out
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_equations_agree_with_the_published_ones_in_their_own_units(coupling):
+    vehicle = vehicle_parameters(coupling)
+    for x, u in random_points():
+        expected = published.derivative(x / published.STATE_UNITS, u, COUPLINGS[coupling]) * published.STATE_UNITS
+        assert_allclose(rates(x, u, vehicle), expected.astype(float), rtol=1e-11, atol=1e-11)
+
+
+def test_forces_agree_with_the_published_ones():
+    pound = published.SLUG * published.FOOT
+    for x, u in random_points():
+        lift, drag, thrust, moment, pressure = forces(x, u, vehicle_parameters())
+        expected = published.forces(x / published.STATE_UNITS, u)
+        assert_allclose([lift, drag, thrust], np.array(expected[:3], float) * pound, rtol=1e-11)
+        assert moment == pytest.approx(float(expected[3]) * pound * published.FOOT, rel=1e-10)
+        assert pressure > 0.0
+
+
+@pytest.mark.parametrize("coupling", ["derived", "paper_like"])
+def test_elastic_accelerations_satisfy_both_printed_equations(coupling):
+    # Equation (1), line by line, with what the solution of the 2x2 system gives for the other acceleration.
+    p = vehicle_parameters(coupling)
+    psi_1, psi_2, inertia = p.inertial_coupling_1, p.inertial_coupling_2, p.moment_of_inertia
+    for x, u in random_points():
+        _, _, _, moment, _ = forces(x, u, p)
+        d = rates(x, u, p)
+        decoupled = rates(x, u, p.decoupled())
+        first = (decoupled[6] - psi_1 * moment / inertia - psi_1 * psi_2 * d[8] / inertia) / (1 + psi_1**2 / inertia)
+        second = (decoupled[8] - psi_2 * moment / inertia - psi_2 * psi_1 * d[6] / inertia) / (1 + psi_2**2 / inertia)
+        assert_allclose(d[[6, 8]], [first, second], rtol=1e-11)
+        assert d[4] == pytest.approx((moment + psi_1 * d[6] + psi_2 * d[8]) / inertia, rel=1e-11)
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_energy_rate_is_power_of_thrust_minus_drag(coupling):
+    # d(V^2 / 2 + g h) / dt = V (T cos a - D) / m: gravity does no net work, lift none at all.
+    p = vehicle_parameters(coupling)
+    for x, u in random_points():
+        _, drag, thrust, _, _ = forces(x, u, p)
+        d = rates(x, u, p)
+        power = x[1] * (thrust * np.cos(x[2]) - drag) / p.mass
+        assert x[1] * d[1] + p.gravity * d[0] == pytest.approx(power, rel=1e-9, abs=1e-6)
+
+
+def test_flight_path_turns_by_the_force_across_it():
+    # m V d(gamma)/dt = L + T sin a - m g cos(gamma), gamma = theta - a: equation (1) in flight-path form.
+    p = vehicle_parameters()
+    for x, u in random_points():
+        lift, _, thrust, _, _ = forces(x, u, p)
+        d = rates(x, u, p)
+        across = lift + thrust * np.sin(x[2]) - p.mass * p.gravity * np.cos(x[3] - x[2])
+        assert p.mass * x[1] * (d[3] - d[2]) == pytest.approx(across, rel=1e-9, abs=1e-5)
+
+
+def test_free_elastic_modes_lose_energy_by_damping_alone():
+    # Without generalised forces and coupling: d(rate^2 / 2 + omega^2 eta^2 / 2) / dt = -2 zeta omega rate^2.
+    names = [n for n in vehicle_parameters()._fields if n.startswith("elastic_force")]
+    p = vehicle_parameters("decoupled")._replace(**dict.fromkeys(names, 0.0))
+    for x, u in random_points():
+        d = rates(x, u, p)
+        for coordinate, rate, omega, zeta in (
+            (5, 6, p.natural_frequency_1, p.damping_ratio_1),
+            (7, 8, p.natural_frequency_2, p.damping_ratio_2),
+        ):
+            power = x[rate] * d[rate] + omega**2 * x[coordinate] * x[rate]
+            assert power == pytest.approx(-2 * zeta * omega * x[rate] ** 2, rel=1e-9, abs=1e-9)
+
+
+def test_decoupled_body_does_not_feel_its_elastic_states():
+    p = vehicle_parameters("decoupled")
+    for x, u in random_points():
+        still = x.copy()
+        still[5:] = 0.0
+        assert_array_equal(rates(x, u, p)[:5], rates(still, u, p)[:5])
+
+
+def test_density_halves_over_its_scale():
+    p = vehicle_parameters()
+    x, u = random_points(1)[0]
+    higher = x.copy()
+    higher[0] += p.density_scale_height * np.log(2.0)
+    assert forces(higher, u, p)[4] == pytest.approx(0.5 * forces(x, u, p)[4], rel=1e-12)
+
+
+@pytest.mark.parametrize("coupling", COUPLINGS)
+def test_jacobians_agree_with_extrapolated_differences_of_the_published_model(coupling):
+    vehicle = vehicle_parameters(coupling)
+    point = trim(vehicle, 25908.0, 2347.594)
+    for x, u in [(point.state, point.input), *random_points(3)]:
+        A, B = jacobian(x, u, vehicle)
+        y = x / published.STATE_UNITS
+        psi = COUPLINGS[coupling]
+        expected_A = published.jacobian(lambda s, u=u, psi=psi: published.derivative(s, u, psi), y)
+        expected_B = published.jacobian(lambda v, y=y, psi=psi: published.derivative(y, v, psi), u)
+        A = A / published.STATE_UNITS[:, None] * published.STATE_UNITS
+        B = B / published.STATE_UNITS[:, None]
+        assert_allclose(A, expected_A, rtol=1e-8, atol=1e-9)
+        assert_allclose(B, expected_B, rtol=1e-8, atol=1e-9)
+
+
+def test_jacobian_leaves_its_arguments_alone():
+    vehicle = vehicle_parameters()
+    x, u = random_points(1)[0]
+    before = x.copy(), u.copy()
+    jacobian(x, u, vehicle)
+    assert_array_equal(x, before[0])
+    assert_array_equal(u, before[1])

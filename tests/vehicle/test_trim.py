@@ -1,0 +1,81 @@
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from hsv.errors import TrimError
+from hsv.vehicle.dynamics import derivative, forces
+from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
+from hsv.vehicle.parameters import COUPLING_SETS, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.trim import trim
+
+
+def rates(point, vehicle):
+    out = np.empty(9)
+    derivative(point.state, point.input, vehicle, out)
+    return out
+
+
+@pytest.mark.parametrize("coupling", [*COUPLING_SETS, "decoupled"])
+def test_residual_is_rounding_all_over_the_envelope(coupling):
+    vehicle = vehicle_parameters(coupling)
+    for altitude in np.linspace(*ALTITUDE_RANGE, 4):
+        for velocity in np.linspace(*VELOCITY_RANGE, 4):
+            point = trim(vehicle, altitude, velocity)
+            assert np.abs(rates(point, vehicle)).max() == point.residual < 1e-12
+            assert np.all(point.input > INPUT_MINIMUM)
+            assert np.all(point.input < INPUT_MAXIMUM)
+            assert point.state[0] == altitude
+            assert point.state[1] == velocity
+
+
+def test_level_flight_carries_its_weight_and_needs_no_moment():
+    vehicle = vehicle_parameters()
+    point = trim(vehicle, 25908.0, 2400.0)
+    lift, drag, thrust, moment, _ = forces(point.state, point.input, vehicle)
+    alpha = point.state[2]
+    assert point.state[3] == alpha
+    assert lift + thrust * math.sin(alpha) == pytest.approx(vehicle.mass * vehicle.gravity, rel=1e-12)
+    assert thrust * math.cos(alpha) == pytest.approx(drag, rel=1e-12)
+    assert abs(moment) < 1e-9 * thrust * vehicle.mean_aerodynamic_chord
+
+
+def test_perturbed_vehicles_trim_too():
+    rng = np.random.default_rng(2)
+    bounds = uncertainty_bounds()
+    for _ in range(20):
+        signs = rng.choice([-1.0, 1.0], len(bounds))
+        vehicle = vehicle_parameters("derived").perturbed(
+            {name: sign * bound for sign, (name, bound) in zip(signs, bounds.items(), strict=True)}
+        )
+        point = trim(vehicle, 26243.28, 2484.12)
+        assert np.abs(rates(point, vehicle)).max() < 1e-12
+
+
+def test_more_mass_takes_more_angle_of_attack_fuel_and_elevator():
+    nominal, heavy = (trim(vehicle_parameters().perturbed({"mass": m}), 26000.0, 2400.0) for m in (0.0, 0.1))
+    assert 0.2 < math.degrees(heavy.state[2] - nominal.state[2]) < 0.35
+    assert np.all(heavy.input > nominal.input)
+
+
+@pytest.mark.parametrize(
+    ("altitude", "velocity", "message"),
+    [
+        (60000.0, 2400.0, r"altitude = 60000 m, velocity = 2400 m/s: trim needs fuel_equivalence_ratio = -0\.\d+"),
+        (40000.0, 2400.0, r"altitude = 40000 m, .*trim needs elevator_deflection = 1\.\d+, expected -0\.523599"),
+        (25908.0, 500.0, r"velocity = 500 m/s: no level equilibrium"),
+        (1e9, 2400.0, r"no level equilibrium"),
+        (-1e6, 2400.0, r"no level equilibrium"),
+        (25908.0, 1e9, r"no level equilibrium"),
+        (25908.0, 0.0, r"velocity = 0 m/s: expected a finite altitude and a positive velocity"),
+        (25908.0, -2400.0, r"expected a finite altitude and a positive velocity"),
+        (math.nan, 2400.0, r"altitude = nan m.*expected a finite altitude"),
+        (25908.0, math.inf, r"velocity = inf m/s.*expected a finite altitude"),
+    ],
+)
+def test_where_there_is_no_trim_the_error_says_why(altitude, velocity, message):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(TrimError, match=message):
+            trim(vehicle_parameters(), altitude, velocity)
