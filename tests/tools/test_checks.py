@@ -81,6 +81,12 @@ def test_jazzy_without_its_packages_is_refused(python):
         checks.require(routes.JAZZY, replace(python, has_rclpy=False), os.environ)
 
 
+@pytest.mark.parametrize("path", ["/home/a b/hsv", "/home/a:b/hsv", "/home/a;b", "/home/it's"])
+def test_a_path_that_colcon_cannot_build_in_is_refused(path):
+    assert path in checks.path_problems(path)[0].text
+    assert checks.path_problems("/home/jürgen/hsv-2.0_(1)") == []
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from hsv_setup.console import SetupError
 from hsv_setup.interpreter import SUPPORTED, Interpreter
+from hsv_setup.paths import ROOT
 from hsv_setup.routes import Route
 
 CMAKE_AT_LEAST = (3, 20)
@@ -31,7 +32,7 @@ def require(route: Route, python: Interpreter | None, env: Mapping[str, str]) ->
     Raises:
         SetupError: something is missing; the message lists all of it and the apt-get line that brings it.
     """
-    problems = python_problems(route, python) + tool_problems(env)
+    problems = path_problems(str(ROOT)) + python_problems(route, python) + tool_problems(env)
     if not problems:
         return
     lines = ["this machine cannot set the bench up yet:"]
@@ -40,6 +41,16 @@ def require(route: Route, python: Interpreter | None, env: Mapping[str, str]) ->
     if packages:
         lines.append("On Debian 12 or Ubuntu 24.04: sudo apt-get install " + " ".join(packages))
     raise SetupError("\n".join(lines))
+
+
+def path_problems(root: str) -> list[Problem]:
+    """Return what is wrong with the place of the checkout."""
+    # colcon's scripts, #! lines, CMake lists and search paths each have a character they cannot hold.
+    if re.search(r"""[\s:;"'$\\]""", root) is None:
+        return []
+    return [
+        Problem(f"the checkout's path has a blank or one of : ; \" ' $ \\ in it, colcon cannot build there: {root}")
+    ]
 
 
 def python_problems(route: Route, python: Interpreter | None) -> list[Problem]:
