@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter, NotchSection
+from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
 from hsv.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
 from hsv.parameters import Parameter, check_all
@@ -32,6 +33,12 @@ DESIGN_PARAMETERS = (
     Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
+    Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then those of the notch filter (SI)"),
+    Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),
+    Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
+    Parameter("nominal.state_scale", [], "deviations of the 5 rigid states that weigh equally in the nominal cost (SI)"),
+    Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
+    Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel equivalence ratio (-), elevator (rad)"),
     Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
@@ -45,7 +52,8 @@ class ControlDesign:
     """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.vehicle.dynamics`.
 
     ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5) with x' P x <= 1 on the
-    rigid states, outermost first; ``input_minimum`` and ``input_maximum`` (2); ``notch``: the filter it was designed with.
+    rigid states, outermost first; the nominal cost's ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2), and
+    ``nominal_input_bound`` (2), the largest |u_n| of the gains; ``input_minimum`` and ``input_maximum`` (2); ``notch``: the filter it was designed with.
     """
 
     name: str
@@ -57,9 +65,14 @@ class ControlDesign:
     feedback_gain: np.ndarray
     nominal_gains: np.ndarray
     nominal_ellipsoids: np.ndarray
+    nominal_state_scale: np.ndarray
+    nominal_input_scale: np.ndarray
+    nominal_input_bound: np.ndarray
     input_minimum: np.ndarray
     input_maximum: np.ndarray
     notch: tuple[NotchSection, ...]
+    tube: TubeSet | None = None
+    """The invariant set of the tube error, ``None``: the design carries none."""
     modified: bool = False
     """Whether the parameters differ from those that were written (their digest does not match)."""
 
@@ -82,9 +95,15 @@ class ControlDesign:
             "feedback.gain": self.feedback_gain,
             "nominal.gains": self.nominal_gains,
             "nominal.ellipsoids": self.nominal_ellipsoids,
+            "nominal.state_scale": self.nominal_state_scale,
+            "nominal.input_scale": self.nominal_input_scale,
+            "nominal.input_bound": self.nominal_input_bound,
             "input.minimum": self.input_minimum,
             "input.maximum": self.input_maximum,
         }
+        if self.tube:
+            tube = {"centre": self.tube.centre, "shape": self.tube.shape, "half_width": self.tube.half_width}
+            values |= {f"tube.{name}": value for name, value in tube.items()}
         flat = {
             name: np.asarray(value, float).ravel().tolist() if isinstance(value, np.ndarray) else value
             for name, value in values.items()
@@ -123,9 +142,13 @@ class ControlDesign:
             feedback_gain=F,
             nominal_gains=_shaped(v, "nominal.gains", (-1, N_INPUTS, N_STATES)),
             nominal_ellipsoids=_shaped(v, "nominal.ellipsoids", (-1, N_RIGID, N_RIGID)),
+            nominal_state_scale=_positive(v, "nominal.state_scale", N_RIGID),
+            nominal_input_scale=_positive(v, "nominal.input_scale", N_INPUTS),
+            nominal_input_bound=_positive(v, "nominal.input_bound", N_INPUTS),
             input_minimum=_shaped(v, "input.minimum", (N_INPUTS,)),
             input_maximum=_shaped(v, "input.maximum", (N_INPUTS,)),
             notch=notch.sections,
+            tube=_tube(v, N_RIGID + 2 * len(notch.sections)),
             modified=v["design.hash"] != digest(v),
         )
         if len(design.nominal_gains) != len(design.nominal_ellipsoids):
@@ -142,9 +165,9 @@ class ControlDesign:
 
 
 def digest(values: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a design's flat parameters, ``design.hash`` left out."""
+    """Return the SHA-256 of a design's flat parameters, ``design.hash`` and what is empty left out."""
     known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash"}
-    text = json.dumps({name: values[name] for name in sorted(known & values.keys())})
+    text = json.dumps({name: values[name] for name in sorted(known & values.keys()) if values[name] != []})
     return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -236,11 +259,27 @@ def _shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.
     return np.ascontiguousarray(array.reshape(shape))
 
 
+def _positive(values: Mapping[str, Any], name: str, size: int) -> np.ndarray:
+    array = _shaped(values, name, (size,))
+    if not np.all(array > 0.0):
+        raise DesignError(f"parameter {name} = {array.tolist()}: expected values above zero")
+    return array
+
+
 def _samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
     breakpoints = np.array(values[f"{axis}.breakpoints"], float)
     if len(breakpoints) < 2:
         raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
     return breakpoints, _shaped(values, f"{axis}.weights", (len(breakpoints), -1))
+
+
+def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:
+    if not any(values[f"tube.{name}"] for name in ("centre", "shape", "half_width")):
+        return None
+    shape = _shaped(values, "tube.shape", (n, n))
+    if not (np.allclose(shape, shape.T, rtol=1e-9, atol=0.0) and np.linalg.eigvalsh(shape)[0] > 0.0):
+        raise DesignError("parameter tube.shape: expected a symmetric positive definite matrix")
+    return TubeSet(_shaped(values, "tube.centre", (n,)), shape, _shaped(values, "tube.half_width", (n,)))
 
 
 def _check_stable(name: str, A: np.ndarray, B: np.ndarray, gain: np.ndarray) -> None:
