@@ -19,6 +19,7 @@ def warm() -> None:
     tube = components.tube_law.step(
         state.state,
         filtered.filtered_pitch_rate,
+        filtered.filter_state,
         nominal.reference,
         nominal.reference_input,
         nominal.deviation,

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeStatus
 
-from hsv.control.tube_law import TubeLaw
+from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv_ctrl.design import declare_design
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
@@ -21,6 +22,7 @@ class TubeMpcNode(PeerNode):
         self.law = TubeLaw.from_parameters(declare_design(self))
         self._state: FilteredState | None = None
         self._nominal: NominalState | None = None
+        self._outside = False
         self._command_message, self._status_message = ControlInput(), TubeStatus()
         self._command = self.talk("/hsv/command")
         self._status = self.talk("/hsv/tube_status")
@@ -30,6 +32,7 @@ class TubeMpcNode(PeerNode):
     def start_run(self, run: Run) -> None:
         """Forget the last messages of the run before."""
         self._state = self._nominal = None
+        self._outside = False
         self.law.reset()
 
     def _on_state(self, state: FilteredState) -> None:
@@ -48,6 +51,7 @@ class TubeMpcNode(PeerNode):
         result = self.law.step(
             state_vector(state.state),
             state.filtered_pitch_rate,
+            np.asarray(state.filter_state),
             state_vector(nominal.reference),
             u_r,
             state_vector(nominal.deviation),
@@ -61,14 +65,29 @@ class TubeMpcNode(PeerNode):
         status = self._status_message
         status.header, status.step = state.header, state.step
         status.error = result.error
-        status.level, status.inside = float("nan"), False
+        status.tube_centre, status.tube_half_width = result.tube_centre, result.tube_half_width
+        status.level, status.inside = result.level, result.inside
         status.u_nominal, status.u_reference = nominal.input, nominal.reference_input
         fill_input(status.u_feedback, result.u_feedback)
         fill_input(status.u_unsaturated, result.u_unsaturated)
         status.saturated = result.saturated.tolist()
         status.tau, status.status = result.tau, int(result.status)
         self._status.publish(status)
-        self.diagnose(state.header.stamp, result.status.name, step=state.step, saturated=bool(result.saturated.any()))
+        outside = result.status is TubeStatusCode.OUTSIDE
+        left, self._outside = outside and not self._outside, outside
+        stamp = state.header.stamp
+        if left:
+            time = stamp.sec + 1e-9 * stamp.nanosec
+            self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
+        self.diagnose(
+            stamp,
+            result.status.name,
+            warning=left,
+            step=state.step,
+            saturated=bool(result.saturated.any()),
+            level=result.level,
+            component=result.component,
+        )
 
 
 def main(args: Sequence[str] | None = None) -> int:

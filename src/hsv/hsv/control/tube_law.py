@@ -12,6 +12,8 @@ import numpy as np
 from numba import njit
 
 from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import NotchData, discretise, filter_step
+from hsv.control.tube_set import TubeSet
 
 PITCH_RATE = 4
 N_RIGID = 5
@@ -61,10 +63,20 @@ def tube_input(
 
 @dataclass(frozen=True)
 class TubeResult:
-    """The input (2) to apply and how it came about; see the message TubeStatus for the fields."""
+    """The input (2) to apply and how it came about; see the message TubeStatus for the fields.
+
+    ``error`` (n) of the rigid states and, with the filter in the loop, of its states; ``tube_centre`` and
+    ``tube_half_width`` (n) are empty, ``level`` is not a number and ``inside`` false where there is no set;
+    ``component`` names the largest component of e - c for its half-width, outside the set.
+    """
 
     input: np.ndarray
     error: np.ndarray
+    tube_centre: np.ndarray
+    tube_half_width: np.ndarray
+    level: float
+    inside: bool
+    component: str
     u_feedback: np.ndarray
     u_unsaturated: np.ndarray
     saturated: np.ndarray
@@ -72,11 +84,47 @@ class TubeResult:
     status: TubeStatusCode
 
 
+class TubeMonitor:
+    """Where the error is in the invariant set.
+
+    The filter's error is s - s_n, s_n the state of the same filter fed with the pitch rate of reference + nominal. The
+    first step takes s_n from the filter itself: exact at the start of a run, where x = x_r + x_n.
+    """
+
+    def __init__(self, tube: TubeSet | None, notch: NotchData) -> None:
+        self._tube = tube
+        self._notch = notch
+        self._planned = np.zeros(2 * len(notch.D))
+        self._started = False
+
+    def reset(self) -> None:
+        """Forget the past: the next step starts a new run."""
+        self._started = False
+
+    def step(self, error: np.ndarray, planned_rate: float, filter_state: np.ndarray) -> tuple[np.ndarray, TubeSet | None]:
+        """Return the error (n) of rigid states and filter, and the set that holds for it, if any.
+
+        Args:
+            error: (5) e = x - x_r - x_n.
+            planned_rate: Pitch rate of reference + nominal (rad/s).
+            filter_state: (2 s) of the notch filter before its update; empty: it is not in the loop.
+        """
+        if len(filter_state) != len(self._planned):
+            return error, None
+        if not self._started:
+            self._planned[:] = filter_state
+            self._started = True
+        full = np.concatenate((error, filter_state - self._planned))
+        filter_step(self._notch, self._planned, planned_rate)
+        return full, self._tube
+
+
 class TubeLaw:
-    """The controller's last stage; it has no memory, so that a restart in flight loses nothing."""
+    """The controller's last stage; only its monitor has a memory, so that a restart in flight changes no input."""
 
     def __init__(self, design: ControlDesign, tau: float = 1.0) -> None:
         self.data = TubeData(design.feedback_gain, tau, design.input_minimum, design.input_maximum)
+        self._monitor = TubeMonitor(design.tube, discretise(design.notch, design.period))
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
@@ -84,18 +132,20 @@ class TubeLaw:
         return cls(ControlDesign.from_parameters(values))
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Start a new run."""
+        self._monitor.reset()
 
     def step(
         self,
         state: np.ndarray,
         filtered_pitch_rate: float,
+        filter_state: np.ndarray,
         reference: np.ndarray,
         reference_input: np.ndarray,
         deviation: np.ndarray,
         nominal_input: np.ndarray,
     ) -> TubeResult:
-        """Return the input of this step from x (9), q_f (rad/s), x_r (9), u_r (2), x_n (9) and u_n (2)."""
+        """Return the input of this step from x (9), q_f (rad/s), s (2 s), x_r (9), u_r (2), x_n (9) and u_n (2)."""
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         tube_input(
             self.data,
@@ -109,14 +159,27 @@ class TubeLaw:
             total,
             u,
         )
-        error = (state - reference - deviation)[:N_RIGID]
-        finite = math.isfinite(total[0]) and math.isfinite(total[1])
+        planned_rate = float(reference[PITCH_RATE] + deviation[PITCH_RATE])
+        error, tube = self._monitor.step((state - reference - deviation)[:N_RIGID], planned_rate, filter_state)
+        level = tube.level(error) if tube else math.nan
+        inside = level <= 1.0
+        if not (math.isfinite(total[0]) and math.isfinite(total[1])):
+            status = TubeStatusCode.INVALID_INPUT
+        elif tube is None:
+            status = TubeStatusCode.NO_SET
+        else:
+            status = TubeStatusCode.OK if inside else TubeStatusCode.OUTSIDE
         return TubeResult(
             input=u,
             error=error,
+            tube_centre=tube.centre if tube else np.empty(0),
+            tube_half_width=tube.half_width if tube else np.empty(0),
+            level=level,
+            inside=inside,
+            component=tube.farthest(error) if tube and not inside else "",
             u_feedback=u_feedback,
             u_unsaturated=total,
             saturated=u != total,
             tau=self.data.tau,
-            status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,
+            status=status,
         )

@@ -1,0 +1,78 @@
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.control.design_file import ControlDesign, find_design, read_design
+from hsv.control.notch_filter import NotchFilter
+from hsv.control.tube_law import TubeLaw, TubeStatusCode
+from hsv.control.tube_set import TubeSet
+from hsv.errors import DesignError
+
+
+@pytest.fixture(scope="module")
+def design():
+    half_width = np.array([10.0, 3.0, 0.03, 0.03, 0.05, 0.002, 0.0003])
+    tube = TubeSet(0.1 * half_width, np.diag(half_width**-2.0), half_width)
+    return dataclasses.replace(read_design(find_design("baseline")), tube=tube)
+
+
+def step(law, design, error, state=None):
+    x = np.zeros(9)
+    x[:5] = error
+    filter_state = np.zeros(2) if state is None else state
+    return law.step(x, x[4], filter_state, np.zeros(9), np.array([0.27, 0.21]), np.zeros(9), np.zeros(2))
+
+
+def test_error_at_the_centre_has_level_zero_and_on_the_boundary_one(design):
+    law = TubeLaw(design)
+    assert step(law, design, design.tube.centre[:5]).level < 0.03  # the filter's error is zero, its centre not
+    boundary = design.tube.centre + design.tube.half_width * np.eye(7)[0]
+    assert design.tube.level(boundary) == pytest.approx(1.0)
+
+
+def test_an_absurd_altitude_error_is_outside_and_named(design):
+    result = step(TubeLaw(design), design, [1111.1, 0.0, 0.0, 0.0, 0.0])
+    assert (result.status, result.inside, result.component) == (TubeStatusCode.OUTSIDE, False, "altitude")
+    assert_allclose(result.error, [1111.1, 0, 0, 0, 0, 0, 0])
+    assert_allclose(result.tube_half_width, design.tube.half_width)
+
+
+def test_filter_error_is_the_filter_fed_with_the_rate_error(design):
+    law, real, fed = TubeLaw(design), NotchFilter(design.notch, design.period), NotchFilter(design.notch, design.period)
+    rates = np.concatenate(([0.0], 0.01 * np.sin(np.arange(40))))
+    planned = np.concatenate(([0.0], 0.02 * np.cos(np.arange(40))))
+    for e_q, q_n in zip(rates, planned, strict=True):
+        filtered = real.step(e_q + q_n)
+        x, x_n = np.zeros(9), np.zeros(9)
+        x[4], x_n[4] = e_q + q_n, q_n
+        result = law.step(
+            x, filtered.filtered_pitch_rate, filtered.filter_state, np.zeros(9), np.zeros(2), x_n, np.zeros(2)
+        )
+        assert_allclose(result.error[5:], fed.step(e_q).filter_state, atol=1e-15)
+
+
+def test_without_a_set_or_without_the_filter_there_is_no_level(design):
+    bare = TubeLaw(dataclasses.replace(design, tube=None))
+    for result in (step(bare, design, np.zeros(5)), step(TubeLaw(design), design, np.zeros(5), np.empty(0))):
+        assert (result.status, result.inside) == (TubeStatusCode.NO_SET, False)
+        assert math.isnan(result.level)
+        assert len(result.tube_centre) == 0
+
+
+def test_the_set_survives_the_parameter_file(design):
+    checked = ControlDesign.from_parameters(design.to_parameters())
+    assert not checked.modified
+    assert_allclose(checked.tube.shape, design.tube.shape)
+
+
+def test_a_shape_that_is_not_positive_definite_is_refused(design):
+    values = design.to_parameters()
+    values["tube.shape"] = [-v for v in values["tube.shape"]]
+    with pytest.raises(DesignError, match=r"tube\.shape"):
+        ControlDesign.from_parameters(values)
+    values["tube.shape"] = values["tube.shape"][:-1]
+    with pytest.raises(DesignError, match=r"tube\.shape: 48 values, expected 49"):
+        ControlDesign.from_parameters(values)
