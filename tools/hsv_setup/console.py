@@ -12,7 +12,8 @@ from pathlib import Path
 
 from hsv_setup.paths import LOG, ROOT
 
-TAIL_LINES = 30
+_TAIL_LINES = 30
+_POLL_PERIOD = 0.2  # s
 
 
 class SetupError(Exception):
@@ -69,7 +70,8 @@ class Stage:
                 start_new_session=True,
             )
             try:
-                while not _ended(process):
+                while process.poll() is None:
+                    time.sleep(_POLL_PERIOD)
                     if self._live:
                         self._show(progress(self.log.read_text(errors="replace")))
             except BaseException:
@@ -79,19 +81,11 @@ class Stage:
             raise SetupError(self._failure(f"exit code {process.returncode}"))
 
     def _failure(self, reason: str) -> str:
-        tail = self.log.read_text(errors="replace").splitlines()[-TAIL_LINES:]
+        tail = self.log.read_text(errors="replace").splitlines()[-_TAIL_LINES:]
         quoted = "\n".join(f"    {line}" for line in tail)
         log = self.log.relative_to(ROOT)
         what = f"'{self.title}' failed ({reason}) after {self._elapsed:.0f} s"
         return f"{what}. The end of {log}:\n{quoted}\nFull log: {log}"
-
-
-def _ended(process: subprocess.Popen[bytes]) -> bool:
-    try:
-        process.wait(timeout=0.25)
-    except subprocess.TimeoutExpired:
-        return False
-    return True
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:

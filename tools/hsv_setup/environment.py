@@ -53,16 +53,9 @@ def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: St
         write_stamp(_ROUTE, route.name)
     _CONTENTS.unlink(missing_ok=True)
 
-    pip: list[str | Path] = [
-        PYTHON,
-        "-m",
-        "pip",
-        "--disable-pip-version-check",
-        "--no-input",
-        "install",
-        "--progress-bar",
-        "off",
-    ]
+    pip: list[str | Path] = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
+    # Byte code is written at first import; doing it here, for all the modules nobody imports, takes half a minute.
+    pip += ["--no-compile", "--progress-bar", "off"]
     pinned = ["--constraint", route.constraints]
     if route.wheels:
         # First, because empy comes as source only and is built with this pinned setuptools, not with the newest.
