@@ -1,12 +1,13 @@
 """The published model once more, written from the papers in their own units: a second opinion on ``hsv.vehicle``.
 
-Parker et al., J. Guid. Control Dyn. 30(3), 2007 (numbers); equations (1)-(3) of the paper. ft, slug, lbf, s, rad; extended
-precision. The pitch acceleration is found first here, the elastic ones from it: another order than in the library.
+Parker et al., J. Guid. Control Dyn. 30(3), 2007 (numbers); equations (1)-(3) of the paper. ft, slug, lbf, s, rad; in
+extended precision. The pitch acceleration is found first here, the elastic ones from it: another order than in the library.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 
@@ -82,6 +83,6 @@ def jacobian(f: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray
             up[j] += step
             down[j] -= step
             table.append((f(up) - f(down)) / (2 * step))
-        first = [(4 * fine - coarse) / 3 for coarse, fine in zip(table[:-1], table[1:], strict=True)]
+        first = [(4 * fine - coarse) / 3 for coarse, fine in pairwise(table)]
         columns.append((16 * first[1] - first[0]) / 15)
     return np.array(columns, float).T
