@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ class DesignModel:
     report: dict[str, Any]
 
 
-def design_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel:
+def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel:
     """Return the polytopic model of ``vehicle``, decoupled, over the envelope, in the representation asked for.
 
     Raises:
@@ -57,23 +57,33 @@ def design_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel
         polytope, interpolation = product.polytope, "cubic"
         altitude_samples, velocity_samples = product.altitude_samples, product.velocity_samples
         singular_values = product.singular_values
+    report = {
+        "representation": inputs.representation,
+        "vertices": [altitude_samples[1].shape[1], velocity_samples[1].shape[1]],
+        "singular_values": [values[:8].tolist() for values in singular_values],
+    }
+    return DesignModel(polytope, interpolation, altitude_samples, velocity_samples, report)
+
+
+def design_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel:
+    """Return :func:`polytopic_model` with its accuracy between the samples in the report.
+
+    Raises:
+        DesignError: Too few samples for the tolerance, or no hull.
+    """
+    model = polytopic_model(inputs, vehicle)
 
     def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
         return zero_order_hold(*linearise(vehicle, altitude, velocity), inputs.period)
 
     accuracy = model_accuracy(
-        polytope,
+        model.polytope,
         exact,
         off_grid(*ALTITUDE_RANGE, _POINTS),
         off_grid(*VELOCITY_RANGE, _POINTS),
-        *scales,
+        inputs.tensor_product.state_scale.array(),
+        inputs.tensor_product.input_scale.array(),
         _FREQUENCIES,
         inputs.period,
     )
-    report = {
-        "representation": inputs.representation,
-        "vertices": [altitude_samples[1].shape[1], velocity_samples[1].shape[1]],
-        "singular_values": [values[:8].tolist() for values in singular_values],
-        "accuracy": accuracy.report(),
-    }
-    return DesignModel(polytope, interpolation, altitude_samples, velocity_samples, report)
+    return replace(model, report=model.report | {"accuracy": accuracy.report()})
