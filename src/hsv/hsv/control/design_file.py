@@ -33,12 +33,12 @@ DESIGN_PARAMETERS = (
     Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
-    Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then those of the notch filter (SI)"),
+    Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
     Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),
     Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
-    Parameter("nominal.state_scale", [], "deviations of the 5 rigid states that weigh equally in the nominal cost (SI)"),
+    Parameter("nominal.state_scale", [], "rigid deviations (5) that weigh equally in the nominal cost (SI)"),
     Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
-    Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel equivalence ratio (-), elevator (rad)"),
+    Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel (-), elevator (rad)"),
     Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
@@ -51,9 +51,10 @@ N_STATES, N_INPUTS, N_RIGID = 9, 2, 5
 class ControlDesign:
     """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.vehicle.dynamics`.
 
-    ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5) with x' P x <= 1 on the
+    ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5), x' P x <= 1 on the
     rigid states, outermost first; the nominal cost's ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2), and
-    ``nominal_input_bound`` (2), the largest |u_n| of the gains; ``input_minimum`` and ``input_maximum`` (2); ``notch``: the filter it was designed with.
+    ``nominal_input_bound`` (2), the largest |u_n| of the gains; ``input_minimum`` and ``input_maximum`` (2); ``notch``:
+    the filter it was designed with.
     """
 
     name: str
@@ -193,8 +194,9 @@ def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
     """
     try:
         tree = yaml.load(path.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except OSError as error:
-        raise DesignError(f"design {str(path)!r}: cannot be read ({error.strerror}), expected a parameter file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "not text"
+        raise DesignError(f"design {str(path)!r}: cannot be read ({reason}), expected a parameter file") from error
     except yaml.YAMLError as error:
         raise DesignError(f"design {str(path)!r}: {' '.join(str(error).split())}") from error
     flat: dict[str, Any] = {}
@@ -288,5 +290,6 @@ def _check_stable(name: str, A: np.ndarray, B: np.ndarray, gain: np.ndarray) -> 
         radius = float(np.max(np.abs(np.linalg.eigvals(a + b @ gain))))
         if not radius < 1.0:
             raise DesignError(
-                f"parameter {name}: spectral radius {radius:.6f} of the closed loop at vertex {vertex}, expected below 1"
+                f"parameter {name}: spectral radius {radius:.6f} of the closed loop at vertex {vertex}, "
+                "expected below 1"
             )
