@@ -1,0 +1,207 @@
+import copy
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from numpy.testing import assert_array_equal
+
+from hsv.control.design_file import (
+    ControlDesign,
+    digest,
+    find_design,
+    find_file,
+    read_design,
+    read_parameters,
+    write_design,
+)
+from hsv.errors import DesignError
+
+SHIPPED = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
+VALUES = read_parameters(find_design("baseline"))
+
+
+def with_entry(name, index, value):
+    changed = copy.deepcopy(VALUES)
+    changed[name][index] = value
+    return changed
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_every_shipped_design_loads_unmodified(path):
+    design = read_design(path)
+    assert design.name == path.stem
+    assert not design.modified
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
+def test_shipped_files_write_doubles_as_doubles(path):
+    text = yaml.safe_load(path.read_text())
+
+    def leaves(branch):
+        for value in branch.values():
+            yield from leaves(value) if isinstance(value, dict) else [value]
+
+    for value in leaves(text):
+        if isinstance(value, list):
+            assert all(isinstance(entry, float | str) for entry in value)
+
+
+def test_design_survives_writing_and_reading_bit_for_bit(tmp_path):
+    design = ControlDesign.from_parameters(VALUES)
+    path = tmp_path / "copy.yaml"
+    write_design(path, design, "a comment\nof two lines")
+    assert path.read_text().startswith("# a comment\n# of two lines\n")
+    assert read_parameters(path) == design.to_parameters() == VALUES
+    again = read_design(path)
+    assert_array_equal(again.polytope.A, design.polytope.A)
+    assert_array_equal(again.nominal_ellipsoids, design.nominal_ellipsoids)
+
+
+def test_a_changed_number_shows_as_modified():
+    design = ControlDesign.from_parameters(with_entry("feedback.gain", 0, VALUES["feedback.gain"][0] * (1 + 1e-12)))
+    assert design.modified
+    assert digest(VALUES) == VALUES["design.hash"]
+
+
+def array_names():
+    return [name for name, value in VALUES.items() if isinstance(value, list)]
+
+
+@pytest.mark.parametrize("name", array_names())
+@pytest.mark.parametrize("value", [math.nan, math.inf, 1, "1.0", None])
+def test_an_entry_that_is_no_finite_double_is_named(name, value):
+    with pytest.raises(DesignError) as caught:
+        ControlDesign.from_parameters(with_entry(name, 0, value))
+    assert str(caught.value).startswith(f"parameter {name}[0] = {value!r}: expected double array")
+
+
+@pytest.mark.parametrize("name", array_names())
+def test_an_array_of_wrong_length_is_named(name):
+    for changed in ([*VALUES[name], VALUES[name][-1]], VALUES[name][:-1]):
+        with pytest.raises(DesignError) as caught:
+            ControlDesign.from_parameters({**VALUES, name: changed})
+        # Breakpoints and their weights, and the columns of the notch filter, belong together.
+        group = name.rpartition(".")[0]
+        assert f"parameter {group}." in str(caught.value)
+        assert "expected" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["feedback.gain", "nominal.gains", "model.a"])
+def test_a_missing_array_is_named(name):
+    with pytest.raises(DesignError, match=rf"parameter {name}: 0 values, expected"):
+        ControlDesign.from_parameters({n: v for n, v in VALUES.items() if n != name})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("period", 1, "parameter period = 1: expected double"),
+        ("period", math.nan, "parameter period = nan: expected double"),
+        ("design.name", 3, "parameter design.name = 3: expected string"),
+        ("scheduling.interpolation", "quintic", "parameter scheduling.interpolation = 'quintic': expected one of"),
+        ("feedback.gain", 1.0, "parameter feedback.gain = 1.0: expected double array"),
+    ],
+)
+def test_a_wrong_scalar_is_named(name, value, message):
+    with pytest.raises(DesignError) as caught:
+        ControlDesign.from_parameters({**VALUES, name: value})
+    assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize("name", ["feedback.gain", "nominal.gains"])
+@pytest.mark.parametrize("factor", [-1.0, 0.0, 100.0])
+def test_a_gain_that_does_not_stabilise_is_refused_with_its_spectral_radius(name, factor):
+    changed = {**VALUES, name: [factor * entry for entry in VALUES[name]]}
+    with pytest.raises(DesignError, match=rf"parameter {name}: spectral radius \d+\.\d+ of the closed loop at vertex"):
+        ControlDesign.from_parameters(changed)
+
+
+def test_limits_must_leave_room():
+    with pytest.raises(DesignError, match=r"parameter input.minimum: expected values below input.maximum"):
+        ControlDesign.from_parameters({**VALUES, "input.minimum": VALUES["input.maximum"]})
+
+
+def test_breakpoints_must_increase():
+    name = "scheduling.velocity.breakpoints"
+    with pytest.raises(DesignError, match=r"parameter scheduling.*breakpoints.*expected increasing values"):
+        ControlDesign.from_parameters({**VALUES, name: VALUES[name][::-1]})
+
+
+def test_every_gain_needs_its_ellipsoid():
+    with pytest.raises(DesignError, match=r"parameter nominal.ellipsoids: 6 matrices, expected one per gain, 7"):
+        ControlDesign.from_parameters({**VALUES, "nominal.ellipsoids": VALUES["nominal.ellipsoids"][25:]})
+
+
+def test_limits_are_the_paper_s_input_set():
+    design = ControlDesign.from_parameters(VALUES)
+    assert_array_equal(design.input_minimum, [0.0, -math.radians(30.0)])
+    assert_array_equal(design.input_maximum, [1.5, math.radians(30.0)])
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (None, "cannot be read (No such file or directory), expected a parameter file"),
+        (b"", "expected ROS 2 parameters"),
+        (b"a: 1\n", "expected ROS 2 parameters"),
+        (b"- 1\n- 2\n", "expected ROS 2 parameters"),
+        (b"/**:\n  ros__parameters:\n    a: [1.0,\n", "while parsing"),
+        (b"\xff\xfe\x00", "cannot be read (not text), expected a parameter file"),
+        (b"a: \x07\n", "control characters are not allowed"),
+    ],
+)
+def test_a_file_that_is_no_parameter_file_is_named_in_one_line(tmp_path, content, problem):
+    path = tmp_path / "design.yaml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(DesignError) as caught:
+        read_parameters(path)
+    message = str(caught.value)
+    assert message.startswith(f"design {str(path)!r}")
+    assert problem in message
+    assert "\n" not in message
+
+
+def test_errors_of_a_file_name_file_and_parameter(tmp_path):
+    path = tmp_path / "bad.yaml"
+    path.write_text("/**:\n  ros__parameters:\n    period: 1\n")
+    with pytest.raises(DesignError) as caught:
+        read_design(path)
+    assert str(caught.value).startswith(f"{path}: parameter period = 1: expected double")
+
+
+def test_a_section_of_one_node_goes_over_that_for_all(tmp_path):
+    path = tmp_path / "parameters.yaml"
+    path.write_text(
+        "/**: {ros__parameters: {period: 0.02, notch: {enabled: true}}}\nplant: {ros__parameters: {period: 0.01}}\n"
+    )
+    assert read_parameters(path) == {"period": 0.02, "notch.enabled": True}
+    assert read_parameters(path, "plant") == {"period": 0.01, "notch.enabled": True}
+
+
+def test_designs_are_found_by_name_and_by_path(tmp_path, monkeypatch):
+    monkeypatch.setenv("HSV_DESIGN_PATH", str(tmp_path))
+    own = tmp_path / "own.yaml"
+    own.write_text("x")
+    assert find_design("own") == own
+    assert find_design(str(own)) == own
+    assert find_design("baseline").name == "baseline.yaml"
+    assert find_file("baseline", ".toml").name == "baseline.toml"
+
+
+@pytest.mark.parametrize("name", ["absent", "./absent.yaml", "", "/"])
+def test_a_design_that_is_not_there_is_named(name):
+    with pytest.raises(DesignError, match=rf"design = '{name}': no such file, expected the path of a .yaml file"):
+        find_design(name)
+
+
+def test_closed_loop_of_the_shipped_baseline_is_as_fast_as_the_study_says():
+    design = ControlDesign.from_parameters(VALUES)
+    rigid = [
+        np.abs(np.linalg.eigvals((A + B @ design.feedback_gain)[:5, :5])).max()
+        for A, B in zip(design.polytope.A, design.polytope.B, strict=True)
+    ]
+    assert len(rigid) == 20
+    assert max(rigid) < 0.994

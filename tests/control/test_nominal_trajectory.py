@@ -1,0 +1,137 @@
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
+from hsv.errors import ParameterError
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+VALUES = read_parameters(find_design("baseline"))
+DESIGN = read_design(find_design("baseline"))
+START = trim(vehicle_parameters(), 26060.4, 2407.92)
+TARGET = {"reference.altitude": 26243.28, "reference.velocity": 2484.12}
+
+
+def nominal(**changes):
+    return NominalTrajectory.from_parameters({**VALUES, **TARGET, **changes})
+
+
+def smallest(deviation):
+    """Index of the innermost ellipsoid that holds the deviation, 0 if there is none."""
+    levels = [deviation[:5] @ P @ deviation[:5] for P in DESIGN.nominal_ellipsoids]
+    return max((g for g, level in enumerate(levels) if level <= 1.0 + 1e-6), default=0)
+
+
+def test_reference_is_the_trim_of_the_command():
+    result = nominal().step(START.state)
+    expected = trim(vehicle_parameters(), 26243.28, 2484.12)
+    assert_allclose(result.reference, expected.state, rtol=1e-12)
+    assert_allclose(result.reference_input, expected.input, rtol=1e-12)
+
+
+def test_starts_at_what_separates_state_and_reference():
+    result = nominal().step(START.state)
+    assert_array_equal(result.deviation, START.state - result.reference)
+    assert result.status == NominalStatus.OK
+
+
+def test_obeys_the_nominal_system_scheduled_by_the_measured_state():
+    rng = np.random.default_rng(5)
+    law = nominal()
+    result = law.step(START.state)
+    for k in range(200):
+        A, B = DESIGN.polytope.at(START.state[0] + k, START.state[1] + 0.3 * k)
+        expected = A @ result.deviation + B @ result.input
+        measured = START.state + np.array([k + 1, 0.3 * (k + 1), *rng.normal(size=7)])
+        result = law.step(measured)
+        assert_allclose(result.deviation, expected, rtol=1e-11, atol=1e-13)
+        assert_array_equal(result.reference, law.reference.state)
+
+
+def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
+    law = nominal()
+    used = set()
+    for _ in range(6000):
+        result = law.step(START.state)
+        g = smallest(result.deviation)
+        used.add(g)
+        assert_allclose(result.input, DESIGN.nominal_gains[g] @ result.deviation, rtol=1e-9, atol=1e-14)
+    assert used == set(range(len(DESIGN.nominal_gains)))
+    assert np.abs(result.deviation[:2]).max() < 1.0
+
+
+def test_never_leaves_an_ellipsoid_outwards():
+    law = nominal()
+    indices = [smallest(law.step(START.state).deviation) for _ in range(4000)]
+    assert np.all(np.diff(indices) >= 0)
+
+
+def test_at_the_reference_it_rests():
+    law = nominal(**{"reference.altitude": 26060.4, "reference.velocity": 2407.92})
+    for _ in range(3):
+        result = law.step(law.reference.state)
+        assert_array_equal(result.deviation, 0.0)
+        assert_array_equal(result.input, 0.0)
+
+
+def test_tells_when_the_deviation_is_larger_than_the_design_knows():
+    far = START.state.copy()
+    far[2] += 0.5
+    result = nominal().step(far)
+    assert NominalStatus.OUTSIDE_FAMILY in result.status
+    assert np.all(np.isfinite(result.input))
+
+
+@pytest.mark.parametrize(("component", "value"), [(0, 20000.0), (0, 30000.0), (1, 2000.0), (1, 3000.0)])
+def test_tells_when_the_vehicle_is_outside_the_envelope_and_holds_its_edge(component, value):
+    law = nominal()
+    before = law.step(START.state)
+    outside = START.state.copy()
+    outside[component] = value
+    result = law.step(outside)
+    assert NominalStatus.OUTSIDE_ENVELOPE in result.status
+    assert before.status == NominalStatus.OK
+    # Far outside the model is that of the nearest edge: the next deviation is the same however far it is.
+    outside[component] += 1e3 * math.copysign(1.0, value - START.state[component])
+    other = nominal()
+    other.step(START.state)
+    other.step(outside)
+    assert_array_equal(law.step(START.state).deviation, other.step(START.state).deviation)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e300])
+def test_a_measured_state_that_means_nothing_is_told_and_does_not_spoil_the_nominal(value):
+    law = nominal()
+    law.step(START.state)
+    result = law.step(np.full(9, value))
+    assert NominalStatus.OUTSIDE_ENVELOPE in result.status
+    assert np.all(np.isfinite(result.input))
+    assert np.all(np.isfinite(law.step(START.state).deviation))
+
+
+def test_reset_starts_anew():
+    law = nominal()
+    first = [law.step(START.state).deviation for _ in range(5)]
+    law.reset()
+    assert_array_equal([law.step(START.state).deviation for _ in range(5)], first)
+
+
+def test_results_do_not_change_afterwards():
+    law = nominal()
+    result = law.step(START.state)
+    deviation, played = result.deviation.copy(), result.input.copy()
+    law.step(START.state)
+    assert_array_equal(result.deviation, deviation)
+    assert_array_equal(result.input, played)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("reference.altitude", 30000.0), ("reference.velocity", 2484), ("reference.altitude", math.nan)]
+)
+def test_a_wrong_reference_is_named(name, value):
+    with pytest.raises(ParameterError, match=rf"parameter {name} = {value}: expected double from"):
+        nominal(**{name: value})
