@@ -17,6 +17,7 @@ setup(
         "numba",
         "numpy",
         "pint",
+        "piqp",
         "pydantic",
         "pyyaml",
         "rich",

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from hsv_msgs.msg import NominalState, Run, VehicleState
 
-from hsv.control.nominal_trajectory import REFERENCE_PARAMETERS, NominalStatus, NominalTrajectory
+from hsv.control.nominal_law import NominalStatus
+from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS, NominalTrajectory
 from hsv_ctrl.design import declare_design
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
@@ -18,7 +19,7 @@ class NominalTrajectoryNode(PeerNode):
 
     def __init__(self) -> None:
         super().__init__("nominal_trajectory")
-        self.trajectory = NominalTrajectory.from_parameters(declare_design(self, REFERENCE_PARAMETERS))
+        self.trajectory = NominalTrajectory.from_parameters(declare_design(self, NOMINAL_PARAMETERS))
         self._message = NominalState()
         self._nominal = self.talk("/hsv/nominal")
         self.listen("/hsv/state", self._on_state)

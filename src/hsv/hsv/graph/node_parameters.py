@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsv.control.design_file import DESIGN_PARAMETERS
-from hsv.control.nominal_trajectory import REFERENCE_PARAMETERS
+from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.faults.actuator import FAULT_PARAMETERS
 from hsv.parameters import Parameter
@@ -30,7 +30,7 @@ RECORDER_PARAMETERS = (
 NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     "plant": (*PLANT_PARAMETERS, *PACE_PARAMETERS),
     "notch_filter": NOTCH_PARAMETERS,
-    "nominal_trajectory": (*REFERENCE_PARAMETERS, *DESIGN_PARAMETERS),
+    "nominal_trajectory": (*NOMINAL_PARAMETERS, *DESIGN_PARAMETERS),
     "tube_mpc": DESIGN_PARAMETERS,
     "fault_injector": FAULT_PARAMETERS,
     "recorder": RECORDER_PARAMETERS,

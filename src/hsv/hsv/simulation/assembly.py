@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from hsv.control.control_law import control_law
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
-from hsv.control.tube_law import TubeLaw
 from hsv.faults.actuator import FaultInjector
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
@@ -30,6 +30,6 @@ def assemble(values: Mapping[str, Any]) -> Components:
         Plant.from_parameters(values),
         NotchFilter.from_parameters(values),
         NominalTrajectory.from_parameters(values),
-        TubeLaw.from_parameters(values),
+        control_law(values),
         FaultInjector.from_parameters(values),
     )

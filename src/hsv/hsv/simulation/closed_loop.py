@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance, nominal_input
+from hsv.control.control_law import ControlLaw
+from hsv.control.nominal_law import FamilyLaw, nominal_input
+from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.tube_law import TubeLaw, tube_input
 from hsv.faults.actuator import FaultInjector, apply_faults
@@ -25,7 +27,7 @@ class Components:
     plant: Plant
     notch_filter: NotchFilter
     nominal_trajectory: NominalTrajectory
-    tube_law: TubeLaw
+    tube_law: ControlLaw
     fault_injector: FaultInjector
 
 
@@ -131,9 +133,54 @@ class Flight:
 
 
 def fly(components: Components) -> Flight:
-    """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges."""
+    """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges.
+
+    The nested family under the tube law flies compiled, whatever else step by step; both give the same bits.
+    """
+    law = components.tube_law
+    if isinstance(law, TubeLaw) and isinstance(components.nominal_trajectory.law, FamilyLaw):
+        return _flight(components, _fly_compiled(components, law))
+    return fly_stepwise(components)
+
+
+def fly_stepwise(components: Components) -> Flight:
+    """Fly as :func:`fly` does, through the ``step()`` of every component, as the nodes of the graph do."""
+    plant, notch, nominal = components.plant, components.notch_filter, components.nominal_trajectory
+    law, injector = components.tube_law, components.fault_injector
+    for component in (notch, nominal, law, injector):
+        component.reset()
+    history = History.empty(plant.steps + 1)
+    current = plant.reset()
+    for k in range(plant.steps + 1):
+        if k > 0:
+            current = plant.step(history.actuator[k - 1])
+        filtered = notch.step(float(current.state[4]))
+        planned = nominal.step(current.state)
+        applied = law.step(
+            current.state,
+            filtered.filtered_pitch_rate,
+            filtered.filter_state,
+            planned.reference,
+            planned.reference_input,
+            planned.deviation,
+            planned.input,
+        )
+        history.state[k] = current.state
+        history.filtered_pitch_rate[k] = filtered.filtered_pitch_rate
+        history.deviation[k] = planned.deviation
+        history.nominal_input[k] = planned.input
+        history.gain_index[k] = planned.gain_index
+        history.u_unsaturated[k] = applied.u_unsaturated
+        history.command[k] = applied.input
+        history.actuator[k] = injector.step(k, applied.input).actuator
+        if current.status is FlightStatus.DIVERGED:
+            history = History(*(column[: k + 1] for column in history))
+            break
+    return _flight(components, history)
+
+
+def _fly_compiled(components: Components, law: TubeLaw) -> History:
     plant, nominal = components.plant, components.nominal_trajectory
-    reference = nominal.reference
     history = History.empty(plant.steps + 1)
     rows = _fly(
         plant.vehicle,
@@ -141,17 +188,21 @@ def fly(components: Components) -> Flight:
         plant.substeps,
         components.notch_filter.data,
         nominal.data,
-        components.tube_law.data,
+        law.data,
         components.fault_injector.schedule,
-        reference.state,
-        reference.input,
+        nominal.reference.state,
+        nominal.reference.input,
         plant.initial.state.copy(),
         workspace(),
         history,
     )
-    history = History(*(column[:rows] for column in history))
+    return History(*(column[:rows] for column in history))
+
+
+def _flight(components: Components, history: History) -> Flight:
+    plant, reference = components.plant, components.nominal_trajectory.reference
     diverged = not in_model_range(history.state[-1])
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
     starts = components.fault_injector.schedule.start
-    fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < rows else None
+    fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < len(history.state) else None
     return Flight(plant.period, history, reference.state, reference.input, fault_start, status)

@@ -1,0 +1,103 @@
+"""What chooses the nominal input u_n from the nominal state x_n: the interface, and the nested family (eq. 32-35)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numba import njit
+
+from hsv.lpv.polytope import PolytopeData
+
+MEMBERSHIP_TOLERANCE = 1e-6
+"""Relative slack of x' P x <= 1: the first deviation lies on the boundary of the outermost ellipsoid by design."""
+
+NOT_IN_FAMILY = 255
+"""Index of a gain that was found in flight."""
+
+
+class NominalStatus(IntFlag):
+    """Why a step of the nominal trajectory is not as planned; values of NominalState.status."""
+
+    OK = 0
+    OUTSIDE_FAMILY = 1
+    OUTSIDE_ENVELOPE = 2
+    SOLVER_FAILED = 4
+    FAMILY_FALLBACK = 8
+
+
+class NominalData(NamedTuple):
+    """Polytope, gains K (g, 2, n) and ellipsoids P (g, s, s) for compiled functions, outermost first."""
+
+    polytope: PolytopeData
+    gains: np.ndarray
+    ellipsoids: np.ndarray
+
+
+@dataclass(frozen=True)
+class LawResult:
+    """u_n (2); the gain K (2, 9) in it and its index in the family, ``NOT_IN_FAMILY`` if found in flight; status."""
+
+    input: np.ndarray
+    gain: np.ndarray
+    gain_index: int
+    status: NominalStatus
+
+
+class NominalLaw(Protocol):
+    """A nominal law: deterministic, stepped once a control period."""
+
+    def reset(self) -> None:
+        """Forget the past."""
+
+    def step(self, deviation: np.ndarray) -> LawResult:
+        """Return the nominal input for x_n (9), ``deviation``."""
+
+
+@njit(cache=True)
+def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
+    """Return x' P x over the first states, as many as P (s, s) has rows."""
+    total = 0.0
+    for i in range(ellipsoid.shape[0]):
+        row = 0.0
+        for j in range(ellipsoid.shape[0]):
+            row += ellipsoid[i, j] * x[j]
+        total += x[i] * row
+    return total
+
+
+@njit(cache=True)
+def nominal_input(data: Any, deviation: np.ndarray, u_n: np.ndarray) -> tuple[int, bool]:
+    """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one."""
+    index = 0
+    inside = False
+    for g in range(len(data.ellipsoids) - 1, -1, -1):
+        if level(data.ellipsoids[g], deviation) <= 1.0 + MEMBERSHIP_TOLERANCE:
+            index = g
+            inside = True
+            break
+    gain = data.gains[index]
+    for i in range(gain.shape[0]):
+        u_n[i] = 0.0
+        for j in range(gain.shape[1]):
+            u_n[i] += gain[i, j] * deviation[j]
+    return index, inside
+
+
+class FamilyLaw:
+    """The nested family: the gain of the smallest ellipsoid that holds x_n, the outermost where none does."""
+
+    def __init__(self, data: NominalData) -> None:
+        self.data = data
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def step(self, deviation: np.ndarray) -> LawResult:
+        """Return the nominal input for x_n (9)."""
+        u_n = np.empty(self.data.gains.shape[1])
+        index, inside = nominal_input(self.data, deviation, u_n)
+        status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
+        return LawResult(u_n, self.data.gains[index], index, status)

@@ -1,0 +1,132 @@
+"""A quadratic programme as the nominal law: u_n = K x_n + c over a horizon, within the tightened inputs, every step."""
+
+from __future__ import annotations
+
+import numpy as np
+import piqp
+from scipy.linalg import solve_discrete_are
+
+from hsv.control.design_file import N_RIGID, ControlDesign
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
+from hsv.errors import DesignError
+from hsv.vehicle.trim import Trim
+
+BLOCKS = 40
+"""Blocks of the horizon, c constant in each."""
+
+BLOCK_TIME = 0.5
+"""Length of a block, s."""
+
+CHECKED = (0.0, 0.24, 0.48, 0.72, 0.96)
+"""Where in a block the bounds are imposed, as shares of it: at its start and end only, inputs overshoot between."""
+
+
+class QpLaw:
+    """Horizon 20 s, prediction by the model at the reference, K of its Riccati equation.
+
+    About that K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c: the Hessian does not depend on
+    the state, and c = 0 is the answer wherever it keeps the bounds. The solver starts cold each time, so that the input
+    depends on x_n alone. Where it fails, the plan before goes on, shifted; where there is none, the family flies.
+    """
+
+    def __init__(
+        self, design: ControlDesign, data: NominalData, reference: Trim, minimum: np.ndarray, maximum: np.ndarray
+    ) -> None:
+        """Prepare the programme for bounds ``minimum`` and ``maximum`` (2) of the total nominal input u_r + u_n."""
+        for bound, outside in ((minimum, minimum > reference.input), (maximum, maximum < reference.input)):
+            if outside.any():
+                raise DesignError(
+                    f"tightened input bound {bound.tolist()}: expected the reference input "
+                    f"{reference.input.tolist()} inside"
+                )
+        self._family = FamilyLaw(data)
+        self._lower, self._upper = minimum - reference.input, maximum - reference.input
+        self._scale = design.nominal_input_scale
+        self._block = round(BLOCK_TIME / design.period)
+        A, B = design.polytope.at(*reference.state[:2])
+        A, B = A[:N_RIGID, :N_RIGID], B[:N_RIGID]
+        Q = design.period * np.diag(1.0 / design.nominal_state_scale**2)
+        R = design.period * np.diag(1.0 / self._scale**2)
+        P = solve_discrete_are(A, B, Q, R)
+        weight = R + B.T @ P @ B
+        K = -np.linalg.solve(weight, B.T @ P @ A)
+        self.gain = np.zeros(data.gains.shape[1:])
+        self.gain[:, :N_RIGID] = K
+        checked = [round(share * self._block) for share in CHECKED]
+        state_map, self._input_map = _predicted_inputs(A + B @ K, B, K, self._block, checked)
+        # Inputs and c in units of their scales.
+        rows = np.tile(self._scale, BLOCKS * len(checked))
+        self._state_map = state_map / rows[:, None]
+        self._input_map *= np.tile(self._scale, BLOCKS) / rows[:, None]
+        self._bounds = (
+            np.tile(self._lower, BLOCKS * len(checked)) / rows,
+            np.tile(self._upper, BLOCKS * len(checked)) / rows,
+        )
+        scaled = self._scale[:, None] * weight * self._scale
+        self._hessian = np.kron(np.eye(BLOCKS), scaled / np.max(scaled))
+        self._solver: piqp.DenseSolver | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the plan."""
+        self._plan: np.ndarray | None = None
+        self._age = 0
+
+    def step(self, deviation: np.ndarray) -> LawResult:
+        """Return the nominal input for x_n (9)."""
+        status = NominalStatus.OK
+        plan = self._solve(deviation[:N_RIGID])
+        if plan is not None:
+            self._plan, self._age = plan, 0
+        else:
+            self._age += 1
+            status = NominalStatus.SOLVER_FAILED
+        block = self._age // self._block
+        if self._plan is None or block >= BLOCKS:
+            result = self._family.step(deviation)
+            status |= result.status | NominalStatus.FAMILY_FALLBACK
+            return LawResult(result.input, result.gain, result.gain_index, status)
+        planned = self.gain @ deviation + self._plan[block]
+        return LawResult(np.clip(planned, self._lower, self._upper), self.gain, NOT_IN_FAMILY, status)
+
+    def _solve(self, state: np.ndarray) -> np.ndarray | None:
+        """Return the optimal c (blocks, 2), ``None`` where the solver fails."""
+        inputs = self._state_map @ state
+        lower, upper = self._bounds[0] - inputs, self._bounds[1] - inputs
+        if np.all(lower <= 0.0) and np.all(upper >= 0.0):
+            return np.zeros((BLOCKS, len(self._scale)))
+        if not np.all(np.isfinite(inputs)):
+            return None
+        if self._solver is None:
+            self._solver = piqp.DenseSolver()
+            self._solver.setup(self._hessian, np.zeros(len(self._hessian)), None, None, self._input_map, lower, upper)
+        else:
+            self._solver.update(h_l=lower, h_u=upper)
+        if self._solver.solve() != piqp.PIQP_SOLVED:
+            return None
+        return np.asarray(self._solver.result.x).reshape(BLOCKS, -1) * self._scale
+
+
+def _predicted_inputs(
+    closed: np.ndarray, B: np.ndarray, K: np.ndarray, block: int, checked: list[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what maps x_n and all c to the inputs at the checked steps of every block, block after block."""
+    n, m = B.shape
+    power, forced = [np.eye(n)], [np.zeros((n, m))]
+    for _ in range(block):
+        power.append(closed @ power[-1])
+        forced.append(closed @ forced[-1] + B)
+    from_state, from_plan = np.eye(n), np.zeros((n, m * BLOCKS))
+    state_rows, plan_rows = [], []
+    for b in range(BLOCKS):
+        mine = slice(m * b, m * (b + 1))
+        for step in checked:
+            plan = power[step] @ from_plan
+            plan[:, mine] += forced[step]
+            inputs = K @ plan
+            inputs[:, mine] += np.eye(m)
+            state_rows.append(K @ power[step] @ from_state)
+            plan_rows.append(inputs)
+        from_state, from_plan = power[block] @ from_state, power[block] @ from_plan
+        from_plan[:, mine] += forced[block]
+    return np.vstack(state_rows), np.vstack(plan_rows)

@@ -1,0 +1,79 @@
+"""Robust MPC without a tube, the paper's comparison (section 5.2): u = K (x - x_r) + u_r, within the limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.tube_law import N_RIGID, TubeData, TubeResult, TubeStatusCode, tube_input
+from hsv.errors import ParameterError
+from hsv.parameters import Parameter, check_all
+
+ROBUST_MPC_PARAMETERS = (
+    Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost, -1 the last", "", -64, 63),
+)
+
+
+class RobustMpc:
+    """One of the nominal gains K acts on the whole deviation from the reference; it has no memory."""
+
+    def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
+        """Take gain number ``gain_index`` of the family, -1 the last.
+
+        Raises:
+            ParameterError: The design has no such gain.
+        """
+        gains = design.nominal_gains
+        if not -len(gains) <= gain_index < len(gains):
+            raise ParameterError(
+                f"parameter robust_mpc.gain_index = {gain_index}: expected {-len(gains)} to {len(gains) - 1}"
+            )
+        self.data = TubeData(gains[gain_index], 1.0, design.input_minimum, design.input_maximum)
+        self._none = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, Any]) -> Self:
+        """Build from the design's parameters and :data:`ROBUST_MPC_PARAMETERS`; a wrong one is named."""
+        v = check_all(ROBUST_MPC_PARAMETERS, values)
+        return cls(ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
+
+    def reset(self) -> None:
+        """Nothing to forget."""
+
+    def step(
+        self,
+        state: np.ndarray,
+        filtered_pitch_rate: float,
+        filter_state: np.ndarray,
+        reference: np.ndarray,
+        reference_input: np.ndarray,
+        deviation: np.ndarray,
+        nominal_input: np.ndarray,
+    ) -> TubeResult:
+        """Return the input of this step from x (9), q_f (rad/s), x_r (9) and u_r (2).
+
+        The interface is that of :class:`hsv.control.tube_law.TubeLaw`; the nominal trajectory is not used, there is no
+        set, and the error is the deviation from the reference.
+        """
+        u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
+        x_n, u_n = self._none
+        tube_input(self.data, state, filtered_pitch_rate, reference, x_n, u_n, reference_input, u_feedback, total, u)
+        finite = math.isfinite(total[0]) and math.isfinite(total[1])
+        return TubeResult(
+            input=u,
+            error=(state - reference)[:N_RIGID],
+            tube_centre=np.empty(0),
+            tube_half_width=np.empty(0),
+            level=math.nan,
+            inside=False,
+            component="",
+            u_feedback=u_feedback,
+            u_unsaturated=total,
+            saturated=u != total,
+            tau=1.0,
+            status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,
+        )
