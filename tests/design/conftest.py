@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from hsv.design.baseline import design_baseline
+from hsv.design.baseline import design_gains
 from hsv.design.inputs import read_inputs
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -15,7 +15,7 @@ def inputs():
 
 @pytest.fixture(scope="session")
 def result(inputs):
-    return design_baseline(inputs)
+    return design_gains(inputs)
 
 
 @pytest.fixture(scope="session")

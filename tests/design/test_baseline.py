@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.control.design_file import ControlDesign
-from hsv.design.baseline import design_baseline
+from hsv.design.baseline import design_gains
 from hsv.errors import DesignError
 
 
@@ -23,7 +23,7 @@ def test_the_report_is_json_and_carries_the_inputs(result, inputs):
 def test_progress_is_told_and_ends_complete(inputs):
     single = inputs.model_copy(update={"nominal": inputs.nominal.model_copy(update={"scales": [1.0]})})
     told = []
-    result = design_baseline(single, lambda *event: told.append(event))
+    result = design_gains(single, lambda *event: told.append(event))
     assert [stage for stage, done, total in told if done == total] == [
         "polytopic model",
         "feedback gain",
@@ -36,4 +36,4 @@ def test_an_infeasible_design_says_which_part(inputs):
     bound = inputs.nominal.input_bound.model_copy(update={"elevator_deflection": 1e-4})
     nominal = inputs.nominal.model_copy(update={"input_bound": bound})
     with pytest.raises(DesignError, match="nominal gain 1 of 7"):
-        design_baseline(inputs.model_copy(update={"nominal": nominal}))
+        design_gains(inputs.model_copy(update={"nominal": nominal}))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,13 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
-from hsv.design.inputs import DesignInputs, FlightPoint
+from hsv.design.inputs import DesignInputs, FlightPoint, InputSize
 from hsv.design.lmi import spectral_radii
 from hsv.design.model import DesignModel, design_model
 from hsv.design.nominal import NominalGain, NominalProblem, nested_gains
+from hsv.design.tightening import TightenedInputs
+from hsv.design.tube import design_tube
+from hsv.errors import DesignError
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
@@ -36,15 +40,44 @@ class DesignResult:
 
 
 def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
-    """Return the baseline design (paper section 3): polytopic model, feedback gain F, nominal gains K.
+    """Return the baseline design (paper section 3) with its tube: gains, disturbances, invariant set, bounds.
+
+    The report is the certificate. It holds nothing that differs between two runs on one machine.
 
     Args:
         inputs: What :func:`hsv.design.inputs.read_inputs` returns.
         progress: Told of every part that is done.
 
     Raises:
-        DesignError: A problem without a solution, or a solution that fails when recomputed.
+        DesignError: A problem without a solution, a solution that fails when recomputed, or a nominal plan that does
+            not fit into the tightened inputs.
         TrimError: A flight point of ``inputs`` outside the trimmable envelope.
+    """
+    tell = progress or (lambda stage, done, total: None)
+    gains = design_gains(inputs, tell)
+    tube = design_tube(gains.design, inputs, tell)
+    if inputs.tightening.chain == "literal":
+        literal = _literal(inputs, tube.bounds)
+        try:
+            gains = design_gains(literal, tell)
+            tube = design_tube(gains.design, literal, tell)
+        except DesignError as error:
+            bound = literal.nominal.input_bound.array().tolist()
+            raise DesignError(f"literal chain (30) to (35), |u_n| at most {bound}: {error}") from error
+    design = replace(gains.design, tube=tube.flown())
+    report = {
+        **gains.report,
+        "versions": {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")},
+        "tube": tube.report,
+        "parameters_sha256": design.to_parameters()["design.hash"],
+    }
+    return DesignResult(design, report)
+
+
+def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
+    """Return the part of the baseline design without a tube: polytopic model, feedback gain F, nominal gains K.
+
+    Arguments and errors as for :func:`design_baseline`.
     """
     tell = progress or (lambda stage, done, total: None)
     vehicle = vehicle_parameters("decoupled")
@@ -123,6 +156,16 @@ def disturbance_columns(inputs: DesignInputs, vehicle: VehicleParameters) -> np.
     channels = np.zeros((N_RIGID, 3))
     channels[[1, 2, 4], [0, 1, 2]] = d.acceleration, d.angle_of_attack_rate, d.pitch_acceleration
     return zero_order_hold(A[:, :N_RIGID], np.hstack((fault, channels)), inputs.model.period)[1]
+
+
+def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
+    """Return the inputs with the bounds of (35) that (30) leaves on both sides of the target's trim."""
+    target = inputs.nominal.target
+    bound = bounds.symmetric(trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input)
+    if not bound.min() > 0.0:
+        raise DesignError(f"literal chain (30) to (35): |u_n| at most {bound.tolist()}, expected above zero")
+    size = InputSize(fuel_equivalence_ratio=float(bound[0]), elevator_deflection=float(bound[1]))
+    return inputs.model_copy(update={"nominal": inputs.nominal.model_copy(update={"input_bound": size})})
 
 
 def _all_states(gain: np.ndarray) -> np.ndarray:

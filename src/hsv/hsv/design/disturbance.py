@@ -79,7 +79,7 @@ class Signals(NamedTuple):
 
     @property
     def remainder(self) -> np.ndarray:
-        """f = Delta - w (n, 9)."""
+        """Delta - w (n, 9), the f of (13)."""
         return self.delta - self.fault
 
 

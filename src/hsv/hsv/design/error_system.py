@@ -1,8 +1,8 @@
 """The error system of the tube: how e = x - x_r - x_n and the error of the notch filter evolve (paper eq. 22).
 
-The paper's error system leaves the notch filter out. Here its states belong to it: e_s = s - s_n, where s_n is the state
-of the same filter fed with the pitch rate of reference + nominal from the same start. Then e_s(k+1) = A_s e_s + B_s e_q
-exactly, and the feedback sees F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), a signal of the plan alone. The
+The paper's error system leaves the notch filter out. Here its states belong to it: e_s = s - s_n, where s_n is the
+state of the same filter fed with the pitch rate of reference + nominal from the same start. Then
+e_s(k+1) = A_s e_s + B_s e_q exactly, and the feedback sees F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), a signal of the plan alone. The
 pitch rate in e is the true one.
 """
 
@@ -24,8 +24,8 @@ PITCH_RATE = 4
 class ErrorSystem:
     """e(k+1) = A_i e(k) + G_i d(k), the feedback closed; n states, d disturbance channels, r vertices.
 
-    ``A`` (r, n, n) closed loop; ``G`` (r, n, d) columns of the channels; ``F`` (2, n) the feedback on e, and ``F_d`` (2, d)
-    on d; ``names`` (n). SI per period.
+    ``A`` (r, n, n) closed loop; ``G`` (r, n, d) columns of the channels; ``F`` (2, n) the feedback on e, and ``F_d``
+    (2, d) on d; ``names`` (n). SI per period.
     """
 
     A: np.ndarray

@@ -10,13 +10,13 @@ import itertools
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.design.disturbance import CHANNELS, ChannelModel, DisturbanceSet, Record, Signals, inflated
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, Record, Signals, inflated
 from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble

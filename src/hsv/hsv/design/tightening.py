@@ -24,7 +24,7 @@ class TightenedInputs:
     upper: np.ndarray
 
     def margins(self, lowest: np.ndarray, highest: np.ndarray) -> np.ndarray:
-        """Return the room (2 inputs, lower and upper side) that a plan between these inputs leaves; below zero: none."""
+        """Return the room (2 inputs, lower and upper side) that a plan between these inputs leaves."""
         return np.stack((lowest - self.lower, self.upper - highest), axis=1)
 
     def symmetric(self, trim_input: np.ndarray) -> np.ndarray:
@@ -67,8 +67,8 @@ def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray)
         if sides.min() < 0.0:
             side = ("lower", "upper")[int(np.argmin(sides))]
             raise DesignError(
-                f"tightening: the nominal plan passes the {side} tightened bound of {name} by {-sides.min():.4g} {unit}, "
-                "expected it inside"
+                f"tightening: the nominal plan passes the {side} tightened bound of {name} "
+                f"by {-sides.min():.4g} {unit}, expected it inside"
             )
     return {
         "lowest": lowest.tolist(),

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.control.notch_filter import NotchData, discretise
+from hsv.control.notch_filter import discretise
+from hsv.control.tube_set import TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
@@ -30,7 +31,12 @@ Progress = Callable[[str, int, int], None]
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
 """Size and seed of the sampling evidence."""
 
-_SHOWN = ("altitude_end_error", "velocity_end_error", "post_fault_attitude_deviation", "post_fault_attitude_from_nominal")
+_SHOWN = (
+    "altitude_end_error",
+    "velocity_end_error",
+    "post_fault_attitude_deviation",
+    "post_fault_attitude_from_nominal",
+)
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,12 @@ class Tube:
     found: InvariantSet
     bounds: TightenedInputs
     report: dict[str, Any]
+
+    def flown(self) -> TubeSet | None:
+        """Return the set as a controller carries it; only the ellipsoid can be watched in flight."""
+        if not isinstance(self.found, EllipsoidSet):
+            return None
+        return TubeSet(self.found.centre, self.found.shape, self.found.half_width)
 
 
 def channel_model(design: ControlDesign) -> ChannelModel:

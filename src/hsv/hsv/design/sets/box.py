@@ -1,15 +1,15 @@
 """The paper's box set (eq. 25-28): the linear programme it is, and why it has no solution here.
 
-For Z = {|e| <= z} and a box of disturbances, condition (27) asks of every row a of every A_i + B_i F that the largest of
-a'e + d over Z and W is at most z_j. By the Farkas lemma (the paper's Lemma 2) this holds if and only if there are
+For Z = {|e| <= z} and a box of disturbances, condition (27) asks of every row a of every A_i + B_i F that the largest
+of a'e + d over Z and W is at most z_j. By the Farkas lemma (the paper's Lemma 2) this holds if and only if there are
 multipliers p, m >= 0 of the faces e <= z and -e <= z with p - m = a and (p + m)'z + w_j <= z_j; the least p + m is |a|,
 so the multipliers of (28) can be eliminated:
 
     minimise sum z   subject to   |A_i + B_i F| z + w_i <= z  at every vertex,  z >= 0,   a linear programme.
 
 It is infeasible if and only if (Farkas again) there are y_i >= 0 with sum_i (I - |A_i + B_i F|)' y_i <= 0 and
-sum_i w_i' y_i > 0. One vertex with a spectral radius of |A_i + B_i F| of at least one is enough for that: its left Perron
-vector is such a y_i. Integrators and oscillating pairs lose their sign in the absolute value.
+sum_i w_i' y_i > 0. One vertex with a spectral radius of |A_i + B_i F| of at least one is enough for that: its left
+Perron vector is such a y_i. Integrators and oscillating pairs lose their sign in the absolute value.
 """
 
 from __future__ import annotations

@@ -100,12 +100,17 @@ def ellipsoid(
 
 
 def from_shape(
-    problem: TubeProblem, centre: np.ndarray, Q: np.ndarray, contraction: float, multipliers: np.ndarray, s: SolverReport
+    problem: TubeProblem,
+    centre: np.ndarray,
+    Q: np.ndarray,
+    contraction: float,
+    multipliers: np.ndarray,
+    solver: SolverReport,
 ) -> EllipsoidSet:
     """Return the set with its outer box and feedback range computed from ``Q``."""
     F = problem.system.F
     feedback = np.sqrt(np.einsum("ij,jk,ik->i", F, Q, F))
-    return EllipsoidSet(problem, centre, np.sqrt(np.diag(Q)), feedback, Q, contraction, multipliers, s)
+    return EllipsoidSet(problem, centre, np.sqrt(np.diag(Q)), feedback, Q, contraction, multipliers, solver)
 
 
 def vertex_residuals(

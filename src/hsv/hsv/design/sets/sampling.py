@@ -1,8 +1,8 @@
 """Random sequences of vertices and disturbances against an ellipsoid: evidence that needs no faith in the inequality.
 
-Sequences start at e = 0, where flights start, or on the boundary of the set. Kinds: *iid* draws vertex and signs of all
-disturbances anew at every step; *held* keeps them; *switching* keeps them for random times; *adversarial* keeps vertices
-for random times and picks the signs that push outwards most, every twenty-fifth of them the vertex too.
+Sequences start at e = 0, where flights start, or on the boundary of the set. Kinds: *iid* draws vertex and signs of
+all disturbances anew at every step; *held* keeps them; *switching* keeps them for random times; *adversarial* keeps
+vertices for random times and picks the signs that push outwards most, every twenty-fifth of them the vertex too.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _run(
         else:
             v[:] = begin
         level = _square(v) if not boundary else 0.0
-        vertex, signs, left = np.int64(0), np.uint64(0), 0
+        vertex, signs, left = np.int64(0), np.uint64(0), np.int64(0)
         greedy = kind == 3 and sequence % 100 == 3
         for _ in range(steps):
             if left == 0:
@@ -138,12 +138,12 @@ def _run(
                 vertex = np.int64((bits >> np.uint64(40)) % r)
                 signs = bits << np.uint64(n)
                 if kind == 0:
-                    left = 1
+                    left = np.int64(1)
                 elif kind == 1:
-                    left = steps
+                    left = np.int64(steps)
                 else:
                     state += golden
-                    left = 1 + np.int64(_mix(state) % np.uint64(200))
+                    left = np.int64(1 + _mix(state) % np.uint64(200))
             left -= 1
             if greedy:
                 top = -1.0

@@ -1,8 +1,8 @@
 """Zonotope outer bound with vertex absorption: Z = sum over k of A_0^k (W + W_a), A_0 the mean vertex.
 
-Every vertex is the mean one plus a difference: A_i e + G_i d = A_0 e + G_0 d + [(A_i - A_0) e + (G_i - G_0) d]. The bracket
-is absorbed by a box W_a that bounds it for all e in Z; Z depends on W_a, so both are found by a fixed point, verified at
-the end. The sum is taken up to step K and the rest, A_0^K Z, bounded by the box |A_0^K| z.
+Every vertex is the mean one plus a difference: A_i e + G_i d = A_0 e + G_0 d + [(A_i - A_0) e + (G_i - G_0) d]. The
+bracket is absorbed by a box W_a that bounds it for all e in Z; Z depends on W_a, so both are found by a fixed point,
+verified at the end. The sum is taken up to step K and the rest, A_0^K Z, bounded by the box |A_0^K| z.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _TAIL = 1e-3
 
 @dataclass(frozen=True)
 class ZonotopeSet(InvariantSet):
-    """The set with its generators: ``powers`` A_0^k (K, n, n), ``columns`` G_0 (n, d), boxes W_a and of the rest (n)."""
+    """The set with its generators: ``powers`` A_0^k (K, n, n), ``columns`` G_0 (n, d), boxes W_a and the rest's (n)."""
 
     powers: np.ndarray
     columns: np.ndarray
