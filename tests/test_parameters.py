@@ -3,15 +3,27 @@ import math
 import numpy as np
 import pytest
 
+from hsv.control.control_law import CONTROLLER_PARAMETERS
 from hsv.control.design_file import DESIGN_PARAMETERS
+from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
+from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
 from hsv.errors import ParameterError
 from hsv.faults.actuator import FAULT_PARAMETERS
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.plant import PLANT_PARAMETERS
 
-TABLES = (PLANT_PARAMETERS, NOTCH_PARAMETERS, NOMINAL_PARAMETERS, FAULT_PARAMETERS, DESIGN_PARAMETERS)
+TABLES = (
+    PLANT_PARAMETERS,
+    NOTCH_PARAMETERS,
+    NOMINAL_PARAMETERS,
+    CONTROLLER_PARAMETERS,
+    INTEGRAL_PARAMETERS,
+    ROBUST_MPC_PARAMETERS,
+    FAULT_PARAMETERS,
+    DESIGN_PARAMETERS,
+)
 PERIOD = Parameter("period", 0.02, "control period", "s", 1e-4, 1.0)
 ARRAY = Parameter("gains", [1.0], "gains", minimum=0.0)
 

@@ -17,6 +17,7 @@ setup(
         "console_scripts": [
             "notch_filter = hsv_ctrl.notch_filter:main",
             "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
+            "robust_mpc = hsv_ctrl.robust_mpc:main",
             "tube_mpc = hsv_ctrl.tube_mpc:main",
         ],
     },
