@@ -1,0 +1,151 @@
+import pytest
+
+from hsv.errors import ScenarioError
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_names, scenario_text
+
+CASE1 = scenario_text("case1")
+
+
+def refusal(text):
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text, "mine")
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("scenario 'mine': ")
+    return message.removeprefix("scenario 'mine': ")
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_shipped_scenario_loads_and_assembles(name):
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.title
+    assemble(flight_parameters(scenario))
+
+
+def test_case1_is_the_flight_of_the_paper():
+    values = load_scenario("case1").parameters()
+    foot = 0.3048
+    assert values["initial.altitude"] == pytest.approx(85500 * foot)
+    assert values["initial.velocity"] == pytest.approx(7900 * foot)
+    assert values["reference.altitude"] == pytest.approx(86100 * foot)
+    assert values["reference.velocity"] == pytest.approx(8150 * foot)
+    assert values["duration"] == 200.0
+    assert values["fault.channels"] == ["elevator_deflection"]
+    assert values["fault.values"] == [0.9]
+    assert values["fault.starts"] == [100.0]
+    assert values["vehicle.coupling"] == "paper_like"
+    assert not any(name.startswith("vehicle.perturbation") for name in values)
+
+
+def test_uncertain_scenarios_perturb_all_ten_parameters():
+    for name in ("case1_uncertain", "case1_heavy"):
+        assert len(load_scenario(name).vehicle.perturbation) == 10
+
+
+@pytest.mark.parametrize(
+    ("altitude", "step"),
+    [("85000 ft", "1500 ft"), ("86500 ft", "-1500 ft"), ("85950 ft", "550 ft"), ("85030 ft", "-30 ft")],
+)
+def test_edges_of_the_envelope_belong_to_it(altitude, step):
+    text = CASE1.replace('"85500 ft"', f'"{altitude}"').replace('"600 ft"', f'"{step}"')
+    assemble(flight_parameters(parse_scenario(text, "edge")))
+
+
+def test_metres_serve_as_well_as_feet():
+    text = CASE1.replace('"85500 ft"', '"26060.4 m"').replace('"250 ft/s"', '"76.2 m/s"')
+    assert parse_scenario(text, "case1").parameters() == load_scenario("case1").parameters()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of model, coupling"),
+        ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, duration"),
+        ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
+        ("value = 0.9", "value = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of channel, type"),
+        ('"600 ft"', '"600 s"', "command.altitude_step = '600 s': wrong unit, expected a finite quantity such as"),
+        ('"600 ft"', "600", "command.altitude_step = 600: the unit is missing"),
+        ('"600 ft"', '"nan ft"', "command.altitude_step = 'nan ft': "),
+        ('"600 ft"', '"6e999 ft"', "command.altitude_step = '6e999 ft': expected a finite quantity"),
+        ('"600 ft"', '"6000 ft"', "command.altitude_step leads to 91500 ft: expected 85000 ft to 86500 ft"),
+        ('"250 ft/s"', '"2500 ft/s"', "command.velocity_step leads to 10400 ft/s: expected 7700 ft/s to 8300 ft/s"),
+        ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft, the flight env"),
+        ('"7900 ft/s"', '"7900 ft"', "initial.velocity = '7900 ft': wrong unit"),
+        ('duration = "200 s"', 'duration = "-1 s"', "duration = '-1 s': expected a time from 0 s to 100000 s"),
+        ('duration = "200 s"', "", "duration: missing"),
+        ('"CM"', '"XM"', "vehicle.model = 'XM': input should be 'CM' or 'DM'"),
+        ('"paper_like"', '"strong"', "vehicle.coupling = 'strong': input should be 'paper_like' or 'derived'"),
+        ("value = 0.9", "value = nan", "fault[0].value = nan: expected a finite quantity"),
+        ("value = 0.9", "value = 1.9", "fault[0].value = 1.9: expected 0 to 1 for loss_of_effectiveness"),
+        ("value = 0.9", 'value = "9 deg"', "fault[0].value = '9 deg': wrong unit"),
+        ("loss_of_effectiveness", "melted", "fault[0].type = 'melted': expected one of loss_of_effectiveness"),
+        ('"elevator_deflection"', '"rudder"', "fault[0].channel = 'rudder': expected one of fuel_equivalence_ratio"),
+        ('"100 s"', '"-1 s"', "fault[0].start = '-1 s': expected a time"),
+        ("[[fault]]", "[fault]", "fault = {"),
+        ("saturated_steps", "stalls", "limits.stalls: no such metric, expected one of altitude_rise_time"),
+        ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
+        ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected the largest magnitude"),
+        ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: input should be a valid boolean"),
+        ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: input should be 'CM' or 'DM'"),
+        ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
+        ('title = "', 'title = 3 # "', "title = 3: input should be a valid string"),
+    ],
+)
+def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
+    assert CASE1.count(old) >= 1
+    assert refusal(CASE1.replace(old, new, 1)).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('mas = "+10 %"', "vehicle.perturbation.mas = 0.1: no such parameter, expected one of mass, moment_of"),
+        ('mass = "+10 ft"', "vehicle.perturbation.mass = '+10 ft': wrong unit"),
+        ('mass = "-95 %"', "vehicle.perturbation.mass = '-95 %': expected -90 % to +1000 %"),
+        ("mass = nan", "vehicle.perturbation.mass = nan: expected a finite quantity"),
+        ("mass = true", "vehicle.perturbation.mass = True: expected a finite quantity"),
+    ],
+)
+def test_a_wrong_perturbation_is_named(line, message):
+    assert refusal(CASE1.replace("[initial]", f"[vehicle.perturbation]\n{line}\n[initial]")).startswith(message)
+
+
+def test_an_empty_file_lacks_its_first_field():
+    assert refusal("") == "title: missing"
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("case9", "expected a path or one of case1, case1_derived"),
+        ("./absent.toml", "cannot be read (No such file or directory), expected a TOML file"),
+        ("/", "cannot be read (Is a directory), expected a TOML file"),
+    ],
+)
+def test_a_scenario_that_is_not_there_is_named(name, problem):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name)
+    assert str(caught.value).startswith(f"scenario {name!r}: {problem}")
+
+
+def test_what_is_not_text_is_refused(tmp_path):
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match=r"binary.toml': cannot be read \(not text\)"):
+        load_scenario(str(path))
+
+
+def test_a_scenario_from_a_file_is_called_after_it(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(CASE1)
+    assert load_scenario(str(path)).name == "mine"
+
+
+def test_a_design_that_is_not_there_is_named():
+    from hsv.errors import DesignError
+
+    scenario = parse_scenario(CASE1.replace('"baseline"', '"absent"'), "mine")
+    with pytest.raises(DesignError, match=r"design = 'absent': no such file"):
+        flight_parameters(scenario)
