@@ -32,7 +32,7 @@ for command in (trim, linearise, design, scenarios, simulate, run, info, plot):
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
     try:
-        app()
+        app(prog_name="hsv")
     except RunError as error:
         _fail(error, 1)
     except HsvError as error:

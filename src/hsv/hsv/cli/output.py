@@ -95,7 +95,7 @@ def check_target(path: Path, field: str) -> None:
 
 
 def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:
-    """Print name, value and unit of every quantity, with an optional remark."""
+    """Print name, value and unit of every quantity, with an optional remark; remarks on what has no value come last."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
     table.add_column("quantity")
     table.add_column("value", justify="right")
@@ -106,4 +106,7 @@ def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, re
         value, unit = shown(quantity, units)
         row = [name.replace("_", " "), f"{value:.5g}", "" if unit == "1" else unit]
         table.add_row(*row, *([remarks.get(name, "")] if remarks else []))
+    for name in remarks:
+        if name not in quantities:
+            table.add_row(name.replace("_", " "), "-", "", remarks[name])
     console.print(table)

@@ -1,4 +1,4 @@
-"""hsv plot"""
+"""The command ``hsv plot``."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import UnitsOption
-from hsv.cli.output import Units, console
+from hsv.cli.output import Units, check_target, console
 
 
 def plot(
@@ -27,6 +27,7 @@ def plot(
 
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")
+    check_target(out, "out")
     flights = {}
     for path in bags:
         bag = Bag(path)
