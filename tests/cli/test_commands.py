@@ -1,0 +1,264 @@
+import json
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hsv.cli.main import app
+from hsv.cli.output import UNIT_KEYS
+from hsv.control.design_file import find_design
+from hsv.simulation.metrics import METRICS
+from hsv.simulation.scenario import scenario_names, scenario_text
+
+COMMANDS = sorted(command.callback.__name__ for command in app.registered_commands)
+PUBLISHED_POINT = ("--altitude", "85000 ft", "--velocity", "7702.0808 ft/s")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_has_an_example(hsv, command):
+    ran = hsv(command, "--help")
+    assert ran.code == 0
+    assert f"Example: hsv {command}" in ran.out
+
+
+@pytest.mark.parametrize("command", sorted({*COMMANDS} - {"plot"}))
+def test_every_command_that_prints_numbers_prints_json_if_asked(hsv, command):
+    assert "--json" in hsv(command, "--help").out
+
+
+def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
+    ran = hsv()
+    assert all(command in ran.out + ran.err for command in COMMANDS)
+
+
+def test_trim_of_the_literature_to_all_digits(hsv):
+    values = hsv("trim", *PUBLISHED_POINT, "--units", "paper", "--json").json
+    assert round(values["angle_of_attack_deg"], 4) == 1.6446
+    assert round(values["fuel_equivalence_ratio"], 5) == 0.26809
+    assert round(values["elevator_deflection_deg"], 3) == 12.540
+    assert round(values["elastic_coordinate_1_sqrt_slug_ft"], 4) == 0.9739
+    assert round(values["elastic_coordinate_2_sqrt_slug_ft"], 4) == 0.7999
+    assert values["altitude_ft"] == pytest.approx(85000)
+    assert values["largest_residual_si"] < 1e-12
+
+
+def test_trim_in_si(hsv):
+    values = hsv("trim", *PUBLISHED_POINT, "--json").json
+    assert values["altitude_m"] == 25908.0
+    assert values["angle_of_attack_rad"] == pytest.approx(math.radians(1.644566), rel=1e-6)
+    assert values["thrust_N"] > 0
+    assert "dynamic_pressure_Pa" in values
+
+
+def test_trim_table_for_people(hsv):
+    out = hsv("trim", *PUBLISHED_POINT, "--units", "paper").out
+    for words in (("angle of attack", "1.6446", "deg"), ("elastic coordinate 1", "0.97395", "slug^0.5 ft")):
+        assert any(all(word in line for word in words) for line in out.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("coupling", "expected"),
+    [("derived", {(13.73, 0.0166), (18.80, 0.0197)}), ("paper_like", {(15.89, 0.0198), (19.47, 0.0199)})],
+)
+def test_linearise_prints_the_coupled_poles(hsv, coupling, expected):
+    values = hsv("linearise", "--coupling", coupling, "--json").json
+    poles = {(round(p["natural_frequency_rad_per_s"], 2), round(p["damping_ratio"], 4)) for p in values["poles"]}
+    assert expected <= poles
+    assert np.array(values["A_si"]).shape == (9, 9)
+    assert np.array(values["B_si"]).shape == (9, 2)
+    table = hsv("linearise", "--coupling", coupling).out
+    assert all(f"{math.floor(10 * frequency) / 10}" in table for frequency, _ in expected)
+    assert "…" not in table
+
+
+def test_linearise_in_paper_units_has_the_same_poles(hsv):
+    si, paper = hsv("linearise", "--json").json, hsv("linearise", "--units", "paper", "--json").json
+    eigenvalues = [np.sort_complex(np.linalg.eigvals(np.array(m))) for m in (si["A_si"], paper["A_paper"])]
+    np.testing.assert_allclose(*eigenvalues, atol=1e-6)
+    # ft/s of climb per degree of pitch angle: V pi / 180.
+    assert paper["A_paper"][0][3] == pytest.approx(7702.0808 * math.pi / 180, rel=1e-6)
+    # Fuel has no unit: ft/s^2 of acceleration per unit.
+    assert paper["B_paper"][1][0] == pytest.approx(si["B_si"][1][0] / 0.3048, rel=1e-9)
+
+
+def test_linearise_decoupled_has_the_structural_modes(hsv):
+    values = hsv("linearise", "--model", "DM", "--json").json
+    frequencies = [round(p["natural_frequency_rad_per_s"], 6) for p in values["poles"]]
+    assert 16.02 in frequencies
+    assert 19.58 in frequencies
+
+
+def test_scenarios_lists_them_all(hsv):
+    assert set(hsv("scenarios", "--json").json) == set(scenario_names())
+    out = hsv("scenarios").out
+    assert all(name in out for name in scenario_names())
+
+
+@pytest.mark.parametrize("units", ["si", "paper"])
+def test_simulate_case1(hsv, units):
+    ran = hsv("simulate", "case1", "--units", units, "--json")
+    assert ran.code == 0
+    assert ran.json["scenario"] == "case1"
+    assert ran.json["within_limits"] is True
+    assert ran.json["diverged_at_s"] is None
+    assert ran.json["real_time_factor"] > 0
+    suffixes = [key for key in UNIT_KEYS.values() if key]
+    for key in ran.json["metrics"]:
+        name = next(name for name in sorted(METRICS, key=len, reverse=True) if key.startswith(name))
+        unit = key.removeprefix(name).removeprefix("_")
+        assert unit in suffixes if METRICS[name].unit != "1" else unit == ""
+    assert ("altitude_end_error_ft" in ran.json["metrics"]) is (units == "paper")
+
+
+def test_simulate_prints_a_table_with_verdicts(hsv):
+    out = hsv("simulate", "case1_single_k", "--units", "paper").out
+    assert "over 2 ft/s" in out
+    assert "within 0.25 deg" in out
+    assert "x real time" in out
+
+
+def test_simulate_saves_the_histories(hsv, tmp_path):
+    assert hsv("simulate", "case1", "--out", "flight.npz", "--json").code == 0
+    saved = np.load(tmp_path / "flight.npz")
+    assert saved["time"].shape == (10001,)
+    assert saved["state"].shape == (10001, 9)
+    assert saved["state"][0, 0] == 26060.4
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.npz"]
+
+
+def test_a_flight_that_diverges_is_reported_and_is_no_success(hsv):
+    ran = hsv("simulate", "case1_derived_no_notch", "--json")
+    assert ran.code == 1
+    assert ran.json["within_limits"] is False
+    assert ran.json["diverged_at_s"] == pytest.approx(17.6, abs=0.4)
+    assert ran.error.startswith("flight diverged at t = 17.")
+
+
+def test_a_limit_on_what_was_never_reached_is_not_kept(hsv, tmp_path):
+    text = scenario_text("case1").replace("[limits]", '[limits]\nvelocity_settling_time = "90 s"')
+    (tmp_path / "slow.toml").write_text(
+        text.replace('"baseline"', '"baseline_single_k"').replace('"2 ft/s"', '"9 ft/s"')
+    )
+    ran = hsv("simulate", "slow.toml", "--json")
+    assert "velocity_settling_time_s" not in ran.json["metrics"]
+    assert ran.json["within_limits"] is False
+    assert "not reached (limit 90 s)" in hsv("simulate", "slow.toml").out
+
+
+def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
+    from hsv.cli.output import print_json
+
+    print_json({"a": math.nan, "b": [1.0, math.inf], "c": {"d": -math.inf}, "e": 1})
+    values = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert values == {"a": None, "b": [1.0, None], "c": {"d": None}, "e": 1}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ("trim", "--altitude", "85000"),
+            "altitude = '85000': wrong unit, expected a finite quantity such as '85500 ft'",
+        ),
+        (("trim", "--altitude", "85000 s"), "altitude = '85000 s': wrong unit"),
+        (("trim", "--velocity", "nan ft/s"), "velocity = 'nan ft/s': "),
+        (("trim", "--altitude", "200000 ft"), "altitude = 60960 m, velocity = 2407.92 m/s: trim needs fuel_equiv"),
+        (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
+        (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
+        (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_derived"),
+        (("simulate", "absent.toml"), "scenario 'absent.toml': cannot be read (No such file or directory)"),
+        (("simulate", "case1", "--out", "absent/x.npz"), "out = 'absent/x.npz': cannot be written, expected a file"),
+        (("design", "absent"), "design = 'absent': no such file, expected the path of a .toml file"),
+        (("design", "baseline", "--out", "absent/x.yaml"), "out = 'absent/x.yaml': cannot be written, expected a file"),
+        (("run", "case9"), "scenario 'case9': expected a path or one of case1"),
+        (("info", "absent"), "absent: does not exist, expected a bag directory"),
+    ],
+)
+def test_bad_input_is_one_line_with_code_2_and_nothing_written(hsv, tmp_path, words, message):
+    ran = hsv(*words)
+    assert ran.code == 2
+    assert ran.out == ""
+    assert ran.error.startswith(message)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["simulate", "run"])
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key"),
+        ('"600 ft"', '"600 s"', "command.altitude_step = '600 s': wrong unit"),
+        ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft"),
+        ('"baseline"', '"absent"', "design = 'absent': no such file"),
+        ('"baseline"', '"nan.yaml"', "parameter feedback.gain[0] = nan: expected double array"),
+        ('"baseline"', '"short.yaml"', "parameter feedback.gain: 17 values, expected 18"),
+        ('"baseline"', '"integer.yaml"', "parameter period = 1: expected double from 0.0001 to 1 s"),
+        ('"baseline"', '"unstable.yaml"', "parameter feedback.gain: spectral radius"),
+    ],
+)
+def test_a_bad_scenario_or_design_is_refused_before_anything_is_written(hsv, tmp_path, command, old, new, message):
+    gain = read_gain()
+    designs = {
+        "nan.yaml": design_with(gain, [".nan", *gain[1:]]),
+        "short.yaml": design_with(gain, gain[1:]),
+        "unstable.yaml": design_with(gain, ["-" + word if word[0] != "-" else word[1:] for word in gain]),
+        "integer.yaml": find_design("baseline").read_text().replace("period: 0.02", "period: 1"),
+    }
+    for name, text in designs.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "mine.toml").write_text(scenario_text("case1").replace(old, new))
+    before = sorted(tmp_path.iterdir())
+    ran = hsv(command, "mine.toml")
+    assert ran.code == 2
+    assert ran.out == ""
+    assert message in ran.error
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def gain_text():
+    text = find_design("baseline").read_text()
+    start = text.index("gain: [", text.index("feedback:")) + len("gain: [")
+    return text, start, text.index("]", start)
+
+
+def read_gain():
+    text, start, end = gain_text()
+    return [word.strip() for word in text[start:end].split(",")]
+
+
+def design_with(gain, words):
+    text, start, end = gain_text()
+    assert len(gain) == 18
+    return text[:start] + ", ".join(words) + text[end:]
+
+
+@pytest.mark.parametrize(
+    "words", [("trim", "--units", "imperial"), ("trim", "--wings"), ("fly",), ("simulate", "a", "b")]
+)
+def test_usage_errors_have_code_2(hsv, words):
+    ran = hsv(*words)
+    assert ran.code == 2
+    assert "Usage: hsv" in ran.err
+    assert ran.out == ""
+
+
+def command(*words, cwd):
+    return subprocess.run([sys.executable, "-m", "hsv.cli.main", *words], capture_output=True, text=True, cwd=cwd)
+
+
+def test_as_a_process_it_prints_json_on_standard_output_alone(tmp_path):
+    ran = command("trim", *PUBLISHED_POINT, "--json", cwd=tmp_path)
+    assert ran.returncode == 0
+    assert json.loads(ran.stdout)["altitude_m"] == 25908.0
+    assert ran.stderr == ""
+
+
+def test_as_a_process_it_fails_on_one_line(tmp_path):
+    ran = command("simulate", "absent.toml", cwd=tmp_path)
+    assert ran.returncode == 2
+    assert ran.stdout == ""
+    assert ran.stderr.count("\n") == 1
+    assert ran.stderr.startswith("hsv: error: scenario 'absent.toml'")
+    assert list(tmp_path.iterdir()) == []
