@@ -8,7 +8,7 @@ import textwrap
 import pytest
 from node_processes import Processes
 
-from hsv.graph.description import GRAPH
+from hsv.graph.description import graph
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
@@ -59,23 +59,28 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
     extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": flight}
     nodes = {
         node.name: processes.start(
-            "ros2", "run", node.package, node.executable, *(["--ros-args", *extra[node.name]] if node.name in extra else [])
+            "ros2",
+            "run",
+            node.package,
+            node.executable,
+            *(["--ros-args", *extra[node.name]] if node.name in extra else []),
         )
-        for node in GRAPH
+        for node in graph()
     }
     script = processes.run(sys.executable, "-c", INJECT)
     assert script.returncode == 0, script.stdout
     _, first, _, end = script.stdout.split()[-4:]
     assert nodes["plant"].wait(60.0) == 0
     processes.stop()
-    assert [popen.returncode for popen in nodes.values()] == [0] * len(GRAPH)
+    assert [popen.returncode for popen in nodes.values()] == [0] * len(nodes)
     recorded = Bag(bag)
     assert recorded.topics["/hsv/state"].count == 301
     active = [message.step for _, message in recorded.decode("/hsv/fault_status") if message.active]
     assert active == list(range(int(first), int(end)))
-    ratio = recorded.columns("/hsv/actuator")["fuel_equivalence_ratio"] / recorded.columns("/hsv/command")[
-        "fuel_equivalence_ratio"
-    ]
+    ratio = (
+        recorded.columns("/hsv/actuator")["fuel_equivalence_ratio"]
+        / recorded.columns("/hsv/command")["fuel_equivalence_ratio"]
+    )
     assert ratio[active] == pytest.approx(0.95)
 
 
@@ -83,10 +88,24 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
     ("package", "executable", "arguments", "words"),
     [
         ("hsv_plant", "plant", ["-p", "duration:=10"], ["duration = 10", "expected double"]),
-        ("hsv_plant", "plant", ["-p", "initial.altitude:=30000.0"], ["initial.altitude = 30000.0", "25908 to 26365.2 m"]),
-        ("hsv_plant", "plant", ["-p", "vehicle.coupling:=strong"], ["vehicle.coupling = 'strong'", "paper_like, derived"]),
-        ("hsv_plant", "fault_injector", ["-p", "fault.values:=[0.5, 0.5]", "-p", "fault.channels:=[elevator_deflection]"],
-         ["fault."]),
+        (
+            "hsv_plant",
+            "plant",
+            ["-p", "initial.altitude:=30000.0"],
+            ["initial.altitude = 30000.0", "25908 to 26365.2 m"],
+        ),
+        (
+            "hsv_plant",
+            "plant",
+            ["-p", "vehicle.coupling:=strong"],
+            ["vehicle.coupling = 'strong'", "paper_like, derived"],
+        ),
+        (
+            "hsv_plant",
+            "fault_injector",
+            ["-p", "fault.values:=[0.5, 0.5]", "-p", "fault.channels:=[elevator_deflection]"],
+            ["fault."],
+        ),
         ("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),
         ("hsv_ctrl", "tube_mpc", ["-p", "input.minimum:=[.nan, 0.0]"], ["input.minimum[0] = nan"]),
         ("hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hsv.graph.description import GRAPH, RECORDER, TOPICS
+from hsv.graph.description import RECORDER, TOPICS, graph
 from hsv.graph.reference import reference
 
 ROOT = Path(__file__).parents[2]
@@ -20,7 +20,7 @@ def test_readme_names_every_topic_with_its_type_and_ends() -> None:
     assert len(rows) == len(TOPICS)
     for row, (topic, kind) in zip(rows, TOPICS.items(), strict=True):
         cells = [cell.strip() for cell in row.strip("|").split("|")]
-        publisher = next(node.name for node in GRAPH if topic in node.publishes)
-        subscribers = [node.name for node in GRAPH if topic in node.subscribes and node is not RECORDER]
+        publisher = next(node.name for node in graph() if topic in node.publishes)
+        subscribers = [node.name for node in graph() if topic in node.subscribes and node is not RECORDER]
         assert cells[0] == topic and kind in cells[1], row
         assert cells[2] == publisher and cells[3] == ", ".join(subscribers), row

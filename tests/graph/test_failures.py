@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from node_processes import Processes, children, short_scenario
 
-from hsv.graph.description import GRAPH
+from hsv.graph.description import graph
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
@@ -28,12 +28,12 @@ def _start_and_fly(processes: Processes, bag: Path, pace: str = "1"):  # type: i
     return run
 
 
-@pytest.mark.parametrize("name", [node.name for node in GRAPH])
+@pytest.mark.parametrize("name", [node.name for node in graph()])
 def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> None:
     bag = processes.folder / "broken"
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
-    assert set(nodes) == {node.name for node in GRAPH}
+    assert set(nodes) == {node.name for node in graph()}
     killed = time.monotonic()
     os.kill(nodes[name], signal.SIGKILL)
     output, _ = run.communicate(timeout=30.0)

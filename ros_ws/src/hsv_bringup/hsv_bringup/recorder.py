@@ -36,6 +36,8 @@ CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
 
 _STAMP = struct.Struct("<iI")
+_STATUS = 100
+"""Where VehicleState carries its status; what follows pads the message to a multiple of four bytes."""
 _ORDER = {topic: index for index, topic in enumerate(TOPICS)}
 
 
@@ -107,8 +109,7 @@ class RecorderNode(PeerNode):
 
     @staticmethod
     def _is_last(state: bytes) -> bool:
-        # The status is the last field of VehicleState, one byte.
-        return state[-1] != 0
+        return state[_STATUS] != 0
 
     def _on_other_message(self, topic: str, data: bytes) -> None:
         self.bag.write(topic, self._now, data)

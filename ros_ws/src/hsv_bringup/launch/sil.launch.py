@@ -9,7 +9,6 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from hsv.graph.description import GRAPH
 from hsv.graph.preparation import prepare
 from launch import LaunchContext, LaunchDescription
 
@@ -26,7 +25,7 @@ def _nodes(context: LaunchContext) -> list[object]:
             output="screen",
             parameters=[str(path) for path in prepared.parameter_files],
         )
-        for node in GRAPH
+        for node in prepared.nodes
     ]
     # Whoever ends first ends the run: the plant when the flight is over, any other node when something went wrong.
     watch = [

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeStatus
 
 from hsv.control.control_law import ControlLaw
 from hsv.control.tube_law import TubeStatusCode
+from hsv.graph.exchange import control, fill_tube_status
 from hsv_node.lockstep import PeerNode
-from hsv_node.messages import fill_input, input_vector, state_vector
 
 
 class ControllerNode(PeerNode):
@@ -48,34 +47,11 @@ class ControllerNode(PeerNode):
         state, nominal = self._state, self._nominal
         if state is None or nominal is None or state.step != nominal.step:
             return
-        u_n, u_r = input_vector(nominal.input), input_vector(nominal.reference_input)
-        result = self.law.step(
-            state_vector(state.state),
-            state.filtered_pitch_rate,
-            np.asarray(state.filter_state),
-            state_vector(nominal.reference),
-            u_r,
-            state_vector(nominal.deviation),
-            u_n,
-        )
-        command = self._command_message
-        command.header, command.step = state.header, state.step
-        fill_input(command, result.input)
-        self._command.publish(command)
-
-        status = self._status_message
-        status.header, status.step = state.header, state.step
-        status.error = result.error
-        status.tube_centre, status.tube_half_width = result.tube_centre, result.tube_half_width
-        status.level, status.inside = result.level, result.inside
-        if self.follows_nominal:
-            status.u_nominal = nominal.input
-        status.u_reference = nominal.reference_input
-        fill_input(status.u_feedback, result.u_feedback)
-        fill_input(status.u_unsaturated, result.u_unsaturated)
-        status.saturated = result.saturated.tolist()
-        status.tau, status.status = result.tau, int(result.status)
-        self._status.publish(status)
+        result = control(self.law, state, nominal, self._command_message)
+        # The command first: the other nodes work on it while the rest is published.
+        self._command.publish(self._command_message)
+        fill_tube_status(result, state, nominal, self.follows_nominal, self._status_message)
+        self._status.publish(self._status_message)
         outside = result.status is TubeStatusCode.OUTSIDE
         left, self._outside = outside and not self._outside, outside
         stamp = state.header.stamp

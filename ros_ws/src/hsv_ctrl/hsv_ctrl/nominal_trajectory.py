@@ -8,10 +8,10 @@ from hsv_msgs.msg import NominalState, Run, VehicleState
 
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS, NominalTrajectory
+from hsv.graph.exchange import plan_nominal
 from hsv_ctrl.design import declare_design
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
-from hsv_node.messages import fill_input, fill_state, state_vector
 
 
 class NominalTrajectoryNode(PeerNode):
@@ -29,15 +29,8 @@ class NominalTrajectoryNode(PeerNode):
         self.trajectory.reset()
 
     def _on_state(self, state: VehicleState) -> None:
-        result = self.trajectory.step(state_vector(state))
-        message = self._message
-        message.header, message.step = state.header, state.step
-        fill_state(message.reference, result.reference)
-        fill_input(message.reference_input, result.reference_input)
-        fill_state(message.deviation, result.deviation)
-        fill_input(message.input, result.input)
-        message.gain_index, message.status = result.gain_index, int(result.status)
-        self._nominal.publish(message)
+        result = plan_nominal(self.trajectory, state, self._message)
+        self._nominal.publish(self._message)
         self.diagnose(
             state.header.stamp,
             "running" if result.status is NominalStatus.OK else str(result.status.name),

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from hsv_msgs.msg import FilteredState, Run, VehicleState
 
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
+from hsv.graph.exchange import filter_state
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
@@ -27,20 +28,8 @@ class NotchFilterNode(PeerNode):
         self.filter.reset()
 
     def _on_state(self, state: VehicleState) -> None:
-        result = self.filter.step(state.pitch_rate)
-        message = self._message
-        message.header, message.step, message.status = state.header, state.step, state.status
-        copy = message.state
-        copy.altitude, copy.velocity = state.altitude, state.velocity
-        copy.angle_of_attack, copy.pitch_angle, copy.pitch_rate = (
-            state.angle_of_attack,
-            state.pitch_angle,
-            state.pitch_rate,
-        )
-        copy.elastic_coordinate, copy.elastic_rate = state.elastic_coordinate, state.elastic_rate
-        message.filtered_pitch_rate = result.filtered_pitch_rate
-        message.filter_state = result.filter_state
-        self._filtered.publish(message)
+        filter_state(self.filter, state, self._message)
+        self._filtered.publish(self._message)
         self.diagnose(state.header.stamp, step=state.step)
 
 

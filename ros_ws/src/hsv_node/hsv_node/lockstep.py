@@ -16,7 +16,6 @@ from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
 
-
 SAY_AFTER = 2.0
 """Seconds of waiting for peers before this is said, and between saying it again."""
 
@@ -28,7 +27,8 @@ class LockstepNode(Node):
         super().__init__(name)
         self.exit_code: int | None = None
         """Set when the node wants to end, to the exit code of the process."""
-        self.recorded = bool(declare(self, LOCKSTEP_PARAMETERS)["recorder"])
+        values = declare(self, LOCKSTEP_PARAMETERS)
+        self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
@@ -49,7 +49,7 @@ class LockstepNode(Node):
         """Return what this node still waits for, e.g. ``"tube_mpc (/hsv/nominal)"``; empty when all is matched."""
         missing = []
         expected: dict[str, int] = {}
-        for topic, peer in description.links(self.get_name(), self.recorded):
+        for topic, peer in description.links(self.get_name(), self.controller, self.recorded):
             expected[topic] = expected.get(topic, 0) + 1
             if topic in self._outputs:
                 seen = self.get_subscriptions_info_by_topic(topic)

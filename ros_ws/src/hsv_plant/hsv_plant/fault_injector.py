@@ -10,9 +10,9 @@ from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError
 from hsv.faults.actuator import FAULT_PARAMETERS, Fault, FaultInjector
+from hsv.graph.exchange import actuate, fill_fault_status
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
-from hsv_node.messages import fill_input, input_vector
 from hsv_node.parameters import declare
 
 
@@ -22,7 +22,7 @@ class FaultInjectorNode(PeerNode):
     def __init__(self) -> None:
         super().__init__("fault_injector")
         self.injector = FaultInjector.from_parameters(declare(self, FAULT_PARAMETERS))
-        self._actuator_message = ControlInput()
+        self._actuator_message, self._status_message = ControlInput(), FaultStatus()
         self._actuator = self.talk("/hsv/actuator")
         self._status = self.talk("/hsv/fault_status")
         self.listen("/hsv/command", self._on_command)
@@ -34,14 +34,11 @@ class FaultInjectorNode(PeerNode):
         self.injector.reset()
 
     def _on_command(self, command: ControlInput) -> None:
-        result = self.injector.step(command.step, input_vector(command))
-        message = self._actuator_message
-        message.header, message.step = command.header, command.step
-        fill_input(message, result.actuator)
-        self._actuator.publish(message)
-        active = [FaultMessage(channel=f.channel, type=f.type, value=f.value) for f in result.active]
-        self._status.publish(FaultStatus(header=command.header, step=command.step, active=active))
-        self.diagnose(command.header.stamp, "faults act" if active else "no fault", step=command.step)
+        result = actuate(self.injector, command, self._actuator_message)
+        self._actuator.publish(self._actuator_message)
+        fill_fault_status(result, command, FaultMessage, self._status_message)
+        self._status.publish(self._status_message)
+        self.diagnose(command.header.stamp, "faults act" if result.active else "no fault", step=command.step)
 
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:

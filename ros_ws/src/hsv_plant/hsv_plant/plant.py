@@ -10,11 +10,12 @@ import numpy as np
 from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
 from rosgraph_msgs.msg import Clock
 
+from hsv.graph.description import peers
+from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.vehicle.plant import FlightStatus, Plant
 from hsv_node.lockstep import LockstepNode
 from hsv_node.main import run_node
-from hsv_node.messages import fill_state, input_vector
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
@@ -33,7 +34,7 @@ class PlantNode(LockstepNode):
         super().__init__("plant")
         self.values = declare(self, NODE_PARAMETERS["plant"])
         self.plant = Plant.from_parameters(self.values)
-        self._peers = [*self.values["nodes"], *(["recorder"] if self.recorded else [])]
+        self._peers = peers("plant", self.controller, self.recorded)
         self._ready: set[str] = set()
         self._state_message, self._forces_message = VehicleState(), VehicleForces()
         self._clock_message = Clock()
@@ -94,19 +95,14 @@ class PlantNode(LockstepNode):
 
     def _publish(self) -> None:
         result = self._result
-        nanoseconds = round(result.step * self.plant.period * 1e9)
-        seconds, nanoseconds = divmod(nanoseconds, 1_000_000_000)
-        state, forces, clock = self._state_message, self._forces_message, self._clock_message
-        for stamp in (state.header.stamp, forces.header.stamp, clock.clock):
-            stamp.sec, stamp.nanosec = seconds, nanoseconds
-        state.step = forces.step = result.step
-        fill_state(state, result.state)
-        state.status = int(result.status)
+        state, stamp = self._state_message, stamp_of(result.step, self.plant.period)
+        fill_vehicle_state(result, stamp, state)
         # The state first: the other nodes work on it while the rest is published.
         self._state_publisher.publish(state)
-        forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = result.forces
-        self._forces_publisher.publish(forces)
-        self._clock_publisher.publish(clock)
+        fill_vehicle_forces(result, stamp, self._forces_message)
+        self._forces_publisher.publish(self._forces_message)
+        fill_clock(stamp, self._clock_message)
+        self._clock_publisher.publish(self._clock_message)
         if self.values["progress"] and (result.step % 50 == 0 or result.status is not FlightStatus.RUNNING):
             print(f"step {result.step} of {self.plant.steps}", flush=True)
         self.diagnose(state.header.stamp, step=result.step, status=result.status.name)

@@ -52,10 +52,7 @@ def run(
         if verbose or " [WARN] " in text:
             errors.print(f"[dim]{node}:[/] {text}", markup=True, soft_wrap=True)
 
-    from hsv.control.design_file import read_parameters
-
-    period = read_parameters(prepared.parameter_files[0])["period"]
-    with flight_bar(loaded.name, loaded.duration, max(1, round(loaded.duration / period))) as show:
+    with flight_bar(loaded.name, loaded.duration, prepared.steps) as show:
 
         def step(number: int) -> None:
             clock.setdefault("start", time.monotonic())
@@ -63,7 +60,7 @@ def run(
             show(number)
 
         try:
-            with Launcher(arguments, step, line) as launcher:
+            with Launcher(prepared.nodes, arguments, step, line) as launcher:
                 ending = launcher.wait()
         finally:
             # A recorder that was killed could not finish its bag.

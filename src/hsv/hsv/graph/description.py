@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 TOPICS = {
     "/clock": "rosgraph_msgs/msg/Clock",
@@ -42,22 +42,30 @@ FAULT_INJECTOR = NodeDescription(
     "fault_injector", "hsv_plant", "fault_injector", ("/hsv/actuator", "/hsv/fault_status"), ("/hsv/command",)
 )
 
-GRAPH = (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, TUBE_MPC, FAULT_INJECTOR, PLANT)
-"""All nodes, in start order."""
+ROBUST_MPC = replace(TUBE_MPC, name="robust_mpc", executable="robust_mpc")
+"""Flies in place of the Tube-MPC controller, on the same topics."""
+
+CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
 
-def node(name: str) -> NodeDescription:
-    """Return the description of the node ``name``; KeyError if there is none."""
-    return {n.name: n for n in GRAPH}[name]
+def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
+    """Return all nodes of the graph with the named controller, in start order."""
+    return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLERS[controller], FAULT_INJECTOR, PLANT)
 
 
-def links(name: str, recorded: bool) -> list[tuple[str, str]]:
-    """Return the (topic, other node) pairs that ``name`` must be matched with, the recorder's only if ``recorded``."""
-    me = node(name)
+def peers(name: str, controller: str, recorded: bool) -> list[str]:
+    """Return the names of the other nodes, the recorder only if ``recorded``."""
+    return [n.name for n in graph(controller) if n.name != name and (recorded or n is not RECORDER)]
+
+
+def links(name: str, controller: str, recorded: bool) -> list[tuple[str, str]]:
+    """Return the (topic, other node) pairs that node ``name`` must be matched with, the recorder's if ``recorded``."""
+    nodes = graph(name if name in CONTROLLERS else controller)
+    me = next(node for node in nodes if node.name == name)
     return [
         (topic, other.name)
         for topic in TOPICS
-        for other in GRAPH
+        for other in nodes
         if other is not me
         and (recorded or RECORDER not in (me, other))
         and (

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hsv.errors import RunError
-from hsv.graph.description import GRAPH, PLANT, NodeDescription
+from hsv.graph.description import PLANT, NodeDescription
 
 GRACE = 5.0
 """Seconds between asking a process to end and forcing it."""
@@ -60,18 +60,23 @@ class Launcher:
     """The processes of one run; a context manager that leaves no process behind."""
 
     def __init__(
-        self, arguments: Sequence[str], on_step: Callable[[int], None], on_line: Callable[[str, str], None]
+        self,
+        nodes: Sequence[NodeDescription],
+        arguments: Sequence[str],
+        on_step: Callable[[int], None],
+        on_line: Callable[[str, str], None],
     ) -> None:
-        """Prepare to start every node with ``arguments``; report steps of the plant and other lines of any node."""
+        """Prepare to start ``nodes`` with ``arguments``; report steps of the plant and other lines of any node."""
+        self._nodes = list(nodes)
         self._arguments = list(arguments)
         self._on_step = on_step
         self._on_line = on_line
         self._processes: list[_Process] = []
 
     def __enter__(self) -> Launcher:
-        paths = [executable(node) for node in GRAPH]
+        paths = [executable(node) for node in self._nodes]
         try:
-            for description, path in zip(GRAPH, paths, strict=True):
+            for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
         except BaseException:
             self.stop()

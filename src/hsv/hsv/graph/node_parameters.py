@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hsv.control.control_law import CONTROLLER_PARAMETERS
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
@@ -11,14 +12,16 @@ from hsv.faults.actuator import FAULT_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.vehicle.plant import PLANT_PARAMETERS
 
-LOCKSTEP_PARAMETERS = (Parameter("recorder", True, "whether a recorder belongs to the graph"),)
+LOCKSTEP_PARAMETERS = (
+    Parameter("recorder", True, "whether a recorder belongs to the graph"),
+    *CONTROLLER_PARAMETERS,
+)
 """Of every node."""
 
 PACE_PARAMETERS = (
     Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
     Parameter("start_timeout", 30.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
     Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
-    Parameter("nodes", ["notch_filter", "nominal_trajectory", "tube_mpc", "fault_injector"], "nodes to wait for"),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
 """Of the plant, which owns time."""

@@ -13,6 +13,7 @@ from typing import Any
 import yaml
 
 from hsv.control.design_file import find_design, read_parameters
+from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
@@ -25,6 +26,9 @@ class PreparedRun:
     run_id: str
     bag: Path
     parameter_files: tuple[Path, ...]
+    nodes: tuple[NodeDescription, ...]
+    steps: int
+    """Number of the last step if the flight does not diverge."""
 
 
 def prepare(
@@ -46,7 +50,7 @@ def prepare(
     scenario = parse_scenario(text, Path(scenario_name).stem)
     design_file = find_design(scenario.design)
     design = read_parameters(design_file)
-    assemble({**design, **scenario.parameters()})
+    components = assemble({**design, **scenario.parameters()})
     now = datetime.datetime.now(datetime.UTC)
     bag = bag or bags / f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     run_id = uuid.uuid4().hex
@@ -82,9 +86,8 @@ def prepare(
         ],
     }
     (folder / "run.yaml").write_text(_yaml(run), encoding="utf-8")
-    return PreparedRun(
-        scenario, run_id, bag, tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    )
+    parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
+    return PreparedRun(scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps)
 
 
 def commit() -> str:

@@ -8,7 +8,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool, ValidationError, ValidationInfo
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    ValidationError,
+    ValidationInfo,
+)
 
 from hsv.errors import HsvError, ParameterError, QuantityError, ScenarioError
 from hsv.faults.actuator import Fault
@@ -69,6 +78,24 @@ class NotchTable(_Table):
     enabled: StrictBool = True
 
 
+class NominalTable(_Table):
+    """What chooses the nominal input."""
+
+    law: Literal["family", "kothare_online", "qp"] = "family"
+
+
+class IntegralTable(_Table):
+    """Integral action on altitude and velocity errors, a named extension of the tube law."""
+
+    rate: Annotated[float, _quantity("1/s", 0.0, 1.0, shown="0 / s to 1 / s")] = 0.0
+
+
+class RobustMpcTable(_Table):
+    """The robust MPC controller."""
+
+    gain_index: StrictInt = 0
+
+
 class FaultTable(_Table):
     """A scheduled fault."""
 
@@ -84,11 +111,15 @@ class Scenario(_Table):
     name: str
     title: str
     design: str = "baseline"
+    controller: Literal["tube_mpc", "robust_mpc"] = "tube_mpc"
     duration: Time
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
     command: CommandTable = CommandTable()
     notch: NotchTable = NotchTable()
+    nominal: NominalTable = NominalTable()
+    integral: IntegralTable = IntegralTable()
+    robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
     limits: dict[str, float] = Field(default_factory=dict)
     """Largest magnitude expected of a metric, SI."""
@@ -112,6 +143,10 @@ class Scenario(_Table):
             "reference.altitude": self.reference[0],
             "reference.velocity": self.reference[1],
             "notch.enabled": self.notch.enabled,
+            "controller": self.controller,
+            "nominal.law": self.nominal.law,
+            "integral.rate": self.integral.rate,
+            "robust_mpc.gain_index": self.robust_mpc.gain_index,
         }
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
         if self.fault:
