@@ -13,9 +13,14 @@ from hsv.control.design_file import find_file
 from hsv.errors import DesignError
 from hsv.units import parse_quantity
 
+_SI = "SI"
+"""Validation context of tables that hold plain numbers in SI, as a certificate does."""
+
 
 def _quantity(unit: str) -> BeforeValidator:
     def parse(value: Any, info: ValidationInfo) -> float:
+        if info.context == _SI and isinstance(value, float):
+            return value
         return parse_quantity(value, unit, info.field_name or "value")
 
     return BeforeValidator(parse)
@@ -203,6 +208,18 @@ def parse_inputs(table: dict[str, Any]) -> DesignInputs:
         return DesignInputs.model_validate(table)
     except ValidationError as error:
         raise DesignError(_first_line(error, table)) from error
+
+
+def inputs_from_report(table: dict[str, Any]) -> DesignInputs:
+    """Return the design inputs that ``DesignInputs.model_dump`` wrote: plain numbers, SI.
+
+    Raises:
+        DesignError: A field that is missing, unknown or has a wrong value.
+    """
+    try:
+        return DesignInputs.model_validate(table, context=_SI)
+    except ValidationError as error:
+        raise DesignError(f"inputs: {_first_line(error, table)}") from error
 
 
 def read_inputs(path: Path) -> DesignInputs:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from hsv.vehicle.parameters import uncertainty_bounds
 from hsv.vehicle.plant import FlightStatus, Plant
 
 Corner = Mapping[str, float]
+Result = TypeVar("Result")
 
 
 def corners() -> list[dict[str, float]]:
@@ -96,7 +97,12 @@ class Region:
             )
         return flight
 
-    def map(self, job: Callable[[Flight], Any], over: Sequence[Corner], progress: Callable[[int], None]) -> list[Any]:
+    def map(
+        self,
+        job: Callable[[Flight], Result],
+        over: Sequence[Corner],
+        progress: Callable[[int], None] = lambda done: None,
+    ) -> list[Result]:
         """Return ``job`` of every flight, in order; compiled flights run in as many threads as there are processors."""
         results = []
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
@@ -126,6 +132,10 @@ class Extremes:
         """Return the extremes of per-flight ones (flights, c)."""
         return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
 
+    def structured(self, inflation: float) -> DisturbanceSet:
+        """Return the structured set that these extremes of its channels give."""
+        return inflated(self.lower, self.upper, inflation)
+
 
 @dataclass(frozen=True)
 class RegionResult:
@@ -136,10 +146,6 @@ class RegionResult:
     remainder: Extremes
     fault: Extremes
     delta: Extremes
-
-    def structured(self, inflation: float) -> DisturbanceSet:
-        """Return the structured set."""
-        return inflated(self.channels.lower, self.channels.upper, inflation)
 
 
 def measure(

@@ -11,7 +11,7 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.control.tube_set import TubeSet
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, acceleration_channels
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, corners, fraction, measure, record
@@ -36,6 +36,7 @@ _SHOWN = (
     "velocity_end_error",
     "post_fault_attitude_deviation",
     "post_fault_attitude_from_nominal",
+    "saturated_steps",
 )
 
 
@@ -93,7 +94,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     region, model = Region(design, inputs), channel_model(design)
     seen = fraction()
     measured = measure(region, model, seen, lambda done: progress("disturbances", done, len(seen)))
-    disturbance = measured.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
+    disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
 
     progress("invariant set", 0, 1)
     found = invariant_set(tube_problem(design, disturbance), inputs.invariant_set)
@@ -109,11 +110,12 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
 
     everyone = corners()
     flown = region.map(
-        lambda flight: _evidence(flight, found, disturbance, model),
+        lambda flight: flight_evidence(flight, found, disturbance, model),
         everyone,
         lambda done: progress("flights in the tube", done, len(everyone)),
     )
-    plan = check_plan(bounds, *_plan(flown))
+    lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
+    plan = check_plan(bounds, lowest, highest)
     report = {
         "disturbance": _disturbance_report(measured, disturbance),
         "invariant_set": {**_set_report(found), "certificate": certified, "sampling": sampling},
@@ -123,25 +125,34 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     return Tube(disturbance, found, bounds, report)
 
 
-def _evidence(flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel) -> dict[str, Any]:
-    """Return what one flight shows of the tube."""
+@dataclass(frozen=True)
+class FlightEvidence:
+    """What one flight shows: worst ``level``, ratios |e - c| / z (n), membership, inputs of its plan, some metrics."""
+
+    level: float | None
+    ratios: np.ndarray
+    membership: Membership
+    lowest: np.ndarray
+    highest: np.ndarray
+    metrics: np.ndarray
+
+
+def flight_evidence(
+    flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel
+) -> FlightEvidence:
+    """Return what ``flight`` shows of the tube."""
     h = flight.history
     errors = tube_errors(h.state, h.deviation, flight.reference, model.notch)
     plan = h.nominal_input + flight.reference_input
-    membership = disturbance.membership(model.signals(record(flight)).channels)
     metrics = flight_metrics(flight.data())
-    return {
-        "level": float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
-        "ratios": np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
-        "membership": membership,
-        "lowest": plan.min(axis=0),
-        "highest": plan.max(axis=0),
-        "metrics": [abs(metrics[name]) for name in _SHOWN],
-    }
-
-
-def _plan(flown: list[dict[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
-    return np.min([f["lowest"] for f in flown], axis=0), np.max([f["highest"] for f in flown], axis=0)
+    return FlightEvidence(
+        level=float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
+        ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
+        membership=disturbance.membership(model.signals(record(flight)).channels),
+        lowest=plan.min(axis=0),
+        highest=plan.max(axis=0),
+        metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
+    )
 
 
 def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> dict[str, Any]:
@@ -178,19 +189,18 @@ def _set_report(found: InvariantSet) -> dict[str, Any]:
     return report
 
 
-def _flights_report(flown: list[dict[str, Any]]) -> dict[str, Any]:
-    worst = max(flown, key=lambda f: float(f["membership"].ratio))["membership"]
-    levels = [f["level"] for f in flown if f["level"] is not None]
+def _flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
+    worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
+    levels = [f.level for f in flown if f.level is not None]
     return {
         "flights": len(flown),
         "worst_level": max(levels) if levels else None,
-        "worst_ratio_to_half_width": np.max([f["ratios"] for f in flown], axis=0).tolist(),
+        "worst_ratio_to_half_width": np.max([f.ratios for f in flown], axis=0).tolist(),
         "disturbance_membership": {
-            "outside": sum(not f["membership"].inside for f in flown),
+            "outside": sum(not f.membership.inside for f in flown),
             "worst_ratio": worst.ratio,
             "channel": worst.channel,
             "step": worst.step,
         },
-        "saturated_steps": 0,
-        "worst": dict(zip(_SHOWN, np.max([f["metrics"] for f in flown], axis=0).tolist(), strict=True)),
+        "worst": dict(zip(_SHOWN, np.max([f.metrics for f in flown], axis=0).tolist(), strict=True)),
     }

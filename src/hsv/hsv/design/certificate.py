@@ -1,0 +1,36 @@
+"""The certificate beside a design file: everything that a stranger needs to recompute it, as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from hsv.errors import DesignError
+
+
+def certificate_path(design_file: Path) -> Path:
+    """Return where the certificate of a parameter file lies: ``baseline.yaml`` has ``baseline.certificate.json``."""
+    return design_file.with_suffix(".certificate.json")
+
+
+def write_certificate(path: Path, report: dict[str, Any]) -> None:
+    """Write the report of a design; the same report gives the same bytes."""
+    path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_certificate(path: Path) -> dict[str, Any]:
+    """Return the report of a design.
+
+    Raises:
+        DesignError: The file is missing or is not a certificate.
+    """
+    try:
+        report = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design certificate") from error
+    except ValueError as error:
+        raise DesignError(f"{path}: {error}, expected JSON") from error
+    if not isinstance(report, dict) or not {"inputs", "feedback", "nominal", "tube"} <= report.keys():
+        raise DesignError(f"{path}: expected a design certificate with inputs, feedback, nominal and tube")
+    return report

@@ -1,0 +1,1 @@
+"""Recomputing a design from its parameter file and certificate, claim by claim; no hash is relied on."""
