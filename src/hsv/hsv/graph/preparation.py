@@ -20,7 +20,7 @@ from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
 @dataclass(frozen=True)
 class PreparedRun:
-    """A checked scenario with its parameter files (design first, scenario over it) and the bag it will be recorded to."""
+    """A checked scenario with its parameter files (design first, scenario over it) and the bag to record to."""
 
     scenario: Scenario
     run_id: str

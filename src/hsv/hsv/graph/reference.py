@@ -8,9 +8,9 @@ from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
 from hsv.parameters import Parameter
 
 _HEADER = """# Parameters of the nodes
-Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A value
-of the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2; floats need
-a decimal point. All are fixed once a node runs, unless the last column says otherwise.
+Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A
+value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2;
+floats need a decimal point. All are fixed once a node runs, unless the last column says otherwise.
 """
 
 
