@@ -20,6 +20,9 @@ BLOCK_TIME = 0.5
 CHECKED = (0.0, 0.24, 0.48, 0.72, 0.96)
 """Where in a block the bounds are imposed, as shares of it: at its start and end only, inputs overshoot between."""
 
+_ITERATIONS = 60
+"""Of the solver at most; it needs about 10."""
+
 
 class QpLaw:
     """Horizon 20 s, prediction by the model at the reference, K of its Riccati equation.
@@ -64,7 +67,6 @@ class QpLaw:
         )
         scaled = self._scale[:, None] * weight * self._scale
         self._hessian = np.kron(np.eye(BLOCKS), scaled / np.max(scaled))
-        self._solver: piqp.DenseSolver | None = None
         self.reset()
 
     def reset(self) -> None:
@@ -97,14 +99,13 @@ class QpLaw:
             return np.zeros((BLOCKS, len(self._scale)))
         if not np.all(np.isfinite(inputs)):
             return None
-        if self._solver is None:
-            self._solver = piqp.DenseSolver()
-            self._solver.setup(self._hessian, np.zeros(len(self._hessian)), None, None, self._input_map, lower, upper)
-        else:
-            self._solver.update(h_l=lower, h_u=upper)
-        if self._solver.solve() != piqp.PIQP_SOLVED:
+        # Updating a solver would leave traces of the problems before in the last bits of the answer.
+        solver = piqp.DenseSolver()
+        solver.settings.max_iter = _ITERATIONS
+        solver.setup(self._hessian, np.zeros(len(self._hessian)), None, None, self._input_map, lower, upper)
+        if solver.solve() != piqp.PIQP_SOLVED:
             return None
-        return np.asarray(self._solver.result.x).reshape(BLOCKS, -1) * self._scale
+        return np.asarray(solver.result.x).reshape(BLOCKS, -1) * self._scale
 
 
 def _predicted_inputs(

@@ -1,0 +1,148 @@
+import time
+
+import clarabel
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import sparse
+from scipy.linalg import solve_discrete_are
+
+from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
+from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
+from hsv.control.qp_law import BLOCKS, QpLaw
+from hsv.errors import DesignError, ParameterError
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+PATH = find_design("baseline")
+VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
+DATA = nominal_data(DESIGN)
+START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
+STEP = START.state - REFERENCE.state
+# Control study, section 5: U minus F Z of the certified ellipsoid.
+MINIMUM, MAXIMUM = np.array([0.17, np.radians(-18.8)]), np.array([1.33, np.radians(18.9)])
+FAR = 100.0 * STEP
+
+
+@pytest.fixture
+def law():
+    return QpLaw(DESIGN, DATA, REFERENCE, MINIMUM, MAXIMUM)
+
+
+def rigid():
+    A, B = DESIGN.polytope.at(*REFERENCE.state[:2])
+    return A[:5, :5], B[:5]
+
+
+def predicted(law, deviation, plan):
+    """Inputs (1000, 2) of a plan, step by step, by the model at the reference."""
+    A, B = rigid()
+    x, inputs = deviation[:5], []
+    for k in range(BLOCKS * 25):
+        u = law.gain[:, :5] @ x + plan[k // 25]
+        inputs.append(u)
+        x = A @ x + B @ u
+    return np.array(inputs)
+
+
+def test_far_from_the_bounds_it_is_the_linear_quadratic_regulator(law):
+    A, B = rigid()
+    Q, R = 0.02 * np.diag(DESIGN.nominal_state_scale**-2.0), 0.02 * np.diag(DESIGN.nominal_input_scale**-2.0)
+    P = solve_discrete_are(A, B, Q, R)
+    K = -np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
+    small = 0.05 * STEP
+    result = law.step(small)
+    assert_allclose(result.input, K @ small[:5], rtol=1e-6)
+    assert (result.gain_index, result.status) == (NOT_IN_FAMILY, NominalStatus.OK)
+
+
+def test_plan_of_the_step_keeps_the_bounds_between_block_ends_too(law):
+    plan = law._solve(STEP[:5])
+    inputs = predicted(law, STEP, plan)
+    lower, upper = MINIMUM - REFERENCE.input, MAXIMUM - REFERENCE.input
+    excess = np.maximum(lower - inputs, inputs - upper).max(axis=0)
+    assert excess[0] < 1e-3 and np.degrees(excess[1]) < 0.1
+    assert np.max(np.abs(inputs - upper), axis=0).min() > 0.0 and np.isclose(inputs[:, 0].max(), upper[0], atol=1e-6)
+
+
+def test_plan_is_the_optimum(law):
+    plan = law._solve(STEP[:5])
+    inputs = law._state_map @ STEP[:5]
+    G, rows = law._input_map, np.concatenate((law._bounds[1] - inputs, inputs - law._bounds[0]))
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    solution = clarabel.DefaultSolver(
+        sparse.csc_matrix(np.triu(law._hessian)),
+        np.zeros(2 * BLOCKS),
+        sparse.csc_matrix(np.vstack((G, -G))),
+        rows,
+        [clarabel.NonnegativeConeT(len(rows))],
+        settings,
+    ).solve()
+    assert_allclose(plan.ravel(), np.asarray(solution.x) * np.tile(DESIGN.nominal_input_scale, BLOCKS), atol=1e-5)
+
+
+def test_input_depends_on_the_deviation_alone(law):
+    first = law.step(STEP).input
+    for scale in (0.9, 0.3, 100.0, 0.7):
+        law.step(scale * STEP)
+    assert np.array_equal(law.step(STEP).input, first)
+    assert np.array_equal(QpLaw(DESIGN, DATA, REFERENCE, MINIMUM, MAXIMUM).step(STEP).input, first)
+
+
+def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
+    bounds = {"nominal.input_minimum": MINIMUM.tolist(), "nominal.input_maximum": MAXIMUM.tolist()}
+    values = {**VALUES, "reference.altitude": 26243.28, "reference.velocity": 2484.12, **bounds}
+    settled, times = {}, []
+    for name in ("qp", "family"):
+        trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
+        states, measured = [], START.state
+        for _ in range(4000):
+            begin = time.perf_counter()
+            result = trajectory.step(measured)
+            times.append(time.perf_counter() - begin)
+            measured = result.reference + result.deviation
+            states.append(result.deviation)
+            if name == "qp":
+                total = result.input + result.reference_input
+                assert np.all(total >= MINIMUM - 1e-12) and np.all(total <= MAXIMUM + 1e-12)
+                assert result.status == NominalStatus.OK
+        share = np.abs(states)[:, :2] / np.abs(STEP[:2])
+        settled[name] = [0.02 * np.nonzero(share[:, axis] > 0.02)[0][-1] for axis in (0, 1)]
+    # Control study, section 6: 14.8 s and 36.5 s.
+    assert_allclose(settled["qp"], [14.8, 36.5], rtol=0.05)
+    assert np.all(np.array(settled["qp"]) < settled["family"])
+    assert np.percentile(times[:4000], 99) < 0.02
+
+
+def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):
+    plan = law._solve(STEP[:5])
+    law.step(STEP)
+    lower, upper = MINIMUM - REFERENCE.input, MAXIMUM - REFERENCE.input
+    for age in range(1, 30):
+        result = law.step(FAR)
+        assert result.status == NominalStatus.SOLVER_FAILED
+        assert np.array_equal(result.input, np.clip(law.gain @ FAR + plan[age // 25], lower, upper))
+    law._age = 998
+    assert law.step(FAR).status == NominalStatus.SOLVER_FAILED
+    result = law.step(FAR)
+    assert result.status == NominalStatus.SOLVER_FAILED | NominalStatus.FAMILY_FALLBACK | NominalStatus.OUTSIDE_FAMILY
+    assert np.array_equal(result.input, FamilyLaw(DATA).step(FAR).input)
+    assert law.step(STEP).status == NominalStatus.OK
+
+
+def test_without_a_plan_a_failure_flies_the_family(law):
+    law.step(STEP)
+    law.reset()
+    assert NominalStatus.FAMILY_FALLBACK in law.step(FAR).status
+    assert NominalStatus.SOLVER_FAILED in law.step(np.full(9, np.nan)).status
+
+
+def test_bounds_are_needed_and_must_hold_the_reference():
+    with pytest.raises(DesignError, match="expected the reference input"):
+        QpLaw(DESIGN, DATA, REFERENCE, REFERENCE.input + 0.01, MAXIMUM)
+    with pytest.raises(ParameterError, match=r"nominal.input_minimum: 0 values, expected 2 for nominal.law = 'qp'"):
+        NominalTrajectory.from_parameters({**VALUES, "nominal.law": "qp"})
+    with pytest.raises(ParameterError, match=r"nominal.law = 'lucky'"):
+        NominalTrajectory.from_parameters({**VALUES, "nominal.law": "lucky"})
