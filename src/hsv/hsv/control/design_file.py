@@ -193,19 +193,30 @@ def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
         DesignError: The file is missing or is not parameter YAML.
     """
     try:
-        tree = yaml.load(path.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "not text"
         raise DesignError(f"design {str(path)!r}: cannot be read ({reason}), expected a parameter file") from error
+    return parse_parameters(text, str(path), node)
+
+
+def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
+    """Return the flat parameters in the ``text`` of a parameter YAML, as :func:`read_parameters`.
+
+    Raises:
+        DesignError: The text is not parameter YAML; the message names ``source``.
+    """
+    try:
+        tree = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.YAMLError as error:
-        raise DesignError(f"design {str(path)!r}: {' '.join(str(error).split())}") from error
+        raise DesignError(f"design {source!r}: {' '.join(str(error).split())}") from error
     flat: dict[str, Any] = {}
     for section in ("/**", node, f"/{node}"):
         branch = tree.get(section) if isinstance(tree, dict) else None
         if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
             _flatten(branch["ros__parameters"], "", flat)
     if not flat:
-        raise DesignError(f"design {str(path)!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
+        raise DesignError(f"design {source!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
     return flat
 
 
