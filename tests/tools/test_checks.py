@@ -78,7 +78,7 @@ def test_another_ros_distribution_is_refused_in_one_line(tools):
 
 def test_jazzy_without_its_packages_is_refused(python):
     with pytest.raises(SetupError, match="cannot import rclpy"):
-        checks.require(routes.JAZZY, replace(python, has_rclpy=False), os.environ)
+        checks.require(routes.JAZZY, replace(python, has_ros=False), os.environ)
 
 
 @pytest.mark.parametrize("path", ["/home/a b/hsv", "/home/a:b/hsv", "/home/a;b", "/home/it's"])

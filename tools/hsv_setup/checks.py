@@ -70,9 +70,9 @@ def python_problems(route: Route, python: Interpreter | None) -> list[Problem]:
         problems.append(Problem(f"Python's header files ({python.include}/Python.h)", (f"{stem}-dev",)))
     if route.wheels:
         problems += _wheel_problems(python)
-    elif not python.has_rclpy:
-        text = f"ROS_DISTRO=jazzy is set, but {python.executable} cannot import rclpy: source Jazzy's setup.bash, and "
-        problems.append(Problem(text + "use the system's Python (make setup PYTHON=/usr/bin/python3)"))
+    elif not python.has_ros:
+        text = f"ROS_DISTRO=jazzy is set, but {python.executable} cannot import rclpy and colcon: source its setup.bash"
+        problems.append(Problem(text, ("ros-jazzy-ros-base", "ros-dev-tools")))
     return problems
 
 

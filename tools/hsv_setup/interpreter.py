@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -27,7 +26,7 @@ print(json.dumps({
     "include": paths["include"],
     "has_headers": os.path.exists(os.path.join(paths["include"], "Python.h")),
     "has_venv": all(importlib.util.find_spec(name) for name in ("venv", "ensurepip")),
-    "has_rclpy": importlib.util.find_spec("rclpy") is not None,
+    "has_ros": all(importlib.util.find_spec(name) for name in ("rclpy", "colcon_core")),
 }))
 """
 
@@ -43,7 +42,8 @@ class Interpreter:
     include: str
     has_headers: bool
     has_venv: bool
-    has_rclpy: bool
+    has_ros: bool
+    """Whether it imports rclpy and colcon without any virtual environment."""
 
     @property
     def supported(self) -> bool:
@@ -69,23 +69,23 @@ def probe(command: str, env: Mapping[str, str]) -> Interpreter | None:
     return Interpreter(**found)
 
 
-def find(env: Mapping[str, str]) -> Interpreter | None:
-    """Return the interpreter to use: PYTHON if set, else the first supported one, else any (to report on).
+def find(env: Mapping[str, str], with_ros: bool) -> Interpreter | None:
+    """Return the interpreter to use: PYTHON if set, else the first suitable one, else any (to report on).
 
     An existing environment's own interpreter comes first, so that a changed PATH does not rebuild everything.
     """
     named = os.environ.get("PYTHON")
     if named:
         return probe(named, env)
-    unsupported = None
-    for command in filter(None, [_existing(), "python3", "python3.12", "python3.11", sys.executable]):
+    unsuitable = None
+    for command in filter(None, [_existing(), "python3", "python3.12", "python3.11", "/usr/bin/python3"]):
         if shutil.which(command, path=env.get("PATH")) is None:
             continue
         found = probe(command, env)
-        if found is not None and found.supported:
+        if found is not None and found.supported and (found.has_ros or not with_ros):
             return found
-        unsupported = unsupported or found
-    return unsupported
+        unsuitable = unsuitable or found
+    return unsuitable
 
 
 def _existing() -> str | None:

@@ -44,7 +44,7 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
     start = time.monotonic()
     route = routes.choose(environ)
     env = routes.clean_environment(route, environ)
-    python = interpreter.find(env)
+    python = interpreter.find(env, with_ros=not route.wheels)
     if only_check or python is None:
         checks.require(route, python, env)
         return
