@@ -99,9 +99,9 @@ def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
         trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
         states, measured = [], START.state
         for _ in range(4000):
-            begin = time.perf_counter()
+            begin = time.thread_time()
             result = trajectory.step(measured)
-            times.append(time.perf_counter() - begin)
+            times.append(time.thread_time() - begin)
             measured = result.reference + result.deviation
             states.append(result.deviation)
             if name == "qp":
@@ -113,7 +113,8 @@ def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
     # Control study, section 6: 14.8 s and 36.5 s.
     assert_allclose(settled["qp"], [14.8, 36.5], rtol=0.05)
     assert np.all(np.array(settled["qp"]) < settled["family"])
-    assert np.percentile(times[:4000], 99) < 0.02
+    # A wide margin over the 5 ms of the design: processors differ.
+    assert np.percentile(times[:4000], 99) < 0.015
 
 
 def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):

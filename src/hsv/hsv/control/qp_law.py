@@ -17,8 +17,11 @@ BLOCKS = 40
 BLOCK_TIME = 0.5
 """Length of a block, s."""
 
-CHECKED = (0.0, 0.24, 0.48, 0.72, 0.96)
-"""Where in a block the bounds are imposed, as shares of it: at its start and end only, inputs overshoot between."""
+CHECKED_NEAR, CHECKED_FAR = (0.0, 0.24, 0.48, 0.72, 0.96), (0.0, 0.48)
+"""Where in a block the bounds are imposed, as shares of it: at its ends only, inputs overshoot between."""
+
+NEAR_BLOCKS = 10
+"""Blocks that count as near, where inputs move fast."""
 
 _ITERATIONS = 60
 """Of the solver at most; it needs about 10."""
@@ -55,16 +58,13 @@ class QpLaw:
         K = -np.linalg.solve(weight, B.T @ P @ A)
         self.gain = np.zeros(data.gains.shape[1:])
         self.gain[:, :N_RIGID] = K
-        checked = [round(share * self._block) for share in CHECKED]
-        state_map, self._input_map = _predicted_inputs(A + B @ K, B, K, self._block, checked)
+        state_map, self._input_map = _predicted_inputs(A + B @ K, B, K, self._block)
         # Inputs and c in units of their scales.
-        rows = np.tile(self._scale, BLOCKS * len(checked))
+        points = len(state_map) // len(self._scale)
+        rows = np.tile(self._scale, points)
         self._state_map = state_map / rows[:, None]
         self._input_map *= np.tile(self._scale, BLOCKS) / rows[:, None]
-        self._bounds = (
-            np.tile(self._lower, BLOCKS * len(checked)) / rows,
-            np.tile(self._upper, BLOCKS * len(checked)) / rows,
-        )
+        self._bounds = np.tile(self._lower, points) / rows, np.tile(self._upper, points) / rows
         scaled = self._scale[:, None] * weight * self._scale
         self._hessian = np.kron(np.eye(BLOCKS), scaled / np.max(scaled))
         self.reset()
@@ -108,10 +108,8 @@ class QpLaw:
         return np.asarray(solver.result.x).reshape(BLOCKS, -1) * self._scale
 
 
-def _predicted_inputs(
-    closed: np.ndarray, B: np.ndarray, K: np.ndarray, block: int, checked: list[int]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return what maps x_n and all c to the inputs at the checked steps of every block, block after block."""
+def _predicted_inputs(closed: np.ndarray, B: np.ndarray, K: np.ndarray, block: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what maps x_n and all c to the inputs where bounds are imposed, block after block."""
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]
     for _ in range(block):
@@ -121,7 +119,8 @@ def _predicted_inputs(
     state_rows, plan_rows = [], []
     for b in range(BLOCKS):
         mine = slice(m * b, m * (b + 1))
-        for step in checked:
+        for share in CHECKED_NEAR if b < NEAR_BLOCKS else CHECKED_FAR:
+            step = round(share * block)
             plan = power[step] @ from_plan
             plan[:, mine] += forced[step]
             inputs = K @ plan
