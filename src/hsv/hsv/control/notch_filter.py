@@ -45,7 +45,7 @@ class NotchSection:
 
 
 class NotchData(NamedTuple):
-    """Discrete sections in series, for compiled functions: A (n, 2, 2), B, C (n, 2), D (n), G (n, 2): rest per input."""
+    """Discrete sections in series for compiled functions: A (n, 2, 2), B, C (n, 2), D (n), G (n, 2): rest per input."""
 
     A: np.ndarray
     B: np.ndarray

@@ -1,4 +1,4 @@
-"""Tube-MPC law (paper eq. 36): u = tau F (x - x_r - x_n) + u_n + u_r, with the filtered pitch rate, within the limits."""
+"""Tube-MPC law (paper eq. 36): u = tau F (x - x_r - x_n) + u_n + u_r, the pitch rate filtered, within the limits."""
 
 from __future__ import annotations
 
@@ -101,7 +101,9 @@ class TubeMonitor:
         """Forget the past: the next step starts a new run."""
         self._started = False
 
-    def step(self, error: np.ndarray, planned_rate: float, filter_state: np.ndarray) -> tuple[np.ndarray, TubeSet | None]:
+    def step(
+        self, error: np.ndarray, planned_rate: float, filter_state: np.ndarray
+    ) -> tuple[np.ndarray, TubeSet | None]:
         """Return the error (n) of rigid states and filter, and the set that holds for it, if any.
 
         Args:
