@@ -1,4 +1,4 @@
-"""hsv run"""
+"""The command ``hsv run``."""
 
 from __future__ import annotations
 
