@@ -62,7 +62,7 @@ def test_metres_serve_as_well_as_feet():
     ("old", "new", "message"),
     [
         ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of model, coupling"),
-        ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, duration"),
+        ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
         ("value = 0.9", "value = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of channel, type"),
         ('"600 ft"', '"600 s"', "command.altitude_step = '600 s': wrong unit, expected a finite quantity such as"),
