@@ -149,11 +149,11 @@ def test_schedule_from_parameters():
             "fault.starts": [100.0, 0.01],
         }
     )
-    assert injector.scheduled == [(loss(0.9), 5000), (loss(0.8, FUEL), 1)]
+    assert [row[:2] for row in injector.scheduled] == [(loss(0.9), 5000), (loss(0.8, FUEL), 1)]
 
 
 def test_defaults_are_no_fault():
-    assert FaultInjector.from_parameters({p.name: p.default for p in FAULT_PARAMETERS}).scheduled == []
+    assert FaultInjector.from_parameters({p.name: p.default for p in FAULT_PARAMETERS}).scheduled == ()
 
 
 @pytest.mark.parametrize(
@@ -180,3 +180,22 @@ def test_columns_of_different_length_are_refused_by_name():
     values = {"fault.channels": [ELEVATOR, FUEL], "fault.types": ["loss_of_effectiveness"] * 2, "fault.values": [0.9]}
     with pytest.raises(ParameterError, match=r"fault.values: 1 values, expected as many as fault.channels, 2"):
         FaultInjector.from_parameters({**values, "fault.starts": [1.0, 2.0]})
+
+
+def test_parameters_repeat_what_was_injected_and_cleared_in_flight():
+    period = 0.02
+    flown = FaultInjector([(loss(0.9), 5), (loss(0.7, FUEL), 2, 4)])
+    active = []
+    for step in range(30):
+        if step == 8:
+            flown.inject(loss(0.5))
+        if step == 12:
+            flown.inject(loss(0.8, FUEL))
+        if step == 20:
+            flown.clear(ELEVATOR)
+        result = flown.step(step, COMMAND)
+        active.append((result.active, result.actuator.tolist()))
+    again = FaultInjector.from_parameters({"period": period, **flown.parameters(period)})
+    repeated = [again.step(step, COMMAND) for step in range(30)]
+    assert [(r.active, r.actuator.tolist()) for r in repeated] == active
+    assert FaultInjector.from_parameters(FaultInjector().parameters(period)).step(0, COMMAND).active == ()

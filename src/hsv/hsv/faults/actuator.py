@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -92,7 +92,10 @@ FAULT_PARAMETERS = (
     Parameter("fault.types", ["none"], "type of each scheduled fault: " + ", ".join(FAULT_TYPES)),
     Parameter("fault.values", [0.0], "value of each scheduled fault"),
     Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
+    Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
 )
+NEVER_TIME = 1e9
+"""Stop (s) of a fault that does not end, where others do."""
 
 
 @dataclass
@@ -114,7 +117,8 @@ class FaultResult:
 class FaultInjector:
     """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on."""
 
-    scheduled: list[tuple[Fault, int]] = field(default_factory=list)
+    scheduled: Sequence[tuple[Fault, int] | tuple[Fault, int, int]] = ()
+    """Faults with their first step and, if they end, the first step without."""
 
     def __post_init__(self) -> None:
         self.reset()
@@ -129,10 +133,11 @@ class FaultInjector:
             ParameterError: A wrong value, or arrays of different lengths.
         """
         v = check_all(FAULT_PARAMETERS, values)
-        names = ("channels", "types", "values", "starts")
+        names = ("channels", "types", "values", "starts", "stops")
         columns = [v[f"fault.{name}"] for name in names]
         if columns[0] == ["none"]:
             return cls()
+        columns[-1] = list(columns[-1]) or [NEVER_TIME] * len(columns[0])
         for name, column in zip(names, columns, strict=True):
             if len(column) != len(columns[0]):
                 raise ParameterError(
@@ -141,14 +146,14 @@ class FaultInjector:
                 )
         return cls(
             [
-                (Fault(channel, kind, value), first_step(start, v["period"]))
-                for channel, kind, value, start in zip(*columns, strict=True)
+                (Fault(channel, kind, value), first_step(start, v["period"]), first_step(stop, v["period"]))
+                for channel, kind, value, start, stop in zip(*columns, strict=True)
             ]
         )
 
     def reset(self) -> None:
         """Return to the schedule: what was injected or cleared in flight is forgotten."""
-        self._entries = [_Entry(fault, start) for fault, start in self.scheduled]
+        self._entries = [_Entry(*row) for row in self.scheduled]
         self._next = 0
         self._compile()
 
@@ -156,6 +161,18 @@ class FaultInjector:
     def schedule(self) -> FaultSchedule:
         """The faults known now, for compiled functions."""
         return self._schedule
+
+    def parameters(self, period: float) -> dict[str, list[str] | list[float]]:
+        """Return the faults known now, those injected or cleared in flight included, as :data:`FAULT_PARAMETERS`."""
+        if not self._entries:
+            return {"fault.channels": ["none"]}
+        return {
+            "fault.channels": [e.fault.channel for e in self._entries],
+            "fault.types": [e.fault.type for e in self._entries],
+            "fault.values": [e.fault.value for e in self._entries],
+            "fault.starts": [e.start * period for e in self._entries],
+            "fault.stops": [min(e.stop * period, NEVER_TIME) for e in self._entries],
+        }
 
     def inject(self, fault: Fault) -> int:
         """Start ``fault`` with the next step, in place of what acts on its channel; return that step."""

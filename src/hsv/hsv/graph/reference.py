@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hsv.control.design_file import DESIGN_PARAMETERS
+from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
 from hsv.parameters import Parameter
 
@@ -22,9 +24,10 @@ def reference() -> str:
 
 
 def _table(parameters: Iterable[Parameter]) -> str:
+    brought = {p.name for p in (*DESIGN_PARAMETERS, *NOMINAL_PARAMETERS)}
     rows = ["| parameter | default | expected | meaning | in flight |", "| --- | --- | --- | --- | --- |"]
     for p in parameters:
-        default = {"[]": "from the design", "": "empty"}.get(str(p.default), f"`{p.default}`")
+        default = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}.get(str(p.default), f"`{p.default}`")
         rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
     return "\n".join(rows) + "\n"
 
