@@ -15,6 +15,7 @@ from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
 from hsv.cli.trim import trim
+from hsv.cli.verify import verify
 from hsv.errors import HsvError, RunError
 
 app = typer.Typer(
@@ -25,7 +26,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (trim, linearise, design, scenarios, simulate, run, info, plot):
+for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot):
     app.command()(command)
 
 
