@@ -27,7 +27,9 @@ def _table(parameters: Iterable[Parameter]) -> str:
     brought = {p.name for p in (*DESIGN_PARAMETERS, *NOMINAL_PARAMETERS)}
     rows = ["| parameter | default | expected | meaning | in flight |", "| --- | --- | --- | --- | --- |"]
     for p in parameters:
-        default = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}.get(str(p.default), f"`{p.default}`")
+        default = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}.get(
+            str(p.default), f"`{p.default}`"
+        )
         rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
     return "\n".join(rows) + "\n"
 
