@@ -7,10 +7,13 @@ import sys
 import typer
 
 from hsv.cli.design import design
+from hsv.cli.diff import diff
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.output import errors
 from hsv.cli.plot import plot
+from hsv.cli.recover import recover
+from hsv.cli.replay import replay
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
@@ -26,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot):
+for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot, replay, diff, recover):
     app.command()(command)
 
 

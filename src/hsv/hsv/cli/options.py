@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,3 +15,4 @@ AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '850
 VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
 CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
+BagArgument = Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")]

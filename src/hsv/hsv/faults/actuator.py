@@ -200,8 +200,11 @@ class FaultInjector:
         actuator = np.empty(2)
         apply_faults(self._schedule, step, command, actuator)
         self._next = step + 1
-        acting = {e.fault.channel: e.fault for e in self._entries if e.start <= step < e.stop}
-        return FaultResult(actuator, tuple(acting.values()))
+        return FaultResult(actuator, self.acting(step))
+
+    def acting(self, step: int) -> tuple[Fault, ...]:
+        """Return the faults that act in ``step``, one a channel: the last known wins."""
+        return tuple({e.fault.channel: e.fault for e in self._entries if e.start <= step < e.stop}.values())
 
     def _compile(self) -> None:
         rows = self._entries

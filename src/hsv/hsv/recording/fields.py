@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.typesys.store import Typestore
 
 TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 """Two fields each, int32 sec and uint32 nanosec, which are worth one number together."""
@@ -52,6 +54,25 @@ def fields_of(types: Typesdict, message_type: str) -> list[Field]:
 def as_dict(types: Typesdict, message_type: str, message: object) -> dict[str, Any]:
     """Return a deserialized message as plain dictionaries, lists and numbers; times in nanoseconds."""
     return {field.name: _plain(types, field, getattr(message, field.name)) for field in fields_of(types, message_type)}
+
+
+def blank(store: Typestore, message_type: str) -> Any:
+    """Return a message of zeros, empty text and empty sequences."""
+    values: dict[str, Any] = {}
+    for field in fields_of(store.fielddefs, message_type):
+        if field.count != "one":
+            if field.format:
+                values[field.name] = np.zeros(field.length, field.format)
+            else:
+                single = "" if field.is_text else None
+                values[field.name] = [
+                    blank(store, field.type) if single is None else single for _ in range(field.length)
+                ]
+        elif field.format:
+            values[field.name] = np.zeros((), field.format).item()
+        else:
+            values[field.name] = "" if field.is_text else blank(store, field.type)
+    return store.types[message_type](**values)
 
 
 def nanoseconds(time: Any) -> int:

@@ -14,14 +14,15 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Metadata, Schema
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.recording.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
+from hsv.recording.columns import Columns
 from hsv.recording.metadata import CUSTOM_DATA
 from hsv.recording.scan import MESSAGE_HEADER, content, records
+from hsv.recording.topic import Qos
+from hsv.recording.track import Track
 
 NAMESPACE = "/hsv/"
 """A bag of this project has topics below this name."""
@@ -109,14 +110,7 @@ class Bag:
         RecordingError
             If the topic is not in the bag or a message does not fit its definition.
         """
-        messages = self._of(topic)[1]
-        message_type, types = self.topics[topic].type, self._types.fielddefs
-        if messages:
-            try:
-                return columns_at_once(types, message_type, messages)
-            except NoCommonLayoutError:
-                pass
-        return columns_one_by_one(types, message_type, [message for _, message in self.decode(topic)])
+        return self.track(topic).columns()
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield time in nanoseconds and message of a topic, deserialized one by one.
@@ -126,21 +120,38 @@ class Bag:
         RecordingError
             As :meth:`columns`.
         """
+        return self.track(topic).decode()
+
+    def track(self, topic: str) -> Track:
+        """Return the messages of a topic with what decodes them.
+
+        Raises:
+        ------
+        RecordingError
+            If the topic is not in the bag.
+        """
         times, messages = self._of(topic)
-        message_type = self.topics[topic].type
-        for time, message in zip(times, messages, strict=True):
-            try:
-                yield time, self._types.deserialize_cdr(message, message_type)
-            except SerdeError as error:
-                raise RecordingError(f"{self.path}: topic {topic}: message at {time} ns: {error}") from None
+        return Track(topic, self.topics[topic].type, self.types, times, messages, str(self.path))
+
+    def definition(self, topic: str) -> str:
+        """Return the definition of a topic's type as recorded, its dependencies included."""
+        self._of(topic)
+        return next(self._schemas[c.schema_id].data.decode() for c in self._channels.values() if c.topic == topic)
+
+    def qos(self, topic: str) -> Qos:
+        """Return the quality of service with which a topic was offered; the default if the bag does not tell."""
+        self._of(topic)
+        metadata = next(c.metadata for c in self._channels.values() if c.topic == topic)
+        return Qos.from_yaml(metadata.get("offered_qos_profiles", ""))
 
     def constants(self, topic: str) -> dict[str, ConstValue]:
         """Return the constants that the type of a topic defines, as recorded in the bag."""
         self._of(topic)
-        return {name: value for name, _, value in self._types.fielddefs[self.topics[topic].type][0]}
+        return {name: value for name, _, value in self.types.fielddefs[self.topics[topic].type][0]}
 
     @cached_property
-    def _types(self) -> Typestore:
+    def types(self) -> Typestore:
+        """The message types as the bag's own definitions state them."""
         store = get_typestore(Stores.EMPTY)
         for schema in self._schemas.values():
             try:

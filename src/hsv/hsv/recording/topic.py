@@ -45,6 +45,16 @@ class Qos:
             "avoid_ros_namespace_conventions": self.avoid_ros_namespace_conventions,
         }
 
+    @classmethod
+    def from_yaml(cls, text: str) -> Qos:
+        """Return the first profile of the text that :meth:`as_yaml` makes; the default for what it does not say."""
+        profiles = yaml.safe_load(text) or [{}]
+        given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
+        for key, value in given.items():
+            if isinstance(value, dict):
+                given[key] = int(value["sec"]) * 10**9 + int(value["nsec"])
+        return cls(**given)
+
     def as_yaml(self) -> str:
         """Return the profile as the list of one profile that the metadata of an MCAP channel carries as text."""
         return yaml.safe_dump([self.as_dict()], sort_keys=False)

@@ -85,6 +85,11 @@ class Plant:
         self._step = 0
         return self._result(self.initial.input)
 
+    def place(self, step: int, state: np.ndarray) -> None:
+        """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""
+        self._state[:] = state
+        self._step = step
+
     def step(self, actuator: np.ndarray) -> PlantResult:
         """Hold ``actuator`` (2) over one period and return the state at its end."""
         advance(self._state, actuator, self.vehicle, self.period, self.substeps, self._work)

@@ -1,0 +1,78 @@
+"""The command ``hsv diff``."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from hsv.cli.options import BagArgument, JsonOption
+from hsv.cli.output import console, print_json
+
+if TYPE_CHECKING:
+    from hsv.recording.compare import Comparison, Difference
+
+
+def diff(
+    first: BagArgument,
+    second: BagArgument,
+    tolerance: Annotated[float, typer.Option(help="Absolute and relative at once; 0: every bit counts.")] = 0.0,
+    json: JsonOption = False,
+) -> None:
+    """Compare two bags: where they part first, and the largest difference of every field.
+
+    Exit code 0 if all step topics are equal, 1 if not.
+
+    Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
+    """
+    from hsv.errors import ParameterError
+    from hsv.graph.description import TOPICS
+    from hsv.recording.compare import compare
+    from hsv.recording.reader import Bag
+
+    if not 0.0 <= tolerance < math.inf:
+        raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
+    bags = Bag(first), Bag(second)
+    compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in TOPICS]
+    differences = [c.first for c in compared if c.first]
+    earliest = min(differences, key=lambda d: d.time_ns, default=None)
+    if json:
+        print_json(
+            {
+                "equal": earliest is None,
+                "first_difference": earliest
+                and {
+                    "topic": earliest.topic,
+                    "step": earliest.step,
+                    "time_s": earliest.time_ns * 1e-9,
+                    "field": earliest.field,
+                    "first": earliest.expected,
+                    "second": earliest.actual,
+                },
+                "largest_difference": {c.topic: c.largest for c in compared if c.largest},
+                "messages": {c.topic: [c.expected_count, c.actual_count] for c in compared},
+            }
+        )
+    else:
+        _print(compared, earliest)
+    raise typer.Exit(0 if earliest is None else 1)
+
+
+def _print(compared: list[Comparison], earliest: Difference | None) -> None:
+    from rich.table import Table
+
+    if earliest is None:
+        count = sum(c.actual_count for c in compared)
+        identical = all(c.identical for c in compared)
+        console.print(f"{count} messages: {'identical in every byte' if identical else 'equal within the tolerance'}")
+    else:
+        console.print(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}", soft_wrap=True)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for column in ("topic", "field", "largest difference"):
+        table.add_column(column, justify="right" if column.startswith("largest") else "left")
+    for comparison in compared:
+        for name, value in comparison.largest.items():
+            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else f"{value:.4g}")
+    if table.row_count:
+        console.print(table)

@@ -1,0 +1,127 @@
+"""The command ``hsv replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsv.cli.options import BagArgument, JsonOption
+from hsv.cli.output import console, errors, print_json
+
+if TYPE_CHECKING:
+    from hsv.replay.engine import ProcessComparison
+
+
+def replay(
+    bag: BagArgument,
+    node: Annotated[str, typer.Option(help="Replay this node only.")] = "",
+    parameters: Annotated[
+        Path | None, typer.Option(help="Parameter YAML under test, in place of the attached design.")
+    ] = None,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Repeat the whole loop instead of one node after the other.")
+    ] = False,
+    over_dds: Annotated[bool, typer.Option("--over-dds", help="Run the real node processes.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Feed every node's algorithm with its recorded inputs and compare what it does with what was recorded.
+
+    Exit code 1 if anything differs; a run in which the controller did next to nothing is refused.
+
+    Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
+    """
+    from hsv.cli.progress import stages
+    from hsv.errors import ParameterError
+    from hsv.recording.reader import Bag
+    from hsv.replay import engine
+    from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous
+
+    opened = Bag(bag)
+    refuse_vacuous(opened)
+    values = flown_parameters(opened, parameters)
+    controller = controller_of(values)
+    processes = engine.chosen(controller)
+    if node and node not in processes:
+        raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}")
+    if node and rerun:
+        raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
+    failed = []
+    report = []
+    with stages() as progress:
+        if over_dds:
+            from hsv.replay import over_dds as real
+
+            compared = (
+                real.rerun(opened, controller, values, progress)
+                if rerun
+                else real.replay_all(opened, [node] if node else list(processes), controller, values, progress)
+            )
+        elif rerun:
+            compared = iter(engine.rerun(opened, controller, values, progress))
+        else:
+            names = [node] if node else list(processes)
+            compared = (engine.replay(opened, processes[name], values, progress) for name in names)
+        for result in compared:
+            report.append(_as_json(result))
+            if not result.passed:
+                failed.append(result.process.node.name)
+            if not json:
+                _print(result)
+    if json:
+        print_json({"bag": str(bag), "passed": not failed, "processes": report})
+    if failed:
+        errors.print(f"[bold red]hsv: error:[/] {', '.join(failed)} differ from {bag}", soft_wrap=True)
+        raise typer.Exit(1)
+
+
+def _print(result: ProcessComparison) -> None:
+    messages = sum(topic.actual_count for topic in result.topics)
+    line = f"{result.process.node.name:18} {messages:7} messages  "
+    if result.identical:
+        console.print(f"{line}[green]identical in every byte[/]")
+        return
+    different = sum(topic.different_bytes for topic in result.topics)
+    if not result.passed:
+        first = min((t.first for t in result.topics if t.first), key=lambda d: d.step)
+        console.print(f"{line}[bold red]differ[/]", f"{first}", soft_wrap=True, markup=True)
+        return
+    largest = [(value, t.topic, name) for t in result.topics for name, value in t.largest.items()]
+    if largest:
+        value, topic, name = max(largest)
+        console.print(
+            f"{line}equal within {result.process.tolerance:g}, {different} differ in bytes: largest {value:.3g} in "
+            f"{topic} {name}",
+            soft_wrap=True,
+        )
+    else:
+        console.print(f"{line}equal in every field, but {different} differ in bytes that carry none", soft_wrap=True)
+
+
+def _as_json(result: ProcessComparison) -> dict[str, Any]:
+    return {
+        "node": result.process.node.name,
+        "passed": result.passed,
+        "identical": result.identical,
+        "tolerance": result.process.tolerance,
+        "reason": result.process.reason,
+        "topics": [
+            {
+                "topic": topic.topic,
+                "recorded": topic.expected_count,
+                "replayed": topic.actual_count,
+                "different_bytes": topic.different_bytes,
+                "largest_difference": topic.largest,
+                "first_difference": topic.first
+                and {
+                    "step": topic.first.step,
+                    "time_s": topic.first.time_ns * 1e-9,
+                    "field": topic.first.field,
+                    "recorded": topic.first.expected,
+                    "replayed": topic.first.actual,
+                },
+            }
+            for topic in result.topics
+        ],
+    }

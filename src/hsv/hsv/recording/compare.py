@@ -1,0 +1,145 @@
+"""Comparing two tracks of one topic: count, order, bytes, and then every field of every message."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.recording.columns import Columns
+from hsv.recording.track import Track
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One field of one message that is not what was expected."""
+
+    topic: str
+    step: int
+    """Step number that the message carries, or its row where it carries none."""
+    time_ns: int
+    field: str
+    expected: Any
+    actual: Any
+
+    def __str__(self) -> str:
+        return f"step {self.step} {self.topic} {self.field}: {_shown(self.expected)} became {_shown(self.actual)}"
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What comparing two tracks found; ``first`` is None where all is equal within the tolerance."""
+
+    topic: str
+    expected_count: int
+    actual_count: int
+    different_bytes: int
+    """Messages whose bytes differ, among those that both tracks have."""
+    first: Difference | None = None
+    largest: dict[str, float] = field(default_factory=dict)
+    """Largest |a - b| of each field that is not everywhere equal; not a number where it is no number that differs."""
+
+    @property
+    def identical(self) -> bool:
+        """Whether the tracks are equal in every byte."""
+        return self.expected_count == self.actual_count and self.different_bytes == 0 and self.first is None
+
+
+def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), tolerance: float = 0.0) -> Comparison:
+    """Compare two tracks of one topic.
+
+    Numbers are equal where |a - b| <= max(tolerance, tolerance max(|a|, |b|)), both are NaN, or both are the same
+    infinity; integers, text and lists only where they are the same (lists of messages element by element as numbers).
+
+    Args:
+        expected: What was recorded.
+        actual: What is compared to it.
+        ignored: Field paths that do not count.
+        tolerance: Absolute and relative at once.
+    """
+    count = min(len(expected.data), len(actual.data))
+    counts = len(expected.data), len(actual.data)
+    different = sum(a != b for a, b in zip(expected.data, actual.data, strict=False))
+    disordered = np.flatnonzero(np.array(expected.times[:count]) != np.array(actual.times[:count]))
+    if counts[0] == counts[1] and different == 0 and not len(disordered):
+        return Comparison(expected.topic, *counts, different)
+    ours, theirs = expected.cut(count).columns(), actual.cut(count).columns()
+    steps = ours.get("step", np.arange(count))
+    found: list[tuple[int, Difference]] = []
+    largest: dict[str, float] = {}
+
+    def note(row: int, name: str, a: Any, b: Any) -> None:
+        found.append((row, Difference(expected.topic, int(steps[row]), expected.times[row], name, a, b)))
+
+    if len(disordered):
+        row = int(disordered[0])
+        note(row, "time (ns)", expected.times[row], actual.times[row])
+    for name in dict.fromkeys((*ours, *theirs)):
+        if name in ignored:
+            continue
+        if name not in ours or name not in theirs:
+            note(0, name, name in ours, name in theirs)
+        elif count:
+            _compare_column(name, ours, theirs, tolerance, largest, note)
+    if counts[0] != counts[1]:
+        last = int(steps[count - 1]) + 1 if count else 0
+        time = max(expected.times[count - 1 : count], default=0)
+        found.append((count, Difference(expected.topic, last, time, "number of messages", *counts)))
+    first = min(found, key=lambda entry: entry[0])[1] if found else None
+    return Comparison(expected.topic, *counts, different, first, largest)
+
+
+def _compare_column(
+    name: str, ours: Columns, theirs: Columns, tolerance: float, largest: dict[str, float], note: Any
+) -> None:
+    a, b = ours[name], theirs[name]
+    if a.dtype == object or b.dtype == object or a.shape != b.shape:
+        rows = [row for row in range(len(a)) if not _alike(_plain(a[row]), _plain(b[row]), tolerance)]
+        if rows:
+            largest[name] = math.nan
+            note(rows[0], name, _plain(a[rows[0]]), _plain(b[rows[0]]))
+        return
+    equal = a == b
+    if a.dtype.kind == "f":
+        equal |= np.isnan(a) & np.isnan(b)
+    if equal.all():
+        return
+    difference = _absolute_difference(a, b)
+    largest[name] = float(np.max(np.where(equal, 0.0, difference)))
+    if a.dtype.kind == "f":
+        with np.errstate(invalid="ignore"):
+            limit = np.maximum(tolerance, tolerance * np.maximum(np.abs(a), np.abs(b)))
+            equal |= np.isfinite(a) & np.isfinite(b) & (difference <= limit)
+    if not equal.all():
+        index = tuple(int(i) for i in np.argwhere(~equal)[0])
+        suffix = "".join(f"[{i}]" for i in index[1:])
+        note(index[0], name + suffix, a[index].item(), b[index].item())
+
+
+def _absolute_difference(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.abs(a.astype(np.float64) - b.astype(np.float64))
+
+
+def _alike(a: Any, b: Any, tolerance: float) -> bool:
+    if isinstance(a, float) and isinstance(b, float):
+        if math.isfinite(a) and math.isfinite(b):
+            return abs(a - b) <= max(tolerance, tolerance * max(abs(a), abs(b)))
+        return a == b or (math.isnan(a) and math.isnan(b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(_alike(a[key], b[key], tolerance) for key in a)
+    if isinstance(a, list) and isinstance(b, list):
+        return len(a) == len(b) and all(_alike(x, y, tolerance) for x, y in zip(a, b, strict=True))
+    return bool(a == b)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+def _shown(value: Any) -> str:
+    return f"{value!r}"

@@ -1,0 +1,59 @@
+"""The messages of one topic, from a bag or made in a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
+
+from hsv.errors import RecordingError
+from hsv.recording.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
+
+
+@dataclass(frozen=True)
+class Track:
+    """Messages of one topic in their order."""
+
+    topic: str
+    type: str
+    """``package/msg/Type``."""
+    types: Typestore
+    """Definitions of the type and of those it depends on."""
+    times: list[int]
+    """Simulated times in nanoseconds."""
+    data: list[bytes]
+    """CDR with its header of four bytes."""
+    source: str = ""
+    """Where the messages come from, for errors."""
+
+    def cut(self, count: int) -> Track:
+        """Return the first ``count`` messages."""
+        return Track(self.topic, self.type, self.types, self.times[:count], self.data[:count], self.source)
+
+    def columns(self) -> Columns:
+        """Return all messages decoded, one array per field; see :mod:`hsv.recording.columns`.
+
+        Raises:
+            RecordingError: A message does not fit its definition.
+        """
+        if self.data:
+            try:
+                return columns_at_once(self.types.fielddefs, self.type, self.data)
+            except NoCommonLayoutError:
+                pass
+        return columns_one_by_one(self.types.fielddefs, self.type, [message for _, message in self.decode()])
+
+    def decode(self) -> Iterator[tuple[int, Any]]:
+        """Yield time in nanoseconds and message, deserialized one by one.
+
+        Raises:
+            RecordingError: As :meth:`columns`.
+        """
+        for time, message in zip(self.times, self.data, strict=True):
+            try:
+                yield time, self.types.deserialize_cdr(message, self.type)
+            except SerdeError as error:
+                raise RecordingError(f"{self.source}: topic {self.topic}: message at {time} ns: {error}") from None

@@ -1,0 +1,111 @@
+"""What a bag says of how it was made: the parameters attached to it, and what was done to the faults in flight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.control.control_law import CONTROLLER_PARAMETERS
+from hsv.control.design_file import parse_parameters, read_parameters
+from hsv.errors import RecordingError
+from hsv.faults.actuator import Fault, FaultInjector
+from hsv.graph.description import TOPICS
+from hsv.parameters import check_all
+from hsv.recording.flight import input_columns
+from hsv.recording.reader import Bag
+
+DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
+"""Attachments: the parameters of the design and, over them, those of the scenario."""
+
+LEAST_ACTIVE_TIME = 10.0
+"""Seconds of simulated time for which the controller must have done something."""
+
+ACTIVE_INPUT = 1e-6
+"""Deviation of a command from the reference input (-, rad) from which on the controller does something."""
+
+
+def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
+    """Return the flat parameters of a recorded run; faults injected or cleared in flight are part of the schedule.
+
+    Args:
+        bag: A bag of ``hsv run``.
+        design: Parameter file to put in place of the attached design.
+
+    Raises:
+        RecordingError: The bag carries no parameters.
+        DesignError, ParameterError: They are not acceptable.
+    """
+    attached = {}
+    for name in (DESIGN, SCENARIO):
+        if name not in bag.attachments:
+            raise RecordingError(f"{bag.path}: no attachment {name}, expected a bag recorded by hsv run")
+        attached[name] = parse_parameters(bag.attachments[name].decode(), f"{bag.path}: {name}")
+    values = attached[DESIGN] | attached[SCENARIO]
+    faults = _faults_as_flown(bag, values)
+    if design is not None:
+        values = read_parameters(design) | attached[SCENARIO]
+    return values | faults
+
+
+def controller_of(values: dict[str, Any]) -> str:
+    """Return the name of the controller node that these parameters choose."""
+    return str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+
+
+def complete_steps(bag: Bag) -> int:
+    """Return the number of steps of which the bag has every topic.
+
+    Raises:
+        RecordingError: A topic is missing.
+    """
+    return min(len(bag.messages(topic)) for topic in TOPICS)
+
+
+def broken_off(bag: Bag) -> bool:
+    """Whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
+    status = bag.columns("/hsv/state")["status"]
+    return not len(status) or int(status[-1]) == 0 or not bag.complete
+
+
+def refuse_vacuous(bag: Bag) -> None:
+    """Refuse a bag that would prove nothing.
+
+    Raises:
+        RecordingError: The controller was active for less than ten seconds of simulated time.
+    """
+    steps = complete_steps(bag)
+    command = input_columns(bag.columns("/hsv/command"))[:steps]
+    nominal = bag.columns("/hsv/nominal")
+    reference = input_columns(nominal, "reference_input.")[:steps]
+    active = np.abs(command - reference).max(axis=1, initial=0.0) > ACTIVE_INPUT
+    stamps = nominal["header.stamp"][:steps] * 1e-9
+    period = float(np.median(np.diff(stamps))) if steps > 1 else 0.0
+    seconds = np.count_nonzero(active) * period
+    if seconds < LEAST_ACTIVE_TIME:
+        raise RecordingError(
+            f"{bag.path}: the controller was active for {seconds:.2f} s, "
+            f"expected at least {LEAST_ACTIVE_TIME:g} s: a replay would prove nothing"
+        )
+
+
+def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the fault parameters that give the recorded active set, the attached schedule changed where it was not."""
+    injector = FaultInjector.from_parameters(values)
+    command = np.zeros(2)
+    changed = False
+    for _, status in bag.decode("/hsv/fault_status"):
+        recorded = [Fault(f.channel, f.type, f.value) for f in status.active]
+        planned = list(injector.acting(status.step))
+        if planned != recorded:
+            changed = True
+            for fault in planned:
+                if fault.channel not in {f.channel for f in recorded}:
+                    injector.clear(fault.channel)
+            kept = list(injector.acting(status.step))
+            same = next((i for i, f in enumerate(recorded) if i >= len(kept) or kept[i] != f), len(recorded))
+            for fault in recorded[same:]:
+                injector.inject(fault)
+        injector.step(status.step, command)
+    return injector.parameters(float(values["period"])) if changed else {}

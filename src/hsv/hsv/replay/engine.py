@@ -1,0 +1,153 @@
+"""Feeding processes with messages in lockstep and comparing what they make of them with what was recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rosbags.typesys.store import Typestore
+
+from hsv.errors import RecordingError
+from hsv.graph.description import TOPICS
+from hsv.recording.compare import Comparison, compare
+from hsv.recording.fields import blank, nanoseconds
+from hsv.recording.reader import Bag
+from hsv.recording.track import Track
+from hsv.replay.attached import broken_off, complete_steps
+from hsv.replay.processes import PROCESSES, Process
+
+Progress = Callable[[str, int, int], None]
+"""Name of what is done, steps done, steps in all."""
+
+PROGRESS_INTERVAL = 200
+WIRE_ALIGNMENT = 4
+"""What is sent over DDS is padded with zeros to a multiple of so many bytes."""
+
+
+@dataclass(frozen=True)
+class ProcessComparison:
+    """The outputs of one process compared with the recorded ones."""
+
+    process: Process
+    topics: tuple[Comparison, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every output is equal within the tolerance."""
+        return all(topic.first is None for topic in self.topics)
+
+    @property
+    def identical(self) -> bool:
+        """Whether every output is equal in every byte."""
+        return all(topic.identical for topic in self.topics)
+
+
+class _Outputs:
+    """Output messages of a process, filled again at every step and kept as bytes."""
+
+    def __init__(self, types: Typestore, topics: Mapping[str, str]) -> None:
+        self._types = types
+        self._kinds = topics
+        self.messages = {topic: blank(types, kind) for topic, kind in topics.items()}
+        self._fields = {topic: set(vars(message)) for topic, message in self.messages.items()}
+        self.tracks = {topic: Track(topic, kind, types, [], [], "replay") for topic, kind in topics.items()}
+
+    def keep(self) -> None:
+        """Serialize what stands in the messages now."""
+        for topic, message in self.messages.items():
+            if vars(message).keys() != self._fields[topic]:
+                new = ", ".join(sorted(vars(message).keys() - self._fields[topic]))
+                raise RecordingError(f"topic {topic}: recorded with another definition, expected a field {new}")
+            data = bytes(self._types.serialize_cdr(message, self._kinds[topic]))
+            track = self.tracks[topic]
+            track.data.append(data + bytes(-len(data) % WIRE_ALIGNMENT))
+            track.times.append(nanoseconds(message.clock if topic == "/clock" else message.header.stamp))
+
+
+def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Progress) -> ProcessComparison:
+    """Feed ``process`` with its recorded inputs and compare what it makes of them.
+
+    Args:
+        bag: The recorded run.
+        process: The process under test.
+        values: Flat parameters of the component under test.
+        progress: Told how far it is.
+
+    Raises:
+        RecordingError: A topic is missing or recorded with another definition.
+        ParameterError, DesignError: The component refuses its parameters.
+    """
+    component = process.build(values)
+    outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs})
+    recorded = [bag.track(topic) for topic in process.inputs]
+    steps = complete_steps(bag) if broken_off(bag) else min(len(track.data) for track in recorded)
+
+    def step(inputs: tuple[Any, ...]) -> None:
+        process.step(component, inputs, tuple(outputs.messages.values()), bag.types.types.__getitem__)
+        outputs.keep()
+
+    if process.restarts:
+        step(())
+        steps -= 1
+    messages = zip(*(track.cut(steps).decode() for track in recorded), strict=True)
+    for number, inputs in enumerate(messages):
+        if number % PROGRESS_INTERVAL == 0:
+            progress(process.node.name, number, steps)
+        step(tuple(message for _, message in inputs))
+    progress(process.node.name, steps, steps)
+    return compare_process(bag, process, outputs.tracks)
+
+
+def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progress) -> list[ProcessComparison]:
+    """Fly the whole loop again, process after process, and compare everything.
+
+    Args:
+        bag: The recorded run.
+        controller: Name of the controller that closes the loop.
+        values: Flat parameters of all components.
+        progress: Told how far it is.
+
+    Raises:
+        As :func:`replay`.
+    """
+    processes = chosen(controller)
+    components = {name: process.build(values) for name, process in processes.items()}
+    made = {
+        name: _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs})
+        for name, process in processes.items()
+    }
+    latest: dict[str, Any] = {}
+    for outputs in made.values():
+        latest |= outputs.messages
+    last = components["plant"].steps
+    first = True
+    while first or latest["/hsv/state"].status == 0:
+        for name, process in processes.items():
+            inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
+            outputs = tuple(made[name].messages.values())
+            process.step(components[name], inputs, outputs, bag.types.types.__getitem__)
+            made[name].keep()
+        first = False
+        if latest["/hsv/state"].step % PROGRESS_INTERVAL == 0:
+            progress("rerun", latest["/hsv/state"].step, last)
+    progress("rerun", last, last)
+    return [compare_process(bag, process, made[name].tracks) for name, process in processes.items()]
+
+
+def chosen(controller: str) -> dict[str, Process]:
+    """Return the processes of a graph with ``controller``, in the order in which a step passes through them."""
+    names = [name for name in PROCESSES if name == controller or PROCESSES[name].node.publishes[0] != "/hsv/command"]
+    return {name: PROCESSES[name] for name in names}
+
+
+def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> ProcessComparison:
+    """Compare the outputs of ``process`` with those in ``bag``; of a run that was broken off, its complete steps."""
+    limit = complete_steps(bag) if broken_off(bag) else None
+    compared = []
+    for topic in process.outputs:
+        expected, actual = bag.track(topic), tracks[topic]
+        if limit is not None:
+            expected, actual = expected.cut(limit), actual.cut(limit)
+        compared.append(compare(expected, actual, process.ignored, process.tolerance))
+    return ProcessComparison(process, tuple(compared))
