@@ -9,8 +9,12 @@ from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import PreparedRun, prepare
 from launch import LaunchContext, LaunchDescription
+
+
+_prepared: list[PreparedRun] = []
+"""Kept for as long as the launch file runs: with it goes the folder of parameter files."""
 
 
 def _nodes(context: LaunchContext) -> list[object]:
@@ -18,6 +22,7 @@ def _nodes(context: LaunchContext) -> list[object]:
         LaunchConfiguration("scenario").perform(context),
         real_time_factor=float(LaunchConfiguration("real_time_factor").perform(context)),
     )
+    _prepared.append(prepared)
     nodes = [
         Node(
             package=node.package,

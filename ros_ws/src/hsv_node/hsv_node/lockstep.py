@@ -8,25 +8,23 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run
-from rclpy.node import Node
 
 from hsv.graph import description
 from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
+from hsv_node.process import ProcessNode
 from hsv_node.qos import LATCHED, STEP
 
 SAY_AFTER = 2.0
 """Seconds of waiting for peers before this is said, and between saying it again."""
 
 
-class LockstepNode(Node):
+class LockstepNode(ProcessNode):
     """A node of the graph description that reacts to the messages of a step and never to timers."""
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
-        self.exit_code: int | None = None
-        """Set when the node wants to end, to the exit code of the process."""
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
         self._inputs: dict[str, Any] = {}
@@ -67,20 +65,6 @@ class LockstepNode(Node):
         if missing and time.monotonic() > self._patience_ends:
             self._patience_ends = time.monotonic() + SAY_AFTER
             self.get_logger().info("waiting for " + ", ".join(missing))
-
-    def finish(self, code: int) -> None:
-        """End the process with ``code`` once the current callback has returned."""
-        self.exit_code = code
-
-    def poll(self) -> None:
-        """Called between messages, at least four times a second; overridden where something must be watched."""
-
-    def close(self) -> None:
-        """Called once before the process ends; overridden where something must be saved."""
-
-    def patience(self) -> float:
-        """Return how long (s) to wait for a message before :meth:`poll` is due."""
-        return 0.25
 
     def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""

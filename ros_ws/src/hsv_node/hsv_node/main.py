@@ -13,10 +13,10 @@ from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from hsv.errors import HsvError
-from hsv_node.lockstep import LockstepNode
+from hsv_node.process import ProcessNode
 
 
-def run_node(build: Callable[[], LockstepNode], name: str, args: Sequence[str] | None = None) -> int:
+def run_node(build: Callable[[], ProcessNode], name: str, args: Sequence[str] | None = None) -> int:
     """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
 
     Bad parameters end it before it joins the graph, with one line on standard error and exit code 2.

@@ -21,10 +21,12 @@ from hsv.cli.trim import trim
 from hsv.cli.verify import verify
 from hsv.errors import HsvError, RunError
 
+UsageError = typer.BadParameter.__bases__[0]
+"""Of an unknown option, a missing argument and the like; typer exports only this subclass of it."""
+
 app = typer.Typer(
     name="hsv",
     help="Software-in-the-loop flight of a flexible air-breathing hypersonic vehicle under Tube-MPC.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -36,7 +38,12 @@ for command in (trim, linearise, design, verify, scenarios, simulate, run, info,
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
     try:
-        app(prog_name="hsv")
+        # Out of typer's standalone mode, so that a usage error is one line as well.
+        sys.exit(app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False))
+    except UsageError as error:
+        _fail(f"{error.format_message()} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)", 2)
+    except typer.Abort:
+        _fail("interrupted", 130)
     except RunError as error:
         _fail(error, 1)
     except HsvError as error:

@@ -50,7 +50,11 @@ def tube_input(
     u_total: np.ndarray,
     u: np.ndarray,
 ) -> None:
-    """Write the feedback part, the sum of the three parts and the limited input, (2) each."""
+    """Write the feedback part, the sum of the three parts and the limited input, (2) each.
+
+    Where the sum is not finite (a measurement that is not a number) the input is the reference's: an actuator gets a
+    number whatever happens.
+    """
     for i in range(len(u)):
         feedback = 0.0
         for j in range(len(x)):
@@ -58,7 +62,8 @@ def tube_input(
             feedback += data.gain[i, j] * (measured - x_n[j] - x_r[j])
         u_feedback[i] = data.tau * feedback
         u_total[i] = u_feedback[i] + u_n[i] + u_r[i]
-        u[i] = min(max(u_total[i], data.minimum[i]), data.maximum[i])
+        wanted = u_total[i] if math.isfinite(u_total[i]) else u_r[i]
+        u[i] = min(max(wanted, data.minimum[i]), data.maximum[i])
 
 
 @dataclass(frozen=True)
@@ -164,8 +169,9 @@ class TubeLaw:
         planned_rate = float(reference[PITCH_RATE] + deviation[PITCH_RATE])
         error, tube = self._monitor.step((state - reference - deviation)[:N_RIGID], planned_rate, filter_state)
         level = tube.level(error) if tube else math.nan
-        inside = level <= 1.0
-        if not (math.isfinite(total[0]) and math.isfinite(total[1])):
+        valid = math.isfinite(total[0]) and math.isfinite(total[1])
+        inside = valid and level <= 1.0
+        if not valid:
             status = TubeStatusCode.INVALID_INPUT
         elif tube is None:
             status = TubeStatusCode.NO_SET

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.control_law import ControlLaw
+from hsv.control.nominal_law import NOT_IN_FAMILY
 from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
 from hsv.control.notch_filter import NotchFilter, NotchResult
 from hsv.control.tube_law import TubeResult
@@ -19,6 +20,8 @@ from hsv.faults.actuator import FaultInjector, FaultResult
 from hsv.vehicle.plant import PlantResult
 
 Message = Any
+
+NO_GAIN = np.empty(0)
 
 
 def state_vector(message: Message) -> np.ndarray:
@@ -112,6 +115,7 @@ def plan_nominal(trajectory: NominalTrajectory, state: Message, nominal: Message
     fill_input(nominal.reference_input, result.reference_input)
     fill_state(nominal.deviation, result.deviation)
     fill_input(nominal.input, result.input)
+    nominal.gain = result.gain.ravel() if result.gain_index == NOT_IN_FAMILY else NO_GAIN
     nominal.gain_index, nominal.status = result.gain_index, int(result.status)
     return result
 

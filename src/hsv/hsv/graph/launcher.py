@@ -48,9 +48,9 @@ class _Process:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run ended: the exit code of the plant, or which node ended it (``culprit``), how, and its last words."""
+    """How a run ended: the exit code of the awaited node, or which other ended it (``culprit``), how, its last words."""
 
-    plant_code: int | None
+    code: int | None
     culprit: str = ""
     reason: str = ""
     last_words: tuple[str, ...] = ()
@@ -91,13 +91,13 @@ class Launcher:
         """Process ids by node name."""
         return {p.description.name: p.popen.pid for p in self._processes}
 
-    def wait(self) -> Ending:
-        """Wait for the plant to finish, or for any other node to end before it."""
+    def wait(self, awaited: str = PLANT.name) -> Ending:
+        """Wait for the node ``awaited`` to finish, or for any other to end before it; a plant that has landed may."""
         while True:
             for process in self._processes:
                 code = process.popen.poll()
-                if code is not None:
-                    return self._ending(process, code)
+                if code is not None and not (_landed(process, code) and awaited != PLANT.name):
+                    return self._ending(process, code, awaited)
             time.sleep(0.02)
 
     def stop(self) -> None:
@@ -148,15 +148,18 @@ class Launcher:
                     process.words.append(text)
                 self._on_line(process.description.name, text)
 
-    def _ending(self, process: _Process, code: int) -> Ending:
+    def _ending(self, process: _Process, code: int, awaited: str) -> Ending:
         if process.reader:
             process.reader.join(1.0)
-        if process.description is PLANT and code in (0, 3):
+        mine = process.description.name == awaited
+        if mine and (code == 0 or _landed(process, code)):
             return Ending(code)
         reason = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        return Ending(
-            code if process.description is PLANT else None, process.description.name, reason, tuple(process.words)
-        )
+        return Ending(code if mine else None, process.description.name, reason, tuple(process.words))
+
+
+def _landed(process: _Process, code: int) -> bool:
+    return process.description is PLANT and code in (0, 3)
 
 
 def _die_with_parent() -> None:

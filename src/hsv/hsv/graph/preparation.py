@@ -29,6 +29,8 @@ class PreparedRun:
     nodes: tuple[NodeDescription, ...]
     steps: int
     """Number of the last step if the flight does not diverge."""
+    folder: tempfile.TemporaryDirectory[str]
+    """Holds the parameter files; gone with this object."""
 
 
 def prepare(
@@ -54,7 +56,8 @@ def prepare(
     now = datetime.datetime.now(datetime.UTC)
     bag = bag or bags / f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     run_id = uuid.uuid4().hex
-    folder = Path(tempfile.mkdtemp(prefix="hsv_run_"))
+    temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
+    folder = Path(temporary.name)
     files = {
         "scenario.toml": text,
         "design.yaml": design_file.read_text(encoding="utf-8"),
@@ -87,7 +90,9 @@ def prepare(
     }
     (folder / "run.yaml").write_text(_yaml(run), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps)
+    return PreparedRun(
+        scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps, temporary
+    )
 
 
 def commit() -> str:
