@@ -4,6 +4,8 @@ import pytest
 
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import read_inputs
+from hsv.design.verification.tube import certified_set
+from hsv.design.verification.verifier import load_subject
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
@@ -21,3 +23,13 @@ def result(inputs):
 @pytest.fixture(scope="session")
 def design(result):
     return result.design
+
+
+@pytest.fixture(scope="session")
+def subject():
+    return load_subject(OFFLINE_DESIGN / "baseline.yaml")
+
+
+@pytest.fixture(scope="session")
+def found(subject):
+    return certified_set(subject)

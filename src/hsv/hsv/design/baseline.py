@@ -13,7 +13,7 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
-from hsv.design.inputs import DesignInputs, FlightPoint, InputSize
+from hsv.design.inputs import DesignInputs, FlightPoint
 from hsv.design.lmi import spectral_radii
 from hsv.design.model import DesignModel, design_model
 from hsv.design.nominal import NominalGain, NominalProblem, nested_gains
@@ -164,7 +164,8 @@ def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
     bound = bounds.symmetric(trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input)
     if not bound.min() > 0.0:
         raise DesignError(f"literal chain (30) to (35): |u_n| at most {bound.tolist()}, expected above zero")
-    size = InputSize(fuel_equivalence_ratio=float(bound[0]), elevator_deflection=float(bound[1]))
+    values = {"fuel_equivalence_ratio": float(bound[0]), "elevator_deflection": float(bound[1])}
+    size = inputs.nominal.input_bound.model_copy(update=values)
     return inputs.model_copy(update={"nominal": inputs.nominal.model_copy(update={"input_bound": size})})
 
 

@@ -1,0 +1,46 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hsv.design.sets.ellipsoid import ellipsoid
+from hsv.errors import DesignError
+
+FOOT = 0.3048
+ACCEPTED = 1.2 * 1.1 * np.array([42.0 * FOOT, 11.0 * FOOT, *np.radians([2.0, 1.9, 2.9])])
+
+
+def test_half_widths_are_those_of_the_study(found):
+    assert np.all(found.half_width[:5] <= ACCEPTED)
+
+
+def test_certificate_holds_and_fails_just_beyond(found):
+    assert min(found.certify()["lmi_smallest_eigenvalues"]) > 0.0
+    with pytest.raises(DesignError, match="inequality at vertex"):
+        dataclasses.replace(found, Q=0.99 * found.Q).certify()
+
+
+def test_boundary_points_stay_inside_under_extreme_disturbances_at_every_vertex(found):
+    rng = np.random.default_rng(3)
+    factor = np.linalg.cholesky(found.Q)
+    system, w = found.problem.system, found.problem.disturbance
+    directions = rng.normal(size=(2000, len(factor)))
+    errors = found.centre + directions / np.linalg.norm(directions, axis=1)[:, None] @ factor.T
+    signs = rng.choice((0.0, 1.0), size=(2000, 7))
+    d = w.lower + signs * (w.upper - w.lower)
+    for A, G in zip(system.A, system.G, strict=True):
+        assert found.level(errors @ A.T + d @ G.T).max() <= 1.0
+
+
+def test_level_is_one_on_the_half_width_and_zero_at_the_centre(found):
+    assert found.level(found.centre) == pytest.approx(0.0)
+    touching = found.centre + found.Q[:, 0] / found.half_width[0]
+    assert touching[0] - found.centre[0] == pytest.approx(found.half_width[0])
+    assert found.level(touching) == pytest.approx(1.0)
+
+
+def test_half_the_disturbance_gives_half_the_set(found, inputs):
+    problem = dataclasses.replace(found.problem, disturbance=found.problem.disturbance.scaled(0.5))
+    scales = inputs.invariant_set.state_scale.array(), inputs.invariant_set.input_scale.array()
+    half = ellipsoid(problem, *scales, [found.contraction])
+    np.testing.assert_allclose(half.half_width, 0.5 * found.half_width, rtol=0.02)

@@ -1,0 +1,84 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.design.disturbance import DisturbanceSet, inflated
+from hsv.design.error_system import tube_errors
+from hsv.design.region import Region, corners, fraction, record
+from hsv.design.tube import channel_model, tube_problem
+from hsv.vehicle.parameters import uncertainty_bounds
+
+
+@pytest.fixture(scope="module")
+def flight(subject):
+    inputs = subject.inputs
+    short = inputs.disturbance.model_copy(update={"duration": 104.0})
+    worst = {name: bound for name, bound in uncertainty_bounds().items()}
+    return Region(subject.design, inputs.model_copy(update={"disturbance": short})).fly(worst)
+
+
+def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
+    model = channel_model(subject.design)
+    signals = model.signals(record(flight))
+    a, lost, rest = signals.channels[:, :3], signals.channels[:, 3], signals.channels[:, 5:]
+    for k in (0, 100, 4999, 5000, 5150):
+        x = flight.history.state[k]
+        _, B = subject.design.polytope.at(x[0], x[1])
+        rebuilt = model.columns @ a[k] + B[:5, 1] * lost[k]
+        rebuilt[[0, 3]] += rest[k]
+        assert_allclose(rebuilt, signals.delta[k, :5], rtol=0.0, atol=1e-13)
+        assert_allclose(signals.remainder[k] + signals.fault[k], signals.delta[k], rtol=0.0, atol=1e-15)
+
+
+def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
+    lost = channel_model(subject.design).signals(record(flight)).channels[:, 3]
+    assert np.all(lost[:5000] == 0.0)
+    assert_allclose(lost[5000:], -0.1 * flight.history.command[5000:-1, 1], rtol=1e-12)
+
+
+def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
+    """One step of the convex combination of vertices from the true error gives the next one, notch states included."""
+    design = subject.design
+    model = channel_model(design)
+    errors = tube_errors(flight.history.state, flight.history.deviation, flight.reference, model.notch)
+    channels = model.signals(record(flight)).channels
+    ones = DisturbanceSet(-np.ones(7), np.ones(7))
+    for k in (1, 60, 700, 5001, 5100):
+        h, v = flight.history.state[k, :2]
+        A, B = design.polytope.at(h, v)
+        local = dataclasses.replace(
+            design, polytope=dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
+        )
+        system = tube_problem(local, ones).system
+        predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
+        assert_allclose(predicted, errors[k + 1], rtol=0.0, atol=1e-11)
+
+
+def test_fraction_is_balanced(found):
+    rows = fraction()
+    assert len(rows) == 257
+    assert rows[0] == {}
+    assert len(corners()) == 1025
+    signs = np.array([[np.sign(v) for v in row.values()] for row in rows[1:]])
+    assert_allclose(signs.T @ signs, 256 * np.eye(10))
+
+
+def test_membership_names_channel_and_step():
+    bounds = inflated(np.array([-1.0] * 3 + [-0.2] + [-1.0] * 3), np.array([2.0] * 3 + [0.0] + [1.0] * 3), 1.1)
+    channels = np.zeros((5, 7))
+    assert bounds.membership(channels).ratio == 0.0
+    channels[3, 1] = 3.3
+    worst = bounds.membership(channels)
+    assert (worst.channel, worst.step, worst.inside) == ("angle_of_attack_rate", 3, False)
+    assert worst.ratio == pytest.approx(1.5)
+    channels[4, 3] = 1e-6
+    assert bounds.membership(channels).channel == "lost_elevator"
+
+
+def test_report_and_back(found):
+    disturbance = found.problem.disturbance
+    again = DisturbanceSet.from_report(disturbance.report())
+    assert np.array_equal(again.lower, disturbance.lower)
+    assert np.array_equal(again.upper, disturbance.upper)

@@ -1,0 +1,43 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from hsv.control.design_file import find_design, read_design
+from hsv.design.baseline import _literal
+from hsv.design.tightening import check_plan, tighten
+from hsv.errors import DesignError
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+
+
+@pytest.fixture(scope="module")
+def bounds(found):
+    return tighten(found, INPUT_MINIMUM, INPUT_MAXIMUM)
+
+
+def test_extremes_of_the_tube_just_reach_the_limits(found, bounds):
+    system, w = found.problem.system, found.problem.disturbance
+    for i in range(2):
+        direction = found.Q @ system.F[i] / found.feedback[i]
+        direct = np.sort([system.F_d[i] * w.lower, system.F_d[i] * w.upper], axis=0).sum(axis=1)
+        most = system.F[i] @ (found.centre + direction) + direct[1]
+        least = system.F[i] @ (found.centre - direction) + direct[0]
+        assert bounds.upper[i] + most == pytest.approx(INPUT_MAXIMUM[i])
+        assert bounds.lower[i] + least == pytest.approx(INPUT_MINIMUM[i])
+
+
+def test_a_plan_that_does_not_fit_is_refused_with_the_amount(bounds):
+    highest = bounds.upper + np.array([-0.1, 0.02])
+    with pytest.raises(DesignError, match=r"upper tightened bound of elevator_deflection by 0\.02 rad"):
+        check_plan(bounds, bounds.lower, highest)
+
+
+def test_a_tube_too_wide_for_the_inputs_is_refused(found):
+    with pytest.raises(DesignError, match="more of fuel_equivalence_ratio than there is"):
+        tighten(dataclasses.replace(found, feedback=np.array([1.0, 0.1])), INPUT_MINIMUM, INPUT_MAXIMUM)
+
+
+def test_the_literal_chain_leaves_less_than_the_design_uses(bounds, inputs):
+    literal = _literal(inputs, bounds).nominal.input_bound.array()
+    assert np.all(literal < inputs.nominal.input_bound.array())
+    assert read_design(find_design("baseline")).nominal_input_bound == pytest.approx(inputs.nominal.input_bound.array())
