@@ -4,7 +4,7 @@ setup(
     name="hsv",
     version="0.1.0",
     packages=find_packages(include=["hsv", "hsv.*"]),
-    package_data={"hsv": ["**/*.toml"]},
+    package_data={"hsv": ["**/*.toml", "recording/report/template/*", "recording/layouts/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv"]),
         ("share/hsv", ["package.xml"]),
@@ -13,11 +13,13 @@ setup(
     install_requires=[
         "clarabel",
         "cvxpy",
+        "jinja2",
         "mcap",
         "numba",
         "numpy",
         "pint",
         "piqp",
+        "plotly",
         "pydantic",
         "pyyaml",
         "rich",

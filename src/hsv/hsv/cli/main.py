@@ -14,6 +14,7 @@ from hsv.cli.output import errors
 from hsv.cli.plot import plot
 from hsv.cli.recover import recover
 from hsv.cli.replay import replay
+from hsv.cli.report import report
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
@@ -31,7 +32,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot, replay, diff, recover):
+for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot, report, replay, diff, recover):
     app.command()(command)
 
 

@@ -16,6 +16,7 @@ def run(
     real_time_factor: Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")] = 0.0,
     bag: Annotated[Path | None, typer.Option(help="Bag to write; default: bags/<scenario>_<UTC>.")] = None,
     step_timeout: Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")] = 10.0,
+    report: Annotated[bool, typer.Option(help="Write the report into the bag's folder.")] = True,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
@@ -69,14 +70,22 @@ def run(
     if ending.culprit:
         words = "".join(f"\n  {word}" for word in ending.last_words)
         raise RunError(f"{ending.culprit} {ending.reason}; the bag is {prepared.bag}. Its last words:{words}")
-    data = flight_data(Bag(prepared.bag))
+    recorded = Bag(prepared.bag)
+    data = flight_data(recorded)
+    extra = {"bag": str(prepared.bag)}
+    if report:
+        from hsv.recording.report.page import write_report
+
+        page = prepared.bag / "report.html"
+        write_report([recorded], page, paper_units=units is Units.paper)
+        extra["report"] = str(page)
     report_flight(
         loaded,
         flight_metrics(data),
-        diverged_at=float(data.time[-1]) if ending.plant_code == 3 else None,
+        diverged_at=float(data.time[-1]) if ending.code == 3 else None,
         wall_time=clock["end"] - clock["start"],
         simulated_time=float(data.time[-1]),
         units=units,
         json=json,
-        extra={"bag": str(prepared.bag)},
+        extra=extra,
     )

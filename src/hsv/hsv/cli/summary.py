@@ -6,6 +6,7 @@ from typing import Any
 
 from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
 from hsv.errors import RunError
+from hsv.simulation.limits import verdicts
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario
 
@@ -27,14 +28,13 @@ def report_flight(
         RunError: The flight diverged; the message says when.
     """
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
-    verdicts = limit_verdicts(scenario, metrics, units)
     factor = simulated_time / wall_time if wall_time > 0.0 else 0.0
     if json:
         print_json(
             {
                 "scenario": scenario.name,
                 "diverged_at_s": diverged_at,
-                "within_limits": diverged_at is None and all(text.startswith("within") for text in verdicts.values()),
+                "within_limits": diverged_at is None and all(v.within for v in verdicts(scenario, metrics).values()),
                 "metrics": to_json(quantities, units),
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
@@ -42,7 +42,7 @@ def report_flight(
             }
         )
     else:
-        print_table(scenario.title, quantities, units, verdicts)
+        print_table(scenario.title, quantities, units, limit_verdicts(scenario, metrics, units))
         console.print(f"flown {simulated_time:.6g} s in {wall_time:.3g} s: {factor:.3g} x real time")
         for name, value in (extra or {}).items():
             console.print(f"{name:5} {value}", soft_wrap=True)
@@ -52,12 +52,12 @@ def report_flight(
 
 def limit_verdicts(scenario: Scenario, metrics: dict[str, float], units: Units) -> dict[str, str]:
     """Return, for each metric with a limit, whether its magnitude stays within it, in words."""
-    verdicts = {}
-    for name, limit in scenario.limits.items():
-        value, unit = shown((limit, METRICS[name].unit), units)
+    words = {}
+    for name, verdict in verdicts(scenario, metrics).items():
+        value, unit = shown((verdict.limit, METRICS[name].unit), units)
         text = f"{value:.4g}{'' if unit == '1' else ' ' + unit}"
-        if name not in metrics:
-            verdicts[name] = f"not reached (limit {text})"
+        if verdict.value is None:
+            words[name] = f"not reached (limit {text})"
         else:
-            verdicts[name] = f"within {text}" if abs(metrics[name]) <= limit else f"over {text}"
-    return verdicts
+            words[name] = f"{'within' if verdict.within else 'over'} {text}"
+    return words

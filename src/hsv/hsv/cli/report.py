@@ -1,0 +1,33 @@
+"""The command ``hsv report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import UnitsOption
+from hsv.cli.output import Units, check_target, console
+
+
+def report(
+    bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are laid over one another.")],
+    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
+    units: UnitsOption = Units.si,
+) -> None:
+    """Write a page about recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
+
+    The page is one file that opens offline; units can be switched on it.
+
+    Example: hsv report bags/case1_20260101T000000Z bags/case1_no_notch_20260101T000000Z --out comparison.html
+    """
+    from hsv.errors import QuantityError
+    from hsv.recording.reader import Bag
+    from hsv.recording.report.page import write_report
+
+    if out.suffix not in (".html", ".htm"):
+        raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
+    check_target(out, "out")
+    write_report([Bag(bag) for bag in bags], out, paper_units=units is Units.paper)
+    console.print(f"written {out}", soft_wrap=True)

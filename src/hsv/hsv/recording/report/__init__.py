@@ -1,0 +1,1 @@
+"""The report of recorded flights: one HTML page that needs nothing but itself."""

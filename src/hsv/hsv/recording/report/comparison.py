@@ -1,0 +1,31 @@
+"""Parameters of several runs side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from hsv.recording.report.run import DECLARED, ReportedRun
+from hsv.recording.report.values import Value
+
+
+@dataclass(frozen=True)
+class Row:
+    """A parameter; ``values`` holds one value where all runs agree, else one a run, None where it lacks it."""
+
+    name: str
+    description: str
+    values: tuple[Value | None, ...]
+
+
+def comparisons(runs: Sequence[ReportedRun]) -> dict[str, list[Row]]:
+    """Return the rows of each part of the parameters: scenario, design."""
+    return {part: list(_rows(part, runs)) for part in ("scenario", "design")}
+
+
+def _rows(part: str, runs: Sequence[ReportedRun]) -> Iterator[Row]:
+    for name in dict.fromkeys(name for run in runs for name in run.parameters[part]):
+        values = tuple(run.parameters[part].get(name) for run in runs)
+        if all(value == values[0] for value in values):
+            values = values[:1]
+        yield Row(name, DECLARED[name].description if name in DECLARED else "", values)

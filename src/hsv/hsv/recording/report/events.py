@@ -1,0 +1,124 @@
+"""What happened in a flight, in the order of time: faults, limits, the tube, warnings, changed parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hsv.recording.info import TUBE_STATUS
+from hsv.recording.reader import Bag
+from hsv.recording.report.panels import INPUTS, STATE
+
+JOIN_WITHIN = 0.5
+"""Seconds: intervals of one kind that are closer are shown as one."""
+
+DIAGNOSTICS_PERIOD = 1.0
+"""Seconds of simulated time between the diagnostics of a node."""
+
+LOG_WARNING = 30
+"""Level of a warning in rcl_interfaces/msg/Log; errors are above it."""
+
+_DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened; ``end`` is None where it lasted until the end, equal to ``start`` for an instant."""
+
+    start: float
+    end: float | None
+    kind: str
+    """``fault``, ``saturation``, ``tube``, ``warning``, ``error`` or ``change``."""
+    text: str
+    subject: str = ""
+    """The input or node concerned."""
+
+
+def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
+    """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.recording.info.describe`."""
+    events = [*_faults(description), *_excursions(description), *_saturation(bag), *_ending(bag)]
+    events += [*_diagnostics(bag), *_log(bag), *_parameter_changes(bag)]
+    return sorted(events, key=lambda event: event.start)
+
+
+def _faults(description: dict[str, Any]) -> Iterator[Event]:
+    for fault in description["faults"] or ():
+        channel = fault["channel"].replace("_", " ")
+        text = f"{channel}: {fault['type'].replace('_', ' ')} {fault['value']:.6g}"
+        yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
+
+
+def _excursions(description: dict[str, Any]) -> list[Event]:
+    excursions = description["tube"]["excursions"] if description["tube"] else ()
+    return _joined(Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in excursions)
+
+
+def _saturation(bag: Bag) -> Iterator[Event]:
+    if TUBE_STATUS not in bag.topics:
+        return
+    columns = bag.columns(TUBE_STATUS)
+    time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
+    for column, name in enumerate(INPUTS):
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], saturated[:, column], [False])).astype(np.int8)))
+        text = f"command of {name.replace('_', ' ')} limited"
+        intervals = (
+            Event(float(time[first]), float(time[over]) if over < len(time) else None, "saturation", text, name)
+            for first, over in edges.reshape(-1, 2)
+        )
+        yield from _joined(intervals)
+
+
+def _ending(bag: Bag) -> Iterator[Event]:
+    columns, constants = bag.columns(STATE), bag.constants(STATE)
+    last = float(columns["header.stamp"][-1]) * 1e-9
+    if columns["status"][-1] == constants["DIVERGED"]:
+        yield Event(last, last, "error", "the flight diverged: the state left the range of the model", "plant")
+    elif columns["status"][-1] != constants["FINISHED"]:
+        yield Event(last, last, "error", "the recording breaks off: the run did not reach its end", "plant")
+
+
+def _diagnostics(bag: Bag) -> list[Event]:
+    if "/diagnostics" not in bag.topics:
+        return []
+    found = []
+    for time, message in bag.decode("/diagnostics"):
+        for status in message.status:
+            if status.level in _DIAGNOSTIC_LEVELS:
+                kind = _DIAGNOSTIC_LEVELS[status.level]
+                found.append(Event(time * 1e-9, time * 1e-9, kind, f"{status.name}: {status.message}", status.name))
+    return _joined(found, within=1.5 * DIAGNOSTICS_PERIOD)
+
+
+def _log(bag: Bag) -> Iterator[Event]:
+    if "/rosout" not in bag.topics:
+        return
+    for time, message in bag.decode("/rosout"):
+        if message.level >= LOG_WARNING:
+            kind = "warning" if message.level == LOG_WARNING else "error"
+            yield Event(time * 1e-9, time * 1e-9, kind, f"{message.name}: {message.msg}", message.name)
+
+
+def _parameter_changes(bag: Bag) -> Iterator[Event]:
+    if "/parameter_events" not in bag.topics:
+        return
+    for time, message in bag.decode("/parameter_events"):
+        names = ", ".join(parameter.name for parameter in message.changed_parameters)
+        if names and time > 0:
+            yield Event(time * 1e-9, time * 1e-9, "change", f"{message.node}: {names} changed", message.node)
+
+
+def _joined(events: Iterable[Event], within: float = JOIN_WITHIN) -> list[Event]:
+    """Return ``events``, in the order of time, with those of one text that nearly touch made one."""
+    last: dict[str, int] = {}
+    joined: list[Event] = []
+    for event in events:
+        index = last.get(event.text)
+        if index is not None and (end := joined[index].end) is not None and event.start - end <= within:
+            joined[index] = replace(joined[index], end=event.end)
+            continue
+        last[event.text] = len(joined)
+        joined.append(event)
+    return joined

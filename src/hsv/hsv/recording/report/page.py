@@ -1,0 +1,82 @@
+"""The report as one HTML page that asks nothing of the network: style, script, plotting library and data inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from hsv.errors import RecordingError
+from hsv.recording.reader import Bag
+from hsv.recording.report import text
+from hsv.recording.report.comparison import comparisons
+from hsv.recording.report.panels import GROUPS
+from hsv.recording.report.payload import all_panels, compressed, payload
+from hsv.recording.report.run import ReportedRun, reported_runs
+from hsv.recording.report.values import Quantity, Section, Table
+from hsv.simulation.metrics import METRICS
+from hsv.simulation.scenario import scenario_names
+
+EVENTS_SHOWN = 200
+"""Events of a run that are listed; of a run with more, the page says how many there are."""
+
+
+def write_report(bags: Sequence[Bag], out: Path, *, paper_units: bool = False) -> None:
+    """Write the report of ``bags``, laid over one another, to the HTML file ``out``.
+
+    Args:
+        bags: One flight or several, which are then compared.
+        out: File to write.
+        paper_units: Whether the page opens in the paper's units; it can be switched there.
+
+    Raises:
+        RecordingError: A bag holds no flight, or the file cannot be written.
+    """
+    page = render(reported_runs(bags), paper_units=paper_units)
+    try:
+        out.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"{out}: cannot be written ({error.strerror}), expected an HTML file to write") from None
+
+
+def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
+    """Return the page."""
+    environment = Environment(
+        loader=PackageLoader("hsv.recording.report", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": text.number, "words": text.words}
+    environment.tests |= {
+        "quantity": lambda value: isinstance(value, Quantity),
+        "table": lambda value: isinstance(value, Table),
+        "section": lambda value: isinstance(value, Section),
+    }
+    plots, numbers = payload(runs)
+    return environment.get_template("page.html.j2").render(
+        runs=runs,
+        paper_units=paper_units,
+        groups=GROUPS,
+        panels=all_panels(runs),
+        metrics={name: metric for name, metric in METRICS.items() if any(name in run.metrics for run in runs)},
+        comparisons=comparisons(runs),
+        shipped_scenarios=scenario_names(),
+        events_shown=EVENTS_SHOWN,
+        quantity=text.quantity,
+        unit=text.unit,
+        style=_asset("style.css"),
+        scripts=[_asset("charts.js"), _asset("page.js")],
+        plots=plots,
+        numbers=Markup(numbers),
+        library=Markup(compressed(get_plotlyjs().encode())),
+    )
+
+
+def _asset(name: str) -> Markup:
+    return Markup(files("hsv.recording.report").joinpath("template", name).read_text(encoding="utf-8"))

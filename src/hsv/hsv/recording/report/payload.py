@@ -1,0 +1,124 @@
+"""What the page's script draws: numbers in one compressed block, and a description of the panels that use them."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hsv.recording.report.curves import DrawnCurve
+from hsv.recording.report.events import Event
+from hsv.recording.report.panels import Kind, Panel
+from hsv.recording.report.run import ReportedRun
+from hsv.recording.report.text import unit_html
+from hsv.units import to_paper
+
+_COMMON = (Kind.reference, Kind.bound)
+"""Kinds that are drawn once, for all flights, where they are the same in all."""
+
+
+def compressed(data: bytes) -> str:
+    """Return ``data`` gzipped, as base64; the same text for the same data."""
+    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+
+
+class Numbers:
+    """Arrays one after the other, in single precision: seven digits, more than a plot can show."""
+
+    def __init__(self) -> None:
+        self._blocks: list[bytes] = []
+        self._known: dict[bytes, int] = {}
+        self.lengths: list[int] = []
+
+    def add(self, values: np.ndarray) -> int:
+        """Return the number of the array, which is stored once."""
+        with np.errstate(over="ignore"):
+            block = np.asarray(values, "<f4").tobytes()
+        if block not in self._known:
+            self._known[block] = len(self.lengths)
+            self._blocks.append(block)
+            self.lengths.append(len(values))
+        return self._known[block]
+
+    def packed(self) -> str:
+        """Return all arrays, compressed."""
+        return compressed(b"".join(self._blocks))
+
+
+def payload(runs: Sequence[ReportedRun]) -> tuple[dict[str, Any], str]:
+    """Return the description of the plots, as plain data, and the numbers they draw, compressed."""
+    numbers = Numbers()
+    panels = [_panel(panel, runs, numbers) for panel in all_panels(runs)]
+    described = {
+        "runs": [{"label": run.label, "end": run.duration} for run in runs],
+        "panels": panels,
+        "lengths": numbers.lengths,
+    }
+    return described, numbers.packed()
+
+
+def all_panels(runs: Sequence[ReportedRun]) -> list[Panel]:
+    """Return the panels that any of ``runs`` has, in the order of the page."""
+    longest = max(runs, key=lambda run: len(run.curves.panels)).curves.panels
+    others = [panel for run in runs for panel in run.curves.panels if panel not in longest]
+    return [*longest, *dict.fromkeys(others)]
+
+
+def _panel(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> dict[str, Any]:
+    drawn = [run.curves.curves.get(panel.name, []) for run in runs]
+    curves: list[dict[str, Any]] = []
+    for index in sorted(range(len(runs)), key=lambda index: _extent(drawn[index]), reverse=True):
+        for curve in drawn[index]:
+            common = curve.kind in _COMMON and _agreed(curve, drawn)
+            described = {"kind": curve.kind, "label": curve.label, "run": None if common else index}
+            if common and any(described.items() <= other.items() for other in curves):
+                continue
+            time = runs[index].curves.time
+            time = time if len(curve.y) == len(time) else time[[0, -1]]
+            curves.append(described | {"x": numbers.add(time), "y": numbers.add(curve.y)})
+    factor, unit = to_paper(1.0, panel.unit)
+    return {
+        "name": panel.name,
+        "units": {
+            "si": {"unit": unit_html(panel.unit), "factor": 1.0},
+            "paper": {"unit": unit_html(unit), "factor": factor},
+        },
+        "curves": curves,
+        "limits": sorted({limit for run in runs for limit in run.input_limits.get(panel.name, ())}),
+        "shades": _shades(panel, runs),
+    }
+
+
+def _agreed(wanted: DrawnCurve, drawn: Sequence[Sequence[DrawnCurve]]) -> bool:
+    """Return whether a curve is the same in all flights that have it."""
+    return all(np.array_equal(curve.y, wanted.y) for curves in drawn for curve in curves if curve.label == wanted.label)
+
+
+def _extent(curves: Sequence[DrawnCurve]) -> float:
+    """Return the range of the actual curve: the widest is drawn first, so that it hides no other."""
+    finite = [curve.y[np.isfinite(curve.y)] for curve in curves if curve.kind is Kind.actual]
+    return max((float(np.ptp(y)) for y in finite if len(y)), default=0.0)
+
+
+def _shades(panel: Panel, runs: Sequence[ReportedRun]) -> list[dict[str, Any]]:
+    shades: dict[tuple[str, float, float], list[int]] = {}
+    for index, run in enumerate(runs):
+        for event in run.events:
+            if _belongs(event, panel):
+                end = run.duration if event.end is None else event.end
+                shades.setdefault((event.kind, event.start, end), []).append(index)
+    return [{"kind": kind, "from": start, "to": end, "runs": owners} for (kind, start, end), owners in shades.items()]
+
+
+def _belongs(event: Event, panel: Panel) -> bool:
+    match event.kind:
+        case "fault":
+            return True
+        case "tube":
+            return panel.shading == "tube"
+        case "saturation":
+            return panel.shading == event.subject
+    return False

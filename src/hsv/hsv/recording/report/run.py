@@ -1,0 +1,137 @@
+"""A recorded flight as the report tells it."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hsv.control.design_file import parse_parameters
+from hsv.errors import HsvError, RecordingError
+from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
+from hsv.recording.flight import flight_data
+from hsv.recording.info import describe
+from hsv.recording.reader import Bag
+from hsv.recording.report.curves import FlightCurves, flight_curves
+from hsv.recording.report.events import Event, flight_events
+from hsv.recording.report.panels import INPUTS
+from hsv.recording.report.values import Value, parameters, tree
+from hsv.simulation.limits import Verdict, verdicts
+from hsv.simulation.metrics import flight_metrics
+from hsv.simulation.scenario import Scenario, parse_scenario
+
+DECLARED = {p.name: p for table in (LOCKSTEP_PARAMETERS, *NODE_PARAMETERS.values()) for p in table}
+"""Every parameter of every node, by name."""
+
+
+@dataclass(frozen=True)
+class ReportedRun:
+    """Everything the page says about one bag."""
+
+    label: str
+    description: dict[str, Any]
+    scenario: Scenario | None
+    """None where the bag holds none that can be read; :attr:`remark` says why."""
+    scenario_text: str
+    remark: str
+    metrics: dict[str, float]
+    verdicts: dict[str, Verdict]
+    curves: FlightCurves
+    events: list[Event]
+    parameters: dict[str, dict[str, Value]]
+    """Of the scenario and of the design."""
+    input_limits: dict[str, tuple[float, float]]
+    certificate: Value | None
+
+    @property
+    def custom(self) -> dict[str, str]:
+        """What the recorder was told about the run: run id, commit, design and its hash, ..."""
+        return dict(self.description["custom_data"])
+
+    @property
+    def folder(self) -> Path:
+        """The bag's folder."""
+        return Path(self.description["path"]).parent
+
+    @property
+    def duration(self) -> float:
+        """Simulated time of the last step, seconds."""
+        return float(self.curves.time[-1])
+
+    @property
+    def failure(self) -> str:
+        """How the flight failed to come to its end; empty if it did not."""
+        return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
+
+    @property
+    def good(self) -> bool:
+        """Whether the flight came to its end within every limit."""
+        return not self.failure and all(verdict.within for verdict in self.verdicts.values())
+
+
+def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
+    """Return what the page says about each of ``bags``, labelled so that they can be told apart.
+
+    Raises:
+        RecordingError: A bag holds no flight.
+    """
+    scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
+    count = Counter(scenarios)
+    labels = [
+        name if count[name] == 1 else f"{name} ({bag.path.parent.name})"
+        for name, bag in zip(scenarios, bags, strict=True)
+    ]
+    return [_reported_run(bag, label) for bag, label in zip(bags, labels, strict=True)]
+
+
+def _reported_run(bag: Bag, label: str) -> ReportedRun:
+    curves = flight_curves(bag)
+    description = describe(bag)
+    metrics = flight_metrics(flight_data(bag))
+    scenario_text = bag.attachments.get("scenario.toml", b"").decode(errors="replace")
+    scenario, remark = _scenario(scenario_text, bag.custom_data.get("scenario", label))
+    values = {name: _attached_parameters(bag, f"{name}.yaml") for name in ("scenario", "design")}
+    return ReportedRun(
+        label=label,
+        description=description,
+        scenario=scenario,
+        scenario_text=scenario_text,
+        remark=remark,
+        metrics=metrics,
+        verdicts=verdicts(scenario, metrics) if scenario else {},
+        curves=curves,
+        events=flight_events(bag, description),
+        parameters={name: parameters(flat, DECLARED) for name, flat in values.items()},
+        input_limits=_input_limits(values["design"]),
+        certificate=_certificate(bag),
+    )
+
+
+def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
+    if not text:
+        return None, "no scenario is attached to the bag, so there are no limits to judge by"
+    try:
+        return parse_scenario(text, name), ""
+    except HsvError as error:
+        return None, f"the attached scenario cannot be read by this version: {error}"
+
+
+def _attached_parameters(bag: Bag, name: str) -> dict[str, Any]:
+    text = bag.attachments.get(name, b"").decode(errors="replace")
+    return parse_parameters(text, f"{bag.path}: {name}") if text else {}
+
+
+def _input_limits(design: dict[str, Any]) -> dict[str, tuple[float, float]]:
+    low, high = design.get("input.minimum", []), design.get("input.maximum", [])
+    return dict(zip(INPUTS, zip(low, high, strict=False), strict=False))
+
+
+def _certificate(bag: Bag) -> Value | None:
+    text = bag.attachments.get("certificate.json")
+    try:
+        return None if text is None else tree(json.loads(text))
+    except ValueError as error:
+        raise RecordingError(f"{bag.path}: attached certificate.json: {error}") from None
