@@ -48,6 +48,13 @@ ROBUST_MPC = replace(TUBE_MPC, name="robust_mpc", executable="robust_mpc")
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
 
+STAND_IN = NodeDescription("stand_in", "hsv_bringup", "stand_in", (), ())
+"""Not of the graph: takes the place of all others when one node is replayed."""
+
+PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
+"""Not of the graph: republishes a bag."""
+
+
 def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
     """Return all nodes of the graph with the named controller, in start order."""
     return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLERS[controller], FAULT_INJECTOR, PLANT)

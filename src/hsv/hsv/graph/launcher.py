@@ -48,7 +48,7 @@ class _Process:
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run ended: the exit code of the awaited node, or which other ended it (``culprit``), how, its last words."""
+    """How a run ended: the exit code of the awaited node, or which other ended it (``culprit``), how, last words."""
 
     code: int | None
     culprit: str = ""

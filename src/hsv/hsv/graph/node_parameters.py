@@ -32,6 +32,14 @@ RECORDER_PARAMETERS = (
     Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
 )
 
+STAND_IN_PARAMETERS = (
+    Parameter("stand_in.bag", "", "bag to feed the node from"),
+    Parameter("stand_in.node", "", "node under test"),
+    Parameter("stand_in.directory", "", "bag to write with its answers, a new directory"),
+    Parameter("stand_in.timeout", 30.0, "wall time to wait for an answer", "s", 0.1, 1e6),
+)
+"""Of the stand-in for all other nodes, in a replay over DDS."""
+
 NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     "plant": (*PLANT_PARAMETERS, *PACE_PARAMETERS),
     "notch_filter": NOTCH_PARAMETERS,

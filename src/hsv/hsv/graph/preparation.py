@@ -6,6 +6,7 @@ import datetime
 import subprocess
 import tempfile
 import uuid
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,7 +62,7 @@ def prepare(
     files = {
         "scenario.toml": text,
         "design.yaml": design_file.read_text(encoding="utf-8"),
-        "scenario.yaml": _yaml(scenario.parameters()),
+        "scenario.yaml": parameter_yaml(scenario.parameters()),
     }
     certificate = design_file.with_suffix(".certificate.json")
     if certificate.is_file():
@@ -88,7 +89,7 @@ def prepare(
             }.items()
         ],
     }
-    (folder / "run.yaml").write_text(_yaml(run), encoding="utf-8")
+    (folder / "run.yaml").write_text(parameter_yaml(run), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
     return PreparedRun(
         scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps, temporary
@@ -104,6 +105,7 @@ def commit() -> str:
         return "unknown"
 
 
-def _yaml(parameters: dict[str, Any]) -> str:
+def parameter_yaml(parameters: Mapping[str, Any]) -> str:
+    """Return flat parameters as the text of a ROS 2 parameter file for every node."""
     # Dotted names need no nesting: rcl takes them as they are.
-    return yaml.safe_dump({"/**": {"ros__parameters": parameters}}, sort_keys=False)
+    return yaml.safe_dump({"/**": {"ros__parameters": dict(parameters)}}, sort_keys=False)
