@@ -15,7 +15,7 @@ from hsv.vehicle.parameters import uncertainty_bounds
 def flight(subject):
     inputs = subject.inputs
     short = inputs.disturbance.model_copy(update={"duration": 104.0})
-    worst = {name: bound for name, bound in uncertainty_bounds().items()}
+    worst = dict(uncertainty_bounds())
     return Region(subject.design, inputs.model_copy(update={"disturbance": short})).fly(worst)
 
 
@@ -48,9 +48,8 @@ def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
     for k in (1, 60, 700, 5001, 5100):
         h, v = flight.history.state[k, :2]
         A, B = design.polytope.at(h, v)
-        local = dataclasses.replace(
-            design, polytope=dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
-        )
+        local = dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
+        local = dataclasses.replace(design, polytope=local)
         system = tube_problem(local, ones).system
         predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
         assert_allclose(predicted, errors[k + 1], rtol=0.0, atol=1e-11)
