@@ -17,6 +17,8 @@ setup(
     entry_points={
         "console_scripts": [
             "recorder = hsv_bringup.recorder:main",
+            "player = hsv_bringup.player:main",
+            "stand_in = hsv_bringup.stand_in:main",
         ],
     },
 )

@@ -11,6 +11,7 @@ from hsv.cli.diff import diff
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.output import errors
+from hsv.cli.play import play
 from hsv.cli.plot import plot
 from hsv.cli.recover import recover
 from hsv.cli.replay import replay
@@ -20,6 +21,7 @@ from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
 from hsv.cli.trim import trim
 from hsv.cli.verify import verify
+from hsv.cli.view import view
 from hsv.errors import HsvError, RunError
 
 UsageError = typer.BadParameter.__bases__[0]
@@ -32,7 +34,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
 )
-for command in (trim, linearise, design, verify, scenarios, simulate, run, info, plot, report, replay, diff, recover):
+for command in (
+    trim,
+    linearise,
+    design,
+    verify,
+    scenarios,
+    simulate,
+    run,
+    info,
+    plot,
+    report,
+    view,
+    replay,
+    play,
+    diff,
+    recover,
+):
     app.command()(command)
 
 

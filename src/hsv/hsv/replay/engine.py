@@ -125,9 +125,9 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     while first or latest["/hsv/state"].status == 0:
         for name, process in processes.items():
             inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
-            outputs = tuple(made[name].messages.values())
-            process.step(components[name], inputs, outputs, bag.types.types.__getitem__)
-            made[name].keep()
+            outputs = made[name]
+            process.step(components[name], inputs, tuple(outputs.messages.values()), bag.types.types.__getitem__)
+            outputs.keep()
         first = False
         if latest["/hsv/state"].step % PROGRESS_INTERVAL == 0:
             progress("rerun", latest["/hsv/state"].step, last)

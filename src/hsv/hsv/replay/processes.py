@@ -67,13 +67,17 @@ def _plan(trajectory: NominalTrajectory, inputs: Messages, outputs: Messages, _:
 
 
 def _control(follows_nominal: bool, law: Any, inputs: Messages, outputs: Messages, _: MessageClass) -> None:
-    result = exchange.control(law, *inputs, outputs[0])
-    exchange.fill_tube_status(result, *inputs, follows_nominal, outputs[1])
+    filtered, nominal = inputs
+    command, status = outputs
+    result = exchange.control(law, filtered, nominal, command)
+    exchange.fill_tube_status(result, filtered, nominal, follows_nominal, status)
 
 
 def _actuate(injector: FaultInjector, inputs: Messages, outputs: Messages, message_class: MessageClass) -> None:
-    result = exchange.actuate(injector, *inputs, outputs[0])
-    exchange.fill_fault_status(result, *inputs, message_class("hsv_msgs/msg/Fault"), outputs[1])
+    (command,) = inputs
+    actuator, status = outputs
+    result = exchange.actuate(injector, command, actuator)
+    exchange.fill_fault_status(result, command, message_class("hsv_msgs/msg/Fault"), status)
 
 
 def _integrate(plant: Plant, inputs: Messages, outputs: Messages, _: MessageClass) -> None:

@@ -1,0 +1,165 @@
+"""The player node: republishes a bag at its own pace, faster, or step by step, for a viewer or a node under test."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.utilities import remove_ros_args
+from std_srvs.srv import Trigger
+
+from hsv.errors import ParameterError
+from hsv.graph.description import TOPICS
+from hsv.recording.reader import Bag
+from hsv.recording.topic import Qos
+from hsv_node.main import run_node
+from hsv_node.messages import message_class
+from hsv_node.process import ProcessNode
+
+CLOCK = "/clock"
+
+ACKNOWLEDGED_STEPS = 50
+"""Steps at full speed after which the listeners must have taken everything: no more than their queues hold."""
+
+_ORDER = {topic: index for index, topic in enumerate(TOPICS)}
+
+
+class PlayerNode(ProcessNode):
+    """Publishes the recorded bytes of a bag; what was recorded in one instant of simulated time goes out together."""
+
+    def __init__(self, bag: Bag, topics: Sequence[str], rate: float, paused: bool, delay: float) -> None:
+        """Prepare to play.
+
+        Args:
+            bag: What to play.
+            topics: Topics to publish.
+            rate: Simulated over wall time; 0: as fast as the listeners take it.
+            paused: Whether to begin paused.
+            delay: Wall time (s) before the first message, for listeners to find the player.
+        """
+        super().__init__("player")
+        self._rate = rate
+        self._paused = paused
+        self._talkers = {
+            topic: self.create_publisher(message_class(bag.topics[topic].type), topic, _profile(bag.qos(topic)))
+            for topic in topics
+        }
+        self._instants = _instants(bag, topics)
+        self._next = 0
+        self._begins = time.monotonic() + delay
+        self._anchor: tuple[float, int] | None = None
+        """Wall time (s) and simulated time (ns) from which the pace is counted."""
+        self.create_service(Trigger, "~/pause", self._pause)
+        self.create_service(Trigger, "~/resume", self._resume)
+        self.create_service(Trigger, "~/step", self._step)
+
+    def poll(self) -> None:
+        """Publish what is due; end after the last message."""
+        while not self._paused and self._next < len(self._instants) and self._delay() <= 0.0:
+            self._publish()
+            if self._rate == 0.0 and self._next % ACKNOWLEDGED_STEPS == 0:
+                self._wait_for_listeners()
+                break
+        if self._next >= len(self._instants):
+            self._wait_for_listeners()
+            self.finish(0)
+
+    def patience(self) -> float:
+        """Wake in time for the next message."""
+        return 0.25 if self._paused else min(max(self._delay(), 0.0), 0.25)
+
+    def _delay(self) -> float:
+        now = time.monotonic()
+        if now < self._begins:
+            return self._begins - now
+        if self._rate == 0.0 or self._next >= len(self._instants):
+            return 0.0
+        instant = self._instants[self._next][0]
+        if self._anchor is None:
+            self._anchor = now, instant
+        return self._anchor[0] + (instant - self._anchor[1]) * 1e-9 / self._rate - now
+
+    def _publish(self) -> None:
+        for topic, data in self._instants[self._next][1]:
+            self._talkers[topic].publish(data)
+        self._next += 1
+
+    def _wait_for_listeners(self) -> None:
+        for publisher in self._talkers.values():
+            publisher.wait_for_all_acked(Duration(seconds=5.0))
+
+    def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._paused = True
+        return self._answer(response)
+
+    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._paused = False
+        self._anchor = None
+        return self._answer(response)
+
+    def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if not self._paused:
+            response.message = "playing: pause first"
+            return response
+        self._publish()
+        return self._answer(response)
+
+    def _answer(self, response: Trigger.Response) -> Trigger.Response:
+        response.success = True
+        played = (
+            f"played up to t = {self._instants[self._next - 1][0] * 1e-9:.3f} s" if self._next else "nothing played"
+        )
+        response.message = f"{'paused' if self._paused else 'playing'}, {played}"
+        return response
+
+
+def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
+    """Return the messages by simulated time (ns); within an instant in the order in which a step is recorded."""
+    gathered: dict[int, list[tuple[str, bytes]]] = {}
+    for topic in sorted(topics, key=lambda name: _ORDER.get(name, -1)):
+        for instant, data in bag.messages(topic):
+            gathered.setdefault(instant, []).append((topic, data))
+    return sorted(gathered.items())
+
+
+def _profile(qos: Qos) -> QoSProfile:
+    reliable, latched = qos.reliability == "reliable", qos.durability == "transient_local"
+    return QoSProfile(
+        depth=max(qos.depth, 1),
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the player node."""
+    words = remove_ros_args(list(sys.argv if args is None else args))[1:]
+    parser = argparse.ArgumentParser(prog="player", description="Republish a bag.")
+    parser.add_argument("bag", type=Path, help="bag directory, or its .mcap file")
+    parser.add_argument("--rate", type=float, default=1.0, help="pace: 1 as recorded, 0 as fast as listeners take it")
+    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, /clock comes along; default: all")
+    parser.add_argument("--no-clock", action="store_true", help="leave /clock to somebody else")
+    parser.add_argument("--paused", action="store_true", help="begin paused: call /player/step or /player/resume")
+    parser.add_argument("--delay", type=float, default=1.0, help="wall time (s) for listeners to find the player")
+    options = parser.parse_args(words)
+
+    def build() -> PlayerNode:
+        if not 0.0 <= options.rate < math.inf:
+            raise ParameterError(f"rate = {options.rate}: expected a finite number, not below zero")
+        bag = Bag(options.bag)
+        topics = dict.fromkeys(options.topics or bag.topics)
+        for topic in topics:
+            bag.track(topic)
+        if not options.no_clock and CLOCK in bag.topics:
+            topics[CLOCK] = None
+        if options.no_clock:
+            topics.pop(CLOCK, None)
+        return PlayerNode(bag, list(topics), options.rate, options.paused, options.delay)
+
+    return run_node(build, "player", args)

@@ -1,0 +1,144 @@
+"""Stands in for all peers of one node: feeds it from a bag, step by step, and writes down what it answers."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import rclpy
+from hsv_msgs.msg import Ready, Run
+from rclpy.node import Node
+
+from hsv.graph import description
+from hsv.graph.node_parameters import STAND_IN_PARAMETERS
+from hsv.recording.definitions import definition, type_hash
+from hsv.recording.reader import Bag
+from hsv.recording.topic import Qos, Topic
+from hsv.recording.writer import BagWriter
+from hsv.replay.attached import broken_off, complete_steps
+from hsv_node.lockstep import LockstepNode
+from hsv_node.main import run_node
+from hsv_node.messages import message_class
+from hsv_node.parameters import declare
+from hsv_node.qos import LATCHED, STEP
+
+_STAMP = struct.Struct("<iI")
+
+
+class StandInNode(LockstepNode):
+    """Plays the peers of ``stand_in.node``, each under its own name, with what ``stand_in.bag`` holds of them."""
+
+    def __init__(self) -> None:
+        super().__init__("stand_in")
+        values = declare(self, STAND_IN_PARAMETERS)
+        bag = Bag(values["stand_in.bag"])
+        self._under_test = values["stand_in.node"]
+        self._limit = values["stand_in.timeout"]
+        me = next(n for n in description.graph(self.controller) if n.name == self._under_test)
+        self._is_plant = me is description.PLANT
+        self._steps = complete_steps(bag) if broken_off(bag) else min(len(bag.messages(t)) for t in me.subscribes)
+        self._recorded = {topic: [data for _, data in bag.messages(topic)] for topic in me.subscribes}
+        self._answered = dict.fromkeys(me.publishes, 0)
+        self._fed = 0
+        self._output = BagWriter(Path(values["stand_in.directory"]))
+        self._peers: dict[str, Node] = {}
+        # Of topics with several listeners each is a peer of its own; of those with several sources there are none.
+        self._feeds = {}
+        for topic, peer in description.links(self._under_test, self.controller, recorded=False):
+            kind = message_class(description.TOPICS[topic])
+            if topic in me.subscribes:
+                self._feeds[topic] = self._peer(peer).create_publisher(kind, topic, STEP)
+            else:
+                self._peer(peer).create_subscription(kind, topic, _ignore, STEP, raw=True)
+        for topic in me.publishes:
+            name = description.TOPICS[topic]
+            self._output.add_topic(Topic(topic, name, definition(name), type_hash(name), Qos(depth=STEP.depth)))
+            answer: Callable[[bytes], None] = partial(self._on_answer, topic)
+            self.create_subscription(message_class(name), topic, answer, STEP, raw=True)
+        self._run = next((message for _, message in bag.decode("/hsv/run")), None)
+        self._ready = self._join()
+        self._heard = time.monotonic()
+
+    def _peer(self, name: str) -> Node:
+        if name not in self._peers:
+            self._peers[name] = rclpy.create_node(name, context=self.context, use_global_arguments=False)
+        return self._peers[name]
+
+    def _join(self) -> bool:
+        """Announce a run to the node under test, or everybody as ready if it is the plant; return whether it may start."""
+        if self._is_plant:
+            self._announcer = self.create_publisher(Ready, "/hsv/ready", LATCHED)
+            self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
+            return True
+        assert self._run is not None, "a bag with states has the announcement of its run"
+        run = Run(run_id="replay", period=self._run.period, last_step=self._run.last_step)
+        self._announcer = self._peer(description.PLANT.name).create_publisher(Run, "/hsv/run", LATCHED)
+        self._announcer.publish(run)
+        self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
+        return False
+
+    def _on_run(self, run: Run) -> None:
+        for peer in description.peers(self._under_test, self.controller, recorded=False):
+            self._announcer.publish(Ready(node=peer, run_id=run.run_id))
+
+    def _on_ready(self, ready: Ready) -> None:
+        if ready.node == self._under_test:
+            self._ready = True
+
+    def _on_answer(self, topic: str, data: bytes) -> None:
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        self._output.write(topic, seconds * 1_000_000_000 + nanoseconds, data)
+        self._answered[topic] += 1
+        self._heard = time.monotonic()
+        self._feed()
+
+    def _feed(self) -> None:
+        """Give the next step to the node under test if it has answered to the one before."""
+        done = min(self._answered.values())
+        # The plant speaks first: its answer to nothing is the first state.
+        if done >= self._steps and (not self._is_plant or self._fed >= self._steps):
+            self.finish(0)
+        elif self._fed < self._steps and done >= self._fed + self._is_plant:
+            for topic, publisher in self._feeds.items():
+                publisher.publish(self._recorded[topic][self._fed])
+            self._fed += 1
+            if self._fed % 200 == 0:
+                print(f"step {self._fed}", flush=True)
+            if self._is_plant and self._fed == self._steps:
+                self.finish(0)
+
+    def poll(self) -> None:
+        """Start when the links stand; give up on a node that does not answer."""
+        if not self._is_plant and self._ready and self._fed == 0 and self._heard_by_node():
+            self._heard = time.monotonic()
+            self._feed()
+        if time.monotonic() - self._heard > self._limit:
+            silent = [topic for topic, count in self._answered.items() if count <= min(self._answered.values())]
+            self.get_logger().fatal(
+                f"step {min(self._answered.values())}: no {', '.join(silent)} from {self._under_test} "
+                f"for {self._limit:g} s"
+            )
+            self.finish(1)
+
+    def _heard_by_node(self) -> bool:
+        return all(publisher.get_subscription_count() > 0 for publisher in self._feeds.values()) and all(
+            self.count_publishers(topic) > 0 for topic in self._answered
+        )
+
+    def close(self) -> None:
+        """Finish the bag of answers."""
+        for peer in self._peers.values():
+            peer.destroy_node()
+        self._output.close()
+
+
+def _ignore(_: bytes) -> None:
+    """The link is there for its name; the answers are read once, by the stand-in itself."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the stand-in node."""
+    return run_node(StandInNode, "stand_in", args)

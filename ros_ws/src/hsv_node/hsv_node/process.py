@@ -1,0 +1,28 @@
+"""A node that is a process of its own: what :func:`hsv_node.main.run_node` runs."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+
+class ProcessNode(Node):
+    """A node with an exit code, and with something to do between messages."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.exit_code: int | None = None
+        """Set when the node wants to end, to the exit code of the process."""
+
+    def finish(self, code: int) -> None:
+        """End the process with ``code`` once the current callback has returned."""
+        self.exit_code = code
+
+    def poll(self) -> None:
+        """Called between messages, at least four times a second; overridden where something must be watched."""
+
+    def close(self) -> None:
+        """Called once before the process ends; overridden where something must be saved."""
+
+    def patience(self) -> float:
+        """Return how long (s) to wait for a message before :meth:`poll` is due."""
+        return 0.25

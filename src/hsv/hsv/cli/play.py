@@ -1,0 +1,39 @@
+"""The command ``hsv play``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import BagArgument
+
+
+def play(
+    bag: BagArgument,
+    rate: Annotated[float, typer.Option(help="Pace: 1 as recorded, 0 as fast as listeners take it.")] = 1.0,
+    topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, may be repeated; default: all.")] = None,
+    clock: Annotated[bool, typer.Option(help="Publish /clock.")] = True,
+    paused: Annotated[
+        bool, typer.Option("--paused", help="Begin paused; the services /player/step and /player/resume go on.")
+    ] = False,
+    delay: Annotated[float, typer.Option(help="Wall time (s) for listeners to find the player.")] = 1.0,
+) -> None:
+    """Republish a bag over DDS, for a viewer or a node under test.
+
+    Example: hsv play bags/case1_20260101T000000Z --rate 10 --topic /hsv/state
+    """
+    import os
+
+    from hsv.graph.description import PLAYER
+    from hsv.graph.launcher import executable
+
+    path = str(executable(PLAYER))
+    words = [path, str(bag), "--rate", str(rate), "--delay", str(delay)]
+    if topic:
+        words += ["--topics", *topic]
+    if not clock:
+        words.append("--no-clock")
+    if paused:
+        words.append("--paused")
+    os.execv(path, words)

@@ -1,0 +1,80 @@
+"""Replay with the real node processes: one by one against a stand-in for all others, or the whole graph again."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from hsv.errors import RunError
+from hsv.graph.description import PLANT, STAND_IN, NodeDescription, graph
+from hsv.graph.launcher import Launcher
+from hsv.graph.preparation import parameter_yaml
+from hsv.recording.reader import Bag
+from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process
+
+
+def replay_all(
+    bag: Bag, names: Sequence[str], controller: str, values: Mapping[str, Any], progress: Progress
+) -> Iterator[ProcessComparison]:
+    """Run each of the nodes ``names`` alone, fed from ``bag`` by a stand-in, and compare what it publishes.
+
+    Raises:
+        RunError: A process failed; its last words are in the message.
+    """
+    for name in names:
+        process = chosen(controller)[name]
+        with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
+            answers = Path(folder, "answers")
+            run = {
+                "recorder": False,
+                "stand_in.bag": str(bag.path.absolute()),
+                "stand_in.node": name,
+                "stand_in.directory": str(answers),
+            }
+            steps = len(bag.messages("/hsv/state"))
+            _run((process.node, STAND_IN), {**values, **run}, Path(folder), name, steps, progress)
+            made = Bag(answers)
+            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
+
+
+def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progress) -> Iterator[ProcessComparison]:
+    """Fly the whole graph again and compare every step topic.
+
+    Raises:
+        RunError: A process failed; its last words are in the message.
+    """
+    with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
+        again = Path(folder, "again")
+        steps = len(bag.messages("/hsv/state"))
+        run = {"recorder": True, "bag.directory": str(again)}
+        _run(graph(controller), {**values, **run}, Path(folder), PLANT.name, steps, progress)
+        made = Bag(again)
+        for process in chosen(controller).values():
+            yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
+
+
+def _run(
+    nodes: Sequence[NodeDescription],
+    values: Mapping[str, Any],
+    folder: Path,
+    title: str,
+    steps: int,
+    progress: Progress,
+) -> None:
+    """Run ``nodes`` until the stand-in or, where there is none, the plant has ended."""
+    file = folder / "parameters.yaml"
+    file.write_text(parameter_yaml(values), encoding="utf-8")
+
+    def line(_: str, text: str) -> None:
+        if text.startswith("step "):
+            progress(title, int(text.split()[1]), steps)
+
+    awaited = STAND_IN if STAND_IN in nodes else PLANT
+    arguments = ["--params-file", str(file)]
+    with Launcher(nodes, arguments, lambda step: progress(title, step, steps), line) as launcher:
+        ending = launcher.wait(awaited.name)
+    if ending.culprit:
+        words = "".join(f"\n  {word}" for word in ending.last_words)
+        raise RunError(f"{ending.culprit} {ending.reason}. Its last words:{words}")
