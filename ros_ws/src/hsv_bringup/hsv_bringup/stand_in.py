@@ -68,7 +68,7 @@ class StandInNode(LockstepNode):
         return self._peers[name]
 
     def _join(self) -> bool:
-        """Announce a run to the node under test, or everybody as ready if it is the plant; return whether it may start."""
+        """Announce a run to the node under test, or everybody as ready to a plant; return whether to start."""
         if self._is_plant:
             self._announcer = self.create_publisher(Ready, "/hsv/ready", LATCHED)
             self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)

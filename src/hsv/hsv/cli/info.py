@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from collections.abc import Callable
+from typing import Any
 
-import typer
-
-from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.options import BagArgument, JsonOption, UnitsOption
 from hsv.cli.output import Units, console, print_json, print_table, to_json
+
+SHOWN_EXCURSIONS = 5
+"""Departures from the tube that are listed one by one."""
 
 
 def info(
-    bag: Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")],
+    bag: BagArgument,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
@@ -31,17 +32,62 @@ def info(
     if json:
         print_json(description | {"metrics": to_json(quantities, units)})
         return
+    _print(description)
+    print_table("Metrics", quantities, units)
+
+
+def _print(description: dict[str, Any]) -> None:
     from rich.table import Table
 
-    for key in ("path", "duration_s"):
-        if key in description:
-            console.print(f"{key:12} {description[key]}", soft_wrap=True)
-    for key, value in description["custom_data"].items():
-        console.print(f"{key:12} {value}", soft_wrap=True)
+    heading = {
+        "path": description["path"],
+        "duration": f"{description['duration_s']:.6g} s",
+        "messages": description["messages"],
+        "complete": "yes" if description["complete"] else "no: hsv recover mends it",
+        **description["custom_data"],
+        "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
+        or "nothing",
+        "faults": _intervals(description["faults"], lambda f: f"{f['type']} {f['value']:g} of {f['channel']}, "),
+        "saturation": _saturation(description["saturation"]),
+        "tube": _tube(description["tube"]),
+    }
+    for key, value in heading.items():
+        console.print(f"{key:12} {value}", soft_wrap=True, markup=False)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for column in ("topic", "type", "messages", "rate Hz"):
         table.add_column(column, justify="right" if column in ("messages", "rate Hz") else "left")
     for topic in description["topics"]:
         table.add_row(topic["name"], topic["type"], str(topic["messages"]), f"{topic['rate_hz'] or 0:.4g}")
     console.print(table)
-    print_table("Metrics", quantities, units)
+
+
+def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str, Any]], str]) -> str:
+    if intervals is None:
+        return "not recorded"
+    return "; ".join(f"{name(i)}{_span(i)}" for i in intervals) or "none"
+
+
+def _span(interval: dict[str, Any]) -> str:
+    end = "to the end" if interval["end_s"] is None else f"to {interval['end_s']:g} s"
+    return f"from {interval['start_s']:g} s {end}"
+
+
+def _saturation(saturation: dict[str, Any] | None) -> str:
+    if saturation is None:
+        return "not recorded"
+    fuel, elevator = saturation["fuel_equivalence_ratio_steps"], saturation["elevator_deflection_steps"]
+    return f"{saturation['steps']} steps (fuel equivalence ratio {fuel}, elevator deflection {elevator})"
+
+
+def _tube(tube: dict[str, Any] | None) -> str:
+    if tube is None:
+        return "not recorded"
+    if not tube["checked_steps"]:
+        return "no invariant set in this design"
+    text = (
+        f"largest level {tube['largest_level']:.4g}, {tube['outside_steps']} of {tube['checked_steps']} steps outside"
+    )
+    excursions = tube["excursions"]
+    shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
+    more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""
+    return f"{text}: {shown}{more}" if excursions else text

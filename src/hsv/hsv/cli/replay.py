@@ -72,7 +72,7 @@ def replay(
     if json:
         print_json({"bag": str(bag), "passed": not failed, "processes": report})
     if failed:
-        errors.print(f"[bold red]hsv: error:[/] {', '.join(failed)} differ from {bag}", soft_wrap=True)
+        errors.print(f"[bold red]hsv: error:[/] {', '.join(failed)}: not what {bag} recorded", soft_wrap=True)
         raise typer.Exit(1)
 
 

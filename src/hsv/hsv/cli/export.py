@@ -1,0 +1,41 @@
+"""The command ``hsv export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import BagArgument
+from hsv.cli.output import console
+
+
+def export(
+    bag: BagArgument,
+    csv: Annotated[bool, typer.Option("--csv", help="A folder of CSV files, one per topic.")] = False,
+    parquet: Annotated[bool, typer.Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
+    npz: Annotated[bool, typer.Option("--npz", help="One .npz file.")] = False,
+    topic: Annotated[
+        list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="What to write; default: beside the bag, named after it.")] = None,
+) -> None:
+    """Write the topics of a bag as tables with field names and units in the header (SI).
+
+    Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
+    """
+    from hsv.errors import ParameterError
+    from hsv.graph.description import TOPICS
+    from hsv.recording import export as tables
+    from hsv.recording.reader import Bag
+
+    chosen = [form for form, wanted in zip(tables.Format, (csv, parquet, npz), strict=True) if wanted]
+    if len(chosen) != 1:
+        raise ParameterError("format: expected one of --csv, --parquet and --npz")
+    opened = Bag(bag)
+    if out is None:
+        home = opened.path.parent
+        out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
+    for path in tables.export(opened, topic or list(TOPICS), chosen[0], out):
+        console.print(f"written {path}", soft_wrap=True)

@@ -1,0 +1,133 @@
+"""Writing the topics of a bag as tables: CSV, Parquet or npz, with field names and units in the header."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.errors import RecordingError
+from hsv.recording.reader import Bag
+from hsv.recording.units import units_of
+
+
+class Format(StrEnum):
+    """What a bag can be exported as."""
+
+    csv = "csv"
+    parquet = "parquet"
+    npz = "npz"
+
+
+def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[Path]:
+    """Write ``topics``; return the files written.
+
+    CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
+    ``elastic_rate[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
+    per field, ``hsv_state.elastic_rate [kg^0.5 m/s]``.
+
+    Raises:
+        RecordingError: A topic is missing, or the target exists or cannot be written.
+    """
+    if target.exists():
+        raise RecordingError(
+            f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
+        )
+    try:
+        if form is Format.npz:
+            arrays = {f"{_file_stem(t)}.{name}": a for t in topics for name, a in _fields(bag, t).items()}
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("wb") as stream:
+                np.savez_compressed(stream, **arrays)
+            return [target]
+        tables = {topic: _table(bag, topic) for topic in topics}
+        target.mkdir(parents=True)
+        written = []
+        for topic, table in tables.items():
+            path = target / f"{_file_stem(topic)}.{form}"
+            (_write_csv if form is Format.csv else _write_parquet)(path, table)
+            written.append(path)
+        return written
+    except OSError as error:
+        raise RecordingError(f"out = {str(target)!r}: cannot be written: {error.strerror}") from None
+
+
+def _file_stem(topic: str) -> str:
+    return topic.strip("/").replace("/", "_")
+
+
+def _fields(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
+    """Return one array per field, units in the names; what has no common length as JSON."""
+    units = _units(bag, topic)
+    fields = {}
+    for name, column in bag.columns(topic).items():
+        named = [units[name].of(i) for i in range(column.shape[1] if column.ndim > 1 else 1)]
+        named = named[:1] if len(set(named)) == 1 else named
+        array = column if column.dtype != object else np.array([_text(value) for value in column], np.str_)
+        fields[_headed(name, ", ".join(named) if any(named) else "")] = array
+    return fields
+
+
+def _table(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
+    """Return one column per number; sequences as wide as the longest, the rest empty."""
+    units = _units(bag, topic)
+    table: dict[str, NDArray[Any]] = {}
+    for name, column in bag.columns(topic).items():
+        if column.dtype == object and len(column) and all(_is_numbers(value) for value in column):
+            column = _padded(column)
+        if column.ndim > 1:
+            for index in range(column.shape[1]):
+                table[_headed(f"{name}[{index}]", units[name].of(index))] = column[:, index]
+        elif column.dtype == object:
+            table[_headed(name, units[name].of())] = np.array([_text(value) for value in column], object)
+        else:
+            table[_headed(name, units[name].of())] = column
+    return table
+
+
+def _units(bag: Bag, topic: str) -> Any:
+    return units_of(bag.definition(topic), bag.types.fielddefs, bag.topics[topic].type)
+
+
+def _headed(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _is_numbers(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+
+
+def _padded(column: NDArray[Any]) -> NDArray[np.float64]:
+    wide = np.full((len(column), max(len(value) for value in column)), np.nan)
+    for row, value in zip(wide, column, strict=True):
+        row[: len(value)] = value
+    return wide
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _arrow(table: dict[str, NDArray[Any]]) -> Any:
+    import pyarrow
+
+    return pyarrow.table({name: pyarrow.array(column) for name, column in table.items()})
+
+
+def _write_csv(path: Path, table: dict[str, NDArray[Any]]) -> None:
+    from pyarrow import csv
+
+    csv.write_csv(_arrow(table), path)
+
+
+def _write_parquet(path: Path, table: dict[str, NDArray[Any]]) -> None:
+    from pyarrow import parquet
+
+    parquet.write_table(_arrow(table), path)
