@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test lint clean
+.PHONY: help setup run test lint references clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -29,6 +29,9 @@ test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
+
+references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
+	@source ./env.sh && python3 -m pytest -m "not reference" && python3 tools/references.py
 
 clean: ## remove what set-up and tools made; recorded runs stay
 	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis

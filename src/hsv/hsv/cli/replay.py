@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsv.cli.options import BagArgument, JsonOption
-from hsv.cli.output import console, errors, print_json
+from hsv.cli.output import console, print_json
 
 if TYPE_CHECKING:
     from hsv.replay.engine import ProcessComparison
@@ -33,7 +33,7 @@ def replay(
     Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
     """
     from hsv.cli.progress import stages
-    from hsv.errors import ParameterError
+    from hsv.errors import ParameterError, RunError
     from hsv.recording.reader import Bag
     from hsv.replay import engine
     from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous
@@ -72,8 +72,7 @@ def replay(
     if json:
         print_json({"bag": str(bag), "passed": not failed, "processes": report})
     if failed:
-        errors.print(f"[bold red]hsv: error:[/] {', '.join(failed)}: not what {bag} recorded", soft_wrap=True)
-        raise typer.Exit(1)
+        raise RunError(f"{', '.join(failed)}: not what {bag} recorded")
 
 
 def _print(result: ProcessComparison) -> None:

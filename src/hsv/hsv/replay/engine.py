@@ -78,6 +78,9 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
         RecordingError: A topic is missing or recorded with another definition.
         ParameterError, DesignError: The component refuses its parameters.
     """
+    for topic in (*process.inputs, *process.outputs):
+        if (kind := bag.track(topic).type) != TOPICS[topic]:
+            raise RecordingError(f"{bag.path}: topic {topic} is {kind}, expected {TOPICS[topic]}")
     component = process.build(values)
     outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs})
     recorded = [bag.track(topic) for topic in process.inputs]
@@ -100,7 +103,7 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
 
 
 def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progress) -> list[ProcessComparison]:
-    """Fly the whole loop again, process after process, and compare everything.
+    """Fly the whole loop again in this process and compare every step topic.
 
     Args:
         bag: The recorded run.
@@ -111,10 +114,16 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     Raises:
         As :func:`replay`.
     """
+    tracks = fly(bag.types, controller, values, progress)
+    return [compare_process(bag, process, tracks) for process in chosen(controller).values()]
+
+
+def fly(types: Typestore, controller: str, values: Mapping[str, Any], progress: Progress) -> dict[str, Track]:
+    """Fly the loop in this process, message by message as the graph does, and return every step topic."""
     processes = chosen(controller)
     components = {name: process.build(values) for name, process in processes.items()}
     made = {
-        name: _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs})
+        name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs})
         for name, process in processes.items()
     }
     latest: dict[str, Any] = {}
@@ -126,13 +135,13 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
         for name, process in processes.items():
             inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
             outputs = made[name]
-            process.step(components[name], inputs, tuple(outputs.messages.values()), bag.types.types.__getitem__)
+            process.step(components[name], inputs, tuple(outputs.messages.values()), types.types.__getitem__)
             outputs.keep()
         first = False
         if latest["/hsv/state"].step % PROGRESS_INTERVAL == 0:
             progress("rerun", latest["/hsv/state"].step, last)
     progress("rerun", last, last)
-    return [compare_process(bag, process, made[name].tracks) for name, process in processes.items()]
+    return {topic: track for outputs in made.values() for topic, track in outputs.tracks.items()}
 
 
 def chosen(controller: str) -> dict[str, Process]:

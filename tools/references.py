@@ -1,0 +1,65 @@
+"""Fly the reference bags anew: ``make references``.
+
+Every scenario ``bags/reference/<name>.toml`` has its bag ``bags/reference/<name>/``. All bags are flown, and replayed,
+in a temporary folder first; only if every one is good do they take the place of the old ones, together.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+REFERENCES = ROOT / "bags" / "reference"
+LARGEST_TOTAL = 10_000_000
+"""Bytes of all bags together: they are part of every clone."""
+
+
+def main() -> int:
+    """Make all reference bags or none; return the exit code."""
+    changes = subprocess.run(
+        ["git", "-C", str(ROOT), "status", "--porcelain", "--", ".", ":!bags/reference"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    if changes:
+        return _refuse("uncommitted changes; commit first: a reference names the commit that made it\n" + changes)
+    # Beside the old bags, so that putting the new ones in their place is a rename.
+    with tempfile.TemporaryDirectory(prefix=".new_", dir=REFERENCES) as folder:
+        made = {}
+        for scenario in sorted(REFERENCES.glob("*.toml")):
+            bag = Path(folder, scenario.stem)
+            print(f"flying {scenario.stem}", flush=True)
+            for command in (
+                ["hsv", "run", str(scenario), "--bag", str(bag)],
+                ["hsv", "replay", str(bag)],
+                ["hsv", "replay", str(bag), "--rerun"],
+            ):
+                done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+                if done.returncode:
+                    return _refuse(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
+            for path in bag.iterdir():
+                if path.suffix not in (".mcap", ".yaml"):
+                    path.unlink()
+            made[scenario.stem] = bag
+        total = sum(path.stat().st_size for bag in made.values() for path in bag.iterdir())
+        if total > LARGEST_TOTAL:
+            return _refuse(f"the bags are {total} bytes together, expected at most {LARGEST_TOTAL}: shorten a scenario")
+        for name, bag in made.items():
+            shutil.rmtree(REFERENCES / name, ignore_errors=True)
+            bag.rename(REFERENCES / name)
+    print(f"{len(made)} reference bags, {total / 1e6:.1f} MB: look at git diff --stat, then commit them")
+    return 0
+
+
+def _refuse(reason: str) -> int:
+    print(f"make references: nothing changed: {reason}", file=sys.stderr)
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
