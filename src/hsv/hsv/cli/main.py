@@ -8,6 +8,7 @@ import typer
 
 from hsv.cli.design import design
 from hsv.cli.diff import diff
+from hsv.cli.export import export
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.output import errors
@@ -50,6 +51,7 @@ for command in (
     play,
     diff,
     recover,
+    export,
 ):
     app.command()(command)
 
