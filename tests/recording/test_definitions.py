@@ -17,10 +17,10 @@ def test_text_is_root_then_dependencies_once(prefix: Path) -> None:
     root, *others = text.split(f"\n{SEPARATOR}\n")
     assert root == (prefix / "share/hsv_msgs/msg/NominalState.msg").read_text()
     assert [other.splitlines()[0] for other in others] == [
-        "MSG: std_msgs/msg/Header",
-        "MSG: hsv_msgs/msg/LongitudinalState",
-        "MSG: hsv_msgs/msg/InputVector",
-        "MSG: builtin_interfaces/msg/Time",
+        "MSG: std_msgs/Header",
+        "MSG: hsv_msgs/LongitudinalState",
+        "MSG: hsv_msgs/InputVector",
+        "MSG: builtin_interfaces/Time",
     ]
     assert len(SEPARATOR) == 80
 

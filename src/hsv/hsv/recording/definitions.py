@@ -26,7 +26,8 @@ def definition(message_type: str) -> str:
     Returns:
     -------
     str
-        The root text, then for each dependency a line of 80 ``=``, a line ``MSG: package/msg/Type`` and its text.
+        The root text, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text.
+        Without ``msg``, as rosbag2 writes it: Foxglove and Lichtblick look types up by what stands in the fields.
 
     Raises:
     ------
@@ -41,7 +42,8 @@ def definition(message_type: str) -> str:
             texts[name], dependencies = _read(name, _share_file(name, ".msg"))
             waiting.extend(dependencies)
     root, *others = texts.items()
-    return "".join([root[1], *(f"\n{SEPARATOR}\nMSG: {name}\n{text}" for name, text in others)])
+    parts = [f"\n{SEPARATOR}\nMSG: {name.replace('/msg/', '/')}\n{text}" for name, text in others]
+    return "".join([root[1], *parts])
 
 
 def type_hash(message_type: str) -> str:

@@ -89,7 +89,8 @@ def _comments(definition: str, message_type: str) -> dict[tuple[str, str], str]:
         kind, text = message_type, part
         if number:
             head, _, text = part.partition("\n")
-            kind = head.removeprefix("MSG: ").strip()
+            package, _, name = head.removeprefix("MSG: ").strip().partition("/")
+            kind = f"{package}/msg/{name.removeprefix('msg/')}"
         for line in text.splitlines():
             if match := _FIELD.match(line):
                 comments[kind, match["name"]] = match["comment"] or ""
