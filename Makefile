@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test lint references clean
+.PHONY: help setup run test test-viewers lint references clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -11,7 +11,7 @@ IN_ENVIRONMENT := source ./env.sh && exec
 PYTHON_SOURCES := src ros_ws/src tests tools
 
 help: ## list these commands
-	@sed -nE 's/^([a-z]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 16
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
 
 setup: ## set everything up (PYTHON=/path/to/python3 chooses the interpreter)
 	@python="$${PYTHON:-python3}"; \
@@ -26,6 +26,16 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest $(ARGS)
+
+# Browser and node come from Debian, node's readers of bags from npm; where apt-get is not wanted, install them before.
+test-viewers: setup ## set up, install a browser, node and npm packages, then run the tests that need them
+	@if ! { command -v chromedriver && command -v npm; } > /dev/null; then \
+		$$([ "$$(id -u)" = 0 ] || echo sudo) apt-get install -y --no-install-recommends chromium chromium-driver nodejs npm; \
+	fi
+	@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
+	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-viewers.txt --constraint "$$pins"
+	@for lock in $$(git ls-files 'tests/*/package-lock.json'); do npm ci --no-audit --no-fund --prefix "$${lock%/*}" || exit; done
+	@$(IN_ENVIRONMENT) python3 -m pytest -m viewer $(ARGS)
 
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy

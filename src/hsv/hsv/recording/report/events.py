@@ -40,7 +40,9 @@ class Event:
 def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
     """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.recording.info.describe`."""
     events = [*_faults(description), *_excursions(description), *_saturation(bag), *_ending(bag)]
-    events += [*_diagnostics(bag), *_log(bag), *_parameter_changes(bag)]
+    # Nodes say some things both in the log and in their diagnostics.
+    said = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
+    events += [*_joined(said, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
     return sorted(events, key=lambda event: event.start)
 
 
@@ -80,16 +82,14 @@ def _ending(bag: Bag) -> Iterator[Event]:
         yield Event(last, last, "error", "the recording breaks off: the run did not reach its end", "plant")
 
 
-def _diagnostics(bag: Bag) -> list[Event]:
+def _diagnostics(bag: Bag) -> Iterator[Event]:
     if "/diagnostics" not in bag.topics:
-        return []
-    found = []
+        return
     for time, message in bag.decode("/diagnostics"):
         for status in message.status:
             if status.level in _DIAGNOSTIC_LEVELS:
                 kind = _DIAGNOSTIC_LEVELS[status.level]
-                found.append(Event(time * 1e-9, time * 1e-9, kind, f"{status.name}: {status.message}", status.name))
-    return _joined(found, within=1.5 * DIAGNOSTICS_PERIOD)
+                yield Event(time * 1e-9, time * 1e-9, kind, f"{status.name}: {status.message}", status.name)
 
 
 def _log(bag: Bag) -> Iterator[Event]:

@@ -16,7 +16,9 @@ const SHADES = { fault: "rgba(179,38,30,.09)", saturation: "rgba(214,158,0,.3)",
 const RUN_COLOURS = 6;
 
 async function inflate(id) {
-  const bytes = Uint8Array.from(atob(document.getElementById(id).textContent), (c) => c.charCodeAt(0));
+  const text = atob(document.getElementById(id).textContent);
+  const bytes = new Uint8Array(text.length);
+  for (let i = 0; i < text.length; i++) bytes[i] = text.charCodeAt(i);
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }

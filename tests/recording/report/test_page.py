@@ -1,0 +1,143 @@
+import html
+import re
+
+import pytest
+from recorded_flight import message_types
+
+from hsv.errors import RecordingError
+from hsv.recording.reader import Bag
+from hsv.recording.report.page import render, write_report
+from hsv.recording.report.payload import all_panels, payload
+from hsv.recording.report.run import reported_runs
+from hsv.recording.topic import Qos, Topic
+from hsv.recording.writer import BagWriter
+from hsv.simulation.metrics import METRICS
+
+EMBEDDED = re.compile(r'<script type="application/[^>]*>.*?</script>', re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def page(quiet, loud):
+    return render(reported_runs([quiet, loud]))
+
+
+def words(page):
+    """What a reader sees: without scripts, style and tags."""
+    page = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page)))
+
+
+def test_the_page_refers_to_nothing_outside_itself(page):
+    shell = EMBEDDED.sub("", page)
+    assert set(re.findall(r'(?:src|href|action|poster)="([^"]*)"', shell)) == {
+        f"#{name}"
+        for name in ["summary", "metrics", "trajectory", "attitude", "elastic", "inputs", "tube", "events", "parameters", "certificate", "repeat"]
+    }
+    assert "@import" not in shell and "url(" not in shell
+    assert "default-src 'none'" in shell
+
+
+def test_every_link_has_its_section(page):
+    for name in re.findall(r'href="#([^"]*)"', page):
+        assert f'id="{name}"' in page
+
+
+def test_equal_bags_give_equal_pages(quiet, page, loud):
+    assert render(reported_runs([quiet, loud])) == page
+
+
+def test_runs_of_one_scenario_are_told_apart(quiet, loud):
+    assert [run.label for run in reported_runs([quiet, loud])] == ["case1 (quiet)", "case1 (loud)"]
+
+
+def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
+    (run,) = reported_runs([quiet])
+    seen = words(render([run]))
+    over = sum(not verdict.within for verdict in run.verdicts.values())
+    assert over, "20 s are too short to reach the end error that is asked for"
+    assert f"over {over} of {len(run.scenario.limits)} limits" in seen
+    for name in run.metrics:
+        assert name.replace("_", " ") in seen and METRICS[name].meaning in seen
+    assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits) + 1
+
+
+def test_both_systems_of_units_are_there(page):
+    (run, *_) = re.findall(r"<tr>\s*<th scope=\"row\">altitude end error.*?</tr>", page, re.DOTALL)
+    cells = re.findall(r'<span class="si">([^&]*)&nbsp;m</span><span class="paper">([^&]*)&nbsp;ft</span>', run)
+    assert len(cells) >= 2
+    for si, paper in cells:
+        assert float(paper.replace("−", "-")) == pytest.approx(float(si.replace("−", "-")) / 0.3048, rel=1e-3)
+
+
+def test_what_happened_is_told_and_escaped(page):
+    seen = words(page)
+    assert "tube_mpc: <b>unusual</b>" in seen and "<b>unusual" not in page
+    assert "command of fuel equivalence ratio limited" in seen
+    assert "outside in" in seen and "inside throughout" in seen
+
+
+def test_parameters_certificate_and_repetition_are_told(page, loud):
+    seen = words(page)
+    assert "20 matrices 9 × 9" in seen and "vehicle.coupling" in seen
+    assert "invariant set" in seen and "parameters sha256" in seen
+    assert loud.custom_data["run_id"] in seen
+    assert f"git checkout {loud.custom_data['commit']}" in seen and "hsv run case1 " in seen
+
+
+def test_parameters_that_differ_are_marked_and_others_said_once(page):
+    rows = re.findall(r"<tr( class=differs)?>\s*<th scope=\"row\"><code>([^<]+)</code>", page)
+    marked = {name for mark, name in rows if mark}
+    assert marked == {"input.maximum", "tube.shape", "tube.half_width"}
+    assert len(rows) == len({name for _, name in rows})
+
+
+def test_all_recorded_steps_are_drawn(loud, quiet):
+    runs = reported_runs([quiet, loud])
+    described, _ = payload(runs)
+    names = [panel.name for panel in all_panels(runs)]
+    assert names == [panel["name"] for panel in described["panels"]]
+    assert len(names) == 12 + 7
+    assert set(described["lengths"]) == {1001, 2}
+
+
+def test_a_design_without_a_set_is_said_to_have_none(bags):
+    from recorded_flight import record_flight
+
+    bag = record_flight(bags / "no_set", tube__shape=[], tube__half_width=[], tube__centre=[], duration=2.0, fault=1.0)
+    page = render(reported_runs([bag]))
+    assert "carries an invariant set" in words(page) and 'id="plot-level"' not in page
+
+
+def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
+    types = message_types()
+    topics = [
+        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
+        for t in quiet.topics.values()
+    ]
+    writer = BagWriter(tmp_path / "bare", topics)
+    for topic in quiet.topics:
+        for time, data in quiet.messages(topic):
+            writer.write(topic, time, data)
+    writer.close()
+    seen = words(render(reported_runs([Bag(tmp_path / "bare")])))
+    assert "no limits to judge by" in seen and "no scenario is attached" in seen
+    assert "None are attached to the bag" in seen
+
+
+def test_a_bag_without_a_flight_is_refused(quiet, tmp_path):
+    types = message_types()
+    topics = [
+        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
+        for t in quiet.topics.values()
+    ]
+    BagWriter(tmp_path / "empty", topics).close()
+    with pytest.raises(RecordingError, match="no complete step"):
+        reported_runs([Bag(tmp_path / "empty")])
+    BagWriter(tmp_path / "partial", [t for t in topics if t.name != "/hsv/nominal"]).close()
+    with pytest.raises(RecordingError, match="no topic /hsv/nominal"):
+        reported_runs([Bag(tmp_path / "partial")])
+
+
+def test_a_file_that_cannot_be_written_is_named(quiet, tmp_path):
+    with pytest.raises(RecordingError, match=r"nowhere/page\.html: cannot be written"):
+        write_report([quiet], tmp_path / "nowhere" / "page.html")

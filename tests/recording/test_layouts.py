@@ -1,0 +1,100 @@
+"""The layouts for viewers name what is recorded, and nothing else."""
+
+import json
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+from recorded_flight import message_types
+from rosbags.typesys.store import Typestore
+
+from hsv.graph.description import TOPICS
+from hsv.recording.fields import fields_of
+from hsv.recording.viewers import LAYOUTS
+
+RECORDED = TOPICS | {"/rosout": "rcl_interfaces/msg/Log", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+UNIT = re.compile(r"\[(-|s|m|m/s|rad|rad/s|kg\^0\.5 m|kg\^0\.5 m/s|N|N m|Pa)\]$")
+
+
+@pytest.fixture(scope="module")
+def types() -> Typestore:
+    return message_types()
+
+
+def foxglove():
+    return json.loads((LAYOUTS / "foxglove.json").read_text())
+
+
+def curves_of_foxglove():
+    for panel in foxglove()["configById"].values():
+        for path in panel.get("paths", ()):
+            topic, _, field = path["value"].partition(".")
+            yield topic, field.split("."), panel["title"]
+
+
+def curves_of_plotjuggler():
+    root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
+    for area in root.iter("DockArea"):
+        for curve in area.iter("curve"):
+            name = curve.attrib["name"]
+            topic = next(topic for topic in sorted(RECORDED, key=len, reverse=True) if name.startswith(f"{topic}/"))
+            yield topic, name.removeprefix(f"{topic}/").split("/"), area.attrib["name"]
+
+
+@pytest.mark.parametrize("curves", [curves_of_foxglove, curves_of_plotjuggler])
+def test_curves_are_numbers_of_recorded_messages(types, curves):
+    found = list(curves())
+    assert len(found) > 30
+    for topic, path, _ in found:
+        kind = RECORDED[topic]
+        for depth, part in enumerate(path):
+            name, _, index = part.partition("[")
+            field = next((field for field in fields_of(types.fielddefs, kind) if field.name == name), None)
+            assert field is not None, f"{topic}: {kind} has no field {name}"
+            assert bool(index) == (field.count != "one"), f"{topic}.{'.'.join(path)}"
+            if index and field.count == "array":
+                assert int(index.rstrip("]")) < field.length
+            assert bool(field.format) == (depth == len(path) - 1), f"{topic}.{'.'.join(path)}"
+            kind = field.type
+
+
+@pytest.mark.parametrize("curves", [curves_of_foxglove, curves_of_plotjuggler])
+def test_every_plot_has_a_title_with_its_unit(curves):
+    for *_, title in curves():
+        assert UNIT.search(title), title
+
+
+def test_both_layouts_show_the_same():
+    assert sorted(curves_of_foxglove()) == sorted(curves_of_plotjuggler())
+
+
+def test_every_panel_of_foxglove_is_placed_once():
+    layout = foxglove()
+    placed = []
+
+    def walk(node):
+        if isinstance(node, str):
+            placed.append(node)
+            for tab in layout["configById"][node].get("tabs", ()):
+                walk(tab["layout"])
+        else:
+            assert node["direction"] in ("row", "column") and 0 < node["splitPercentage"] < 100
+            walk(node["first"])
+            walk(node["second"])
+
+    walk(layout["layout"])
+    assert sorted(placed) == sorted(layout["configById"])
+
+
+def test_topics_of_other_panels_are_recorded():
+    for panel in foxglove()["configById"].values():
+        topic = panel.get("topicToRender") or panel.get("topicPath")
+        assert topic is None or topic in RECORDED
+
+
+def test_sizes_of_plotjuggler_fit_their_splitters():
+    root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
+    for splitter in root.iter("DockSplitter"):
+        sizes = [float(size) for size in splitter.attrib["sizes"].split(";")]
+        assert len(sizes) == len(splitter) == int(splitter.attrib["count"])
+        assert sum(sizes) == pytest.approx(1.0, abs=1e-4)

@@ -1,0 +1,82 @@
+"""Headless Chromium, driven through chromedriver, as far as both are installed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HINT = "make test-viewers installs it"
+FLAGS = (
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--window-size=1400,1000",
+)
+
+
+class Browser:
+    """A browser with a profile of its own; pages are opened from files."""
+
+    def __init__(self, profile: Path) -> None:
+        webdriver = pytest.importorskip("selenium.webdriver", reason=f"no selenium; {HINT}")
+        service = pytest.importorskip("selenium.webdriver.chrome.service")
+        chromium = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+        driver = shutil.which("chromedriver")
+        if not chromium or not driver:
+            pytest.skip(f"no {'chromium' if not chromium else 'chromedriver'}; {HINT}")
+        options = webdriver.ChromeOptions()
+        options.binary_location = chromium
+        for flag in (*FLAGS, f"--user-data-dir={profile}"):
+            options.add_argument(flag)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.driver = webdriver.Chrome(options=options, service=service.Service(driver))
+
+    def open(self, page: Path) -> float:
+        """Open a report and wait until every plot is drawn; return the seconds until it had loaded."""
+        self.console()
+        start = time.monotonic()
+        self.driver.get(page.as_uri())
+        loaded = time.monotonic() - start
+        self.settle()
+        return loaded
+
+    def settle(self) -> None:
+        """Wait until nothing is left to draw."""
+        for _ in range(600):
+            if self.run("return Boolean(window.report) && report.panels.every((panel) => !panel.stale)"):
+                return
+            time.sleep(0.05)
+        raise AssertionError(f"the plots were not drawn: {self.console()}")
+
+    def run(self, script: str, *arguments: Any) -> Any:
+        """Run JavaScript in the page and return its result."""
+        return self.driver.execute_script(script, *arguments)
+
+    def click(self, selector: str) -> None:
+        """Click on the first element and wait until the plots have followed."""
+        self.driver.find_element("css selector", selector).click()
+        self.settle()
+
+    def console(self) -> list[str]:
+        """Return what the console received since the last call."""
+        return [entry["message"] for entry in self.driver.get_log("browser")]
+
+    def requests(self) -> list[str]:
+        """Return the addresses that were asked for since the last call."""
+        events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
+        return [event["params"]["request"]["url"] for event in events if event["method"] == "Network.requestWillBeSent"]
+
+    def media(self, **settings: Any) -> None:
+        """Emulate a medium ("print") or features of one ("prefers-color-scheme")."""
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", settings)
+        self.settle()
