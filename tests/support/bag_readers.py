@@ -1,0 +1,111 @@
+"""Readers of bags that other people wrote: each gives topic, time in nanoseconds and message as plain data."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
+
+from hsv.recording.fields import as_dict
+from hsv.recording.reader import Bag
+
+NPM = Path(__file__).parents[1] / "viewers" / "npm"
+
+Messages = Iterator[tuple[str, int, Any]]
+
+
+def ours(bag: Path) -> Messages:
+    opened = Bag(bag)
+    for topic, recorded in opened.topics.items():
+        for time, message in opened.decode(topic):
+            yield topic, time, as_dict(opened.types.fielddefs, recorded.type, message)
+
+
+def by_rosbags(bag: Path) -> Messages:
+    with AnyReader([bag]) as reader:
+        types = reader.typestore.fielddefs
+        for connection, time, data in reader.messages():
+            yield (
+                connection.topic,
+                time,
+                as_dict(types, connection.msgtype, reader.deserialize(data, connection.msgtype)),
+            )
+
+
+def by_mcap_ros2(bag: Path) -> Messages:
+    with next(bag.glob("*.mcap")).open("rb") as stream:
+        for item in make_reader(stream, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            yield item.channel.topic, item.message.log_time, _plain(item.decoded_message)
+
+
+def by_foxglove(bag: Path) -> Messages:
+    node = shutil.which("node")
+    if not node or not (NPM / "node_modules").is_dir():
+        pytest.skip(f"no {'node_modules' if node else 'node'}; make test-viewers installs it")
+    done = subprocess.run(
+        [node, str(NPM / "read_bag.mjs"), str(next(bag.glob("*.mcap")))], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    for line in done.stdout.splitlines():
+        topic, time, message = json.loads(line)
+        yield topic, int(time), message
+
+
+READERS: dict[str, Callable[[Path], Messages]] = {
+    "rosbags": by_rosbags,
+    "mcap-ros2-support": by_mcap_ros2,
+    "foxglove": by_foxglove,
+}
+
+
+def assert_equal(expected: Messages, actual: Messages) -> int:
+    """Assert that both read the same, whatever the order of topics; return the number of messages."""
+    first, second = _by_topic(expected), _by_topic(actual)
+    assert first.keys() == second.keys()
+    count = 0
+    for topic, messages in first.items():
+        assert len(messages) == len(second[topic]), topic
+        for (time, message), (other_time, other) in zip(messages, second[topic], strict=True):
+            assert time == other_time and _alike(message, other), (topic, time, message, other)
+            count += 1
+    return count
+
+
+def _by_topic(messages: Messages) -> dict[str, list[tuple[int, Any]]]:
+    sorted_out: dict[str, list[tuple[int, Any]]] = {}
+    for topic, time, message in messages:
+        sorted_out.setdefault(topic, []).append((time, message))
+    return sorted_out
+
+
+def _alike(a: Any, b: Any) -> bool:
+    if isinstance(a, dict):
+        return a.keys() == b.keys() and all(_alike(a[key], b[key]) for key in a)
+    if isinstance(a, list):
+        return len(a) == len(b) and all(_alike(x, y) for x, y in zip(a, b, strict=True))
+    if isinstance(b, str) and not isinstance(a, str):
+        # JSON lacks what is not finite, and integers of 64 bits.
+        b = float(b) if isinstance(a, float) else int(b)
+    return bool(a == b) or (isinstance(a, float) and math.isnan(a) and math.isnan(b))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if hasattr(value, "sec") and hasattr(value, "nanosec"):
+        return value.sec * 10**9 + value.nanosec
+    if hasattr(value, "__slots__"):
+        return {name: _plain(getattr(value, name)) for name in value.__slots__}
+    return value
