@@ -1,0 +1,155 @@
+"""The in-process flight as a C program: compiled on the spot, flown through ctypes."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from ctypes import POINTER, Structure, c_double, c_int64
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.control.nominal_law import FamilyLaw
+from hsv.control.tube_law import TubeLaw
+from hsv.errors import RunError
+from hsv.simulation.closed_loop import Components, History
+from hsv.vehicle.envelope import ANGLE_LIMIT
+
+FLAGS = ("-O3", "-ffp-contract=off")
+"""No contraction: a fused multiply-add rounds once where the compiled loop rounds twice."""
+
+_Doubles, _Integers = POINTER(c_double), POINTER(c_int64)
+
+
+class _Notch(Structure):
+    _fields_ = [("sections", c_int64), *((name, _Doubles) for name in "ABCDG")]
+
+
+class _Axis(Structure):
+    _fields_ = [("pieces", c_int64), ("vertices", c_int64), ("breakpoints", _Doubles), ("coefficients", _Doubles)]
+
+
+class _Polytope(Structure):
+    _fields_ = [("S", _Doubles), ("altitude", _Axis), ("velocity", _Axis)]
+
+
+class _Family(Structure):
+    _fields_ = [("count", c_int64), ("size", c_int64), ("gains", _Doubles), ("ellipsoids", _Doubles)]
+
+
+class _Tube(Structure):
+    _fields_ = [("tau", c_double), ("gain", _Doubles), ("minimum", _Doubles), ("maximum", _Doubles)]
+
+
+class _Faults(Structure):
+    _fields_ = [
+        ("count", c_int64),
+        *((name, _Integers) for name in ("start", "stop", "channel", "code")),
+        ("value", _Doubles),
+    ]
+
+
+class _History(Structure):
+    _fields_ = [("rows", c_int64), *((name, _Doubles) for name in History._fields)]
+
+
+class CFlight:
+    """The flight of ``components`` by the C build; the tube law over the nested family, as the compiled loop."""
+
+    def __init__(self, components: Components, flags: Sequence[str] = FLAGS) -> None:
+        """Compile and bind.
+
+        Raises:
+            RunError: No C compiler, a failed build, or components that the C build does not know.
+        """
+        law, nominal = components.tube_law, components.nominal_trajectory
+        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)):
+            raise RunError("C build: it flies the tube law over the nested family, expected a scenario with these")
+        self._folder = tempfile.TemporaryDirectory(prefix="hsv_bench_")
+        self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), flags)))
+        self._library.fly.restype = c_int64
+        self._kept: list[np.ndarray] = []
+        plant, notch, data = components.plant, components.notch_filter.data, nominal.data
+        S = data.polytope
+        faults = components.fault_injector.schedule
+        self._initial = plant.initial.state
+        self._rows = plant.steps + 1
+        self._arguments: list[Any] = [
+            ctypes.byref((c_double * len(plant.vehicle))(*plant.vehicle)),
+            c_double(plant.period),
+            c_int64(plant.substeps),
+            c_double(ANGLE_LIMIT),
+            ctypes.byref(_Notch(len(notch.D), *(self._doubles(getattr(notch, name)) for name in "ABCDG"))),
+            ctypes.byref(_Polytope(self._doubles(S.S), self._axis(S.altitude), self._axis(S.velocity))),
+            ctypes.byref(
+                _Family(
+                    len(data.gains), data.ellipsoids.shape[1], self._doubles(data.gains), self._doubles(data.ellipsoids)
+                )
+            ),
+            ctypes.byref(_Tube(law.data.tau, *(self._doubles(a) for a in (law.data.gain, law.data.minimum, law.data.maximum)))),
+            ctypes.byref(
+                _Faults(
+                    len(faults.start),
+                    *(self._integers(a) for a in (faults.start, faults.stop, faults.channel, faults.code)),
+                    self._doubles(faults.value),
+                )
+            ),
+            self._doubles(nominal.reference.state),
+            self._doubles(nominal.reference.input),
+        ]
+
+    def fly(self) -> History:
+        """Return what happened, to compare with the history of the compiled loop."""
+        history = History.empty(self._rows)
+        x = self._initial.copy()
+        outputs = _History(self._rows, *(column.ctypes.data_as(_Doubles) for column in history))
+        rows = self._library.fly(*self._arguments, x.ctypes.data_as(_Doubles), ctypes.byref(outputs))
+        return History(*(column[:rows] for column in history))
+
+    def _doubles(self, values: np.ndarray) -> Any:
+        return self._pointer(values, np.float64, _Doubles)
+
+    def _integers(self, values: np.ndarray) -> Any:
+        return self._pointer(values, np.int64, _Integers)
+
+    def _pointer(self, values: np.ndarray, kind: type, pointer: Any) -> Any:
+        # The C structures hold addresses only: what they point to must live as long as this object.
+        self._kept.append(np.ascontiguousarray(values, kind))
+        return self._kept[-1].ctypes.data_as(pointer)
+
+    def _axis(self, axis: Any) -> _Axis:
+        return _Axis(
+            len(axis.breakpoints) - 1,
+            axis.coefficients.shape[2],
+            self._doubles(axis.breakpoints),
+            self._doubles(axis.coefficients),
+        )
+
+
+def _compiled(folder: Path, flags: Sequence[str]) -> Path:
+    compiler = shutil.which("cc")
+    if compiler is None:
+        raise RunError("C build: no C compiler cc on PATH, expected one (sudo apt-get install gcc)")
+    library = folder / "flight.so"
+    with as_file(files("hsv.bench").joinpath("flight.c")) as source:
+        command = [compiler, *flags, "-std=c11", "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
+        result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode:
+        raise RunError(f"C build: {' '.join(command)} failed: {result.stderr.strip().splitlines()[-1:]}")
+    return library
+
+
+def largest_difference(a: History, b: History) -> float:
+    """Return the largest |a - b| / max(1, |a|, |b|) over two histories, 0 where all bits agree; infinity by length."""
+    largest = 0.0
+    for x, y in zip(a, b, strict=True):
+        if x.shape != y.shape:
+            return float("inf")
+        scale = np.maximum(1.0, np.maximum(np.abs(x), np.abs(y)))
+        largest = max(largest, float(np.max(np.abs(x - y) / scale)))
+    return largest
