@@ -16,6 +16,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
             "player = hsv_bringup.player:main",
             "stand_in = hsv_bringup.stand_in:main",

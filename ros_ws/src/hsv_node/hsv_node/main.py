@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -21,6 +21,11 @@ def run_node(build: Callable[[], ProcessNode], name: str, args: Sequence[str] | 
 
     Bad parameters end it before it joins the graph, with one line on standard error and exit code 2.
     """
+    return run_nodes(lambda: iter([build()]), name, args)
+
+
+def run_nodes(build: Callable[[], Iterator[ProcessNode]], name: str, args: Sequence[str] | None = None) -> int:
+    """Spin several nodes with one executor, as :func:`run_node` does one, until the first of them finishes."""
     try:
         rclpy.init(args=None if args is None else list(args), signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except Exception as error:  # rcl reports a malformed command line or parameter file by several exception types
@@ -29,24 +34,27 @@ def run_node(build: Callable[[], ProcessNode], name: str, args: Sequence[str] | 
     stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stop.append(received))
-    node = None
+    nodes: list[ProcessNode] = []
     try:
-        node = build()
         executor = EventsExecutor()
-        executor.add_node(node)
-        # The executor runs nothing while it waits without a limit.
+        for node in build():
+            nodes.append(node)
+            executor.add_node(node)
         while not stop:
-            node.poll()
-            if node.exit_code is not None:
-                break
-            executor.spin_once(timeout_sec=node.patience())
-        return node.exit_code or 0
+            for node in nodes:
+                node.poll()
+            codes = [node.exit_code for node in nodes if node.exit_code is not None]
+            if codes:
+                return max(codes)
+            # The executor runs nothing while it waits without a limit.
+            executor.spin_once(timeout_sec=min([node.patience() for node in nodes]))
+        return 0
     except (HsvError, ParameterException, rclpy_implementation.RCLError) as error:
         return _refuse(name, error)
     except (KeyboardInterrupt, ExternalShutdownException):
         return 0
     finally:
-        if node is not None:
+        for node in nodes:
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()

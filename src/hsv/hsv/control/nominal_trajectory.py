@@ -11,7 +11,6 @@ from numba import njit
 
 from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import FamilyLaw, NominalData, NominalLaw, NominalStatus
-from hsv.errors import ParameterError
 from hsv.lpv.polytope import schedule
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
@@ -28,12 +27,6 @@ REFERENCE_PARAMETERS = (
 NOMINAL_PARAMETERS = (
     *REFERENCE_PARAMETERS,
     Parameter("nominal.law", "family", "nested gains, the same LMI solved in flight, or a QP", choices=LAWS),
-    Parameter(
-        "nominal.input_minimum", [], "law qp: least u_r + u_n, U minus F Z: fuel equivalence ratio, elevator (rad)"
-    ),
-    Parameter(
-        "nominal.input_maximum", [], "law qp: largest u_r + u_n, U minus F Z: fuel equivalence ratio, elevator (rad)"
-    ),
 )
 
 
@@ -90,6 +83,9 @@ class NominalTrajectory:
         self._deviation = np.zeros(n)
         self._scratch = np.empty(n * (n + m)), np.empty(n)
         self._started = False
+        # Compile now: a cold cache must not stall a flight.
+        rest = FamilyLaw(self.data).step(self._deviation).input
+        nominal_advance(self.data.polytope, *reference.state[:2], self._deviation, rest, *self._scratch)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
@@ -143,10 +139,5 @@ def _law(values: Mapping[str, Any], design: ControlDesign, reference: Trim) -> N
     if values["nominal.law"] == "qp":
         from hsv.control.qp_law import QpLaw
 
-        bounds = []
-        for name in ("nominal.input_minimum", "nominal.input_maximum"):
-            bounds.append(np.array(values[name], float))
-            if bounds[-1].shape != (2,):
-                raise ParameterError(f"parameter {name}: {len(values[name])} values, expected 2 for nominal.law = 'qp'")
-        return QpLaw(design, nominal_data(design), reference, bounds[0], bounds[1])
+        return QpLaw(design, nominal_data(design), reference)
     return None

@@ -34,6 +34,8 @@ class RobustMpc:
             )
         self.data = TubeData(gains[gain_index], 1.0, design.input_minimum, design.input_maximum)
         self._none = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
+        x, u = self._none
+        self.step(x, 0.0, np.empty(0), x, u, x, u)  # compile now: a cold cache must not stall a flight
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:

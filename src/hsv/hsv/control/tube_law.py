@@ -132,6 +132,10 @@ class TubeLaw:
     def __init__(self, design: ControlDesign, tau: float = 1.0) -> None:
         self.data = TubeData(design.feedback_gain, tau, design.input_minimum, design.input_maximum)
         self._monitor = TubeMonitor(design.tube, discretise(design.notch, design.period))
+        # Compile now: a cold cache must not stall a flight.
+        x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
+        self.step(x, 0.0, np.zeros(2 * len(design.notch)), x, u, x, u)
+        self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:

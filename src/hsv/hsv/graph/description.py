@@ -45,6 +45,9 @@ FAULT_INJECTOR = NodeDescription(
 ROBUST_MPC = replace(TUBE_MPC, name="robust_mpc", executable="robust_mpc")
 """Flies in place of the Tube-MPC controller, on the same topics."""
 
+COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
+"""All nodes of the graph in one process."""
+
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
 

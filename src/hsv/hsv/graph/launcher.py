@@ -14,10 +14,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from hsv.errors import RunError
-from hsv.graph.description import PLANT, NodeDescription
+from hsv.graph.description import COMPOSED, PLANT, NodeDescription
 
 GRACE = 5.0
 """Seconds between asking a process to end and forcing it."""
+
+_FLYING = (PLANT, COMPOSED)
+"""Processes that report the steps of the flight."""
 
 _PR_SET_PDEATHSIG = 1
 
@@ -96,7 +99,7 @@ class Launcher:
         while True:
             for process in self._processes:
                 code = process.popen.poll()
-                if code is not None and not (_landed(process, code) and awaited != PLANT.name):
+                if code is not None and not (_landed(process, code) and process.description.name != awaited):
                     return self._ending(process, code, awaited)
             time.sleep(0.02)
 
@@ -118,7 +121,7 @@ class Launcher:
 
     def _start(self, description: NodeDescription, path: Path) -> None:
         command = [str(path), "--ros-args", *self._arguments]
-        if description is PLANT:
+        if description in _FLYING:
             command += ["-p", "progress:=true"]
         popen = subprocess.Popen(
             command,
@@ -140,7 +143,7 @@ class Launcher:
         assert process.popen.stdout is not None
         for line in process.popen.stdout:
             text = line.rstrip()
-            if process.description is PLANT and text.startswith("step "):
+            if process.description in _FLYING and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
             elif text:
                 # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
@@ -159,7 +162,7 @@ class Launcher:
 
 
 def _landed(process: _Process, code: int) -> bool:
-    return process.description is PLANT and code in (0, 3)
+    return process.description in _FLYING and code in (0, 3)
 
 
 def _die_with_parent() -> None:

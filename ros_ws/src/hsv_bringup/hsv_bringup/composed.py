@@ -1,0 +1,34 @@
+"""The whole graph in one process with one executor: the same nodes, messages and bag, faster."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from hsv_bringup.recorder import RecorderNode
+from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
+from hsv_ctrl.notch_filter import NotchFilterNode
+from hsv_ctrl.robust_mpc import RobustMpcNode
+from hsv_ctrl.tube_mpc import TubeMpcNode
+from hsv_node.main import run_nodes
+from hsv_node.process import ProcessNode
+from hsv_plant.fault_injector import FaultInjectorNode
+from hsv_plant.plant import PlantNode
+
+CONTROLLER_NODES = {"tube_mpc": TubeMpcNode, "robust_mpc": RobustMpcNode}
+
+
+def nodes() -> Iterator[ProcessNode]:
+    """Yield the nodes of the graph; the plant's parameters say which controller flies and whether a recorder writes."""
+    plant = PlantNode()
+    yield plant
+    yield NotchFilterNode()
+    yield NominalTrajectoryNode()
+    yield CONTROLLER_NODES[plant.controller]()
+    yield FaultInjectorNode()
+    if plant.recorded:
+        yield RecorderNode()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the graph."""
+    return run_nodes(nodes, "composed", args)
