@@ -24,9 +24,6 @@ from hsv_node.process import ProcessNode
 
 CLOCK = "/clock"
 
-ACKNOWLEDGED_STEPS = 50
-"""Steps at full speed after which the listeners must have taken everything: no more than their queues hold."""
-
 _ORDER = {topic: index for index, topic in enumerate(TOPICS)}
 
 
@@ -39,7 +36,7 @@ class PlayerNode(ProcessNode):
         Args:
             bag: What to play.
             topics: Topics to publish.
-            rate: Simulated over wall time; 0: as fast as the listeners take it.
+            rate: Simulated over wall time.
             paused: Whether to begin paused.
             delay: Wall time (s) before the first message, for listeners to find the player.
         """
@@ -63,11 +60,9 @@ class PlayerNode(ProcessNode):
         """Publish what is due; end after the last message."""
         while not self._paused and self._next < len(self._instants) and self._delay() <= 0.0:
             self._publish()
-            if self._rate == 0.0 and self._next % ACKNOWLEDGED_STEPS == 0:
-                self._wait_for_listeners()
-                break
         if self._next >= len(self._instants):
-            self._wait_for_listeners()
+            for publisher in self._talkers.values():
+                publisher.wait_for_all_acked(Duration(seconds=5.0))
             self.finish(0)
 
     def patience(self) -> float:
@@ -78,7 +73,7 @@ class PlayerNode(ProcessNode):
         now = time.monotonic()
         if now < self._begins:
             return self._begins - now
-        if self._rate == 0.0 or self._next >= len(self._instants):
+        if self._next >= len(self._instants):
             return 0.0
         instant = self._instants[self._next][0]
         if self._anchor is None:
@@ -89,10 +84,6 @@ class PlayerNode(ProcessNode):
         for topic, data in self._instants[self._next][1]:
             self._talkers[topic].publish(data)
         self._next += 1
-
-    def _wait_for_listeners(self) -> None:
-        for publisher in self._talkers.values():
-            publisher.wait_for_all_acked(Duration(seconds=5.0))
 
     def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._paused = True
@@ -142,7 +133,7 @@ def main(args: Sequence[str] | None = None) -> int:
     words = remove_ros_args(list(sys.argv if args is None else args))[1:]
     parser = argparse.ArgumentParser(prog="player", description="Republish a bag.")
     parser.add_argument("bag", type=Path, help="bag directory, or its .mcap file")
-    parser.add_argument("--rate", type=float, default=1.0, help="pace: 1 as recorded, 0 as fast as listeners take it")
+    parser.add_argument("--rate", type=float, default=1.0, help="pace: 1 as recorded, 10 ten times as fast")
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, /clock comes along; default: all")
     parser.add_argument("--no-clock", action="store_true", help="leave /clock to somebody else")
     parser.add_argument("--paused", action="store_true", help="begin paused: call /player/step or /player/resume")
@@ -150,8 +141,8 @@ def main(args: Sequence[str] | None = None) -> int:
     options = parser.parse_args(words)
 
     def build() -> PlayerNode:
-        if not 0.0 <= options.rate < math.inf:
-            raise ParameterError(f"rate = {options.rate}: expected a finite number, not below zero")
+        if not 0.0 < options.rate < math.inf:
+            raise ParameterError(f"rate = {options.rate}: expected a finite number above zero")
         bag = Bag(options.bag)
         topics = dict.fromkeys(options.topics or bag.topics)
         for topic in topics:

@@ -11,7 +11,7 @@ from hsv.cli.options import BagArgument
 
 def play(
     bag: BagArgument,
-    rate: Annotated[float, typer.Option(help="Pace: 1 as recorded, 0 as fast as listeners take it.")] = 1.0,
+    rate: Annotated[float, typer.Option(help="Pace: 1 as recorded, 10 ten times as fast.")] = 1.0,
     topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, may be repeated; default: all.")] = None,
     clock: Annotated[bool, typer.Option(help="Publish /clock.")] = True,
     paused: Annotated[

@@ -1,0 +1,181 @@
+"""A run of real nodes, repeated by real nodes, played again, and read by others."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import textwrap
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from bag_readers import READERS, assert_equal, ours
+from domain_coordinator import domain_id
+from node_processes import Processes, short_scenario
+
+from hsv.graph.description import TOPICS
+from hsv.recording.reader import Bag
+from hsv.replay.attached import flown_parameters
+from hsv.replay.engine import chosen, replay, rerun
+
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(600)]
+
+STEPS = 601
+
+
+@pytest.fixture(scope="module")
+def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    with domain_id() as number:
+        local = {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+        started = Processes(os.environ | local, tmp_path_factory.mktemp("recorded"))
+        yield started
+        started.stop()
+
+
+@pytest.fixture(scope="module")
+def bag(processes: Processes) -> Path:
+    """A flight of twelve seconds, long enough to be worth a replay."""
+    scenario = short_scenario(processes.folder, duration=12, fault=6)
+    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / "flown", timeout=120.0)
+    assert done.returncode == 0, done.stdout
+    return processes.folder / "flown"
+
+
+def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
+    opened = Bag(bag)
+    values = flown_parameters(opened)
+    results = [replay(opened, process, values, lambda *_: None) for process in chosen("tube_mpc").values()]
+    results += rerun(opened, "tube_mpc", values, lambda *_: None)
+    assert len(results) == 10 and all(result.identical for result in results)
+
+
+@pytest.mark.parametrize("words", [["--node", "plant"], ["--node", "tube_mpc"], ["--rerun"]], ids=" ".join)
+def test_replay_over_dds_is_identical_in_every_byte(processes: Processes, bag: Path, words: list[str]) -> None:
+    done = processes.run("hsv", "replay", bag, "--over-dds", *words, timeout=300.0)
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count("identical in every byte") == (5 if "--rerun" in words else 1), done.stdout
+
+
+def test_a_node_that_does_not_start_is_named(processes: Processes, bag: Path) -> None:
+    wrong = processes.folder / "wrong.yaml"
+    wrong.write_text("/**:\n  ros__parameters:\n    feedback.gain: [1.0, 2.0]\n")
+    words = ["--over-dds", "--node", "tube_mpc", "--parameters", str(wrong)]
+    done = processes.run("hsv", "replay", bag, *words, timeout=60.0)
+    assert done.returncode == 1
+    assert "tube_mpc ended with exit code 2" in done.stdout and "feedback.gain" in done.stdout
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_others_read_it_alike(bag: Path, name: str) -> None:
+    assert assert_equal(ours(bag), READERS[name](bag)) > STEPS * len(TOPICS)
+
+
+HASHES = textwrap.dedent(
+    """
+    import json, sys
+    import rclpy
+    from hsv.recording.reader import Bag
+    from hsv_node.messages import message_class
+
+    rclpy.init()
+    node, other = rclpy.create_node("talker"), rclpy.create_node("asker")
+    found = {}
+    for name, topic in Bag(sys.argv[1]).topics.items():
+        node.create_publisher(message_class(topic.type), name + "_hash", 1)
+        while not (infos := other.get_publishers_info_by_topic(name + "_hash")):
+            rclpy.spin_once(other, timeout_sec=0.05)
+        version, value = infos[0].topic_type_hash.version, infos[0].topic_type_hash.value
+        found[name] = f"RIHS{version:02x}_{bytes(value).hex()}"
+    print(json.dumps(found))
+    """
+)
+
+
+def test_type_hashes_are_those_of_the_running_ros(processes: Processes, bag: Path) -> None:
+    import json
+
+    done = processes.run(sys.executable, "-c", HASHES, bag)
+    assert done.returncode == 0, done.stdout
+    running = json.loads(done.stdout.splitlines()[-1])
+    assert running == {name: topic.type_hash for name, topic in Bag(bag).topics.items()}
+
+
+LISTEN = textwrap.dedent(
+    """
+    import sys, time
+    import rclpy
+    from rclpy.experimental import EventsExecutor
+    from hsv.graph.description import TOPICS
+    from hsv.recording.reader import Bag
+    from hsv_node.messages import message_class
+    from hsv_node.qos import STEP
+    from std_srvs.srv import Trigger
+
+    rclpy.init()
+    node = rclpy.create_node("listener")
+    recorded = Bag(sys.argv[1])
+    topics = sys.argv[2].split(",")
+    heard = {topic: [] for topic in topics}
+    for topic in topics:
+        node.create_subscription(message_class(TOPICS[topic]), topic, heard[topic].append, STEP, raw=True)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    expected = {topic: [data for _, data in recorded.messages(topic)] for topic in topics}
+
+    def wait(done, what):
+        deadline = time.monotonic() + 60.0
+        while not done():
+            assert time.monotonic() < deadline, what
+            executor.spin_once(timeout_sec=0.05)
+
+    def call(name):
+        client = node.create_client(Trigger, "/player/" + name)
+        wait(client.service_is_ready, name)
+        future = client.call_async(Trigger.Request())
+        wait(future.done, name)
+        assert future.result().success, future.result().message
+        return future.result().message
+
+    wait(lambda: all(node.count_publishers(topic) for topic in topics), "no player")
+    time.sleep(0.5)
+    for step in range(1, 4):
+        print(call("step"))
+        wait(lambda: all(len(messages) >= step for messages in heard.values()), f"step {step}")
+    assert all(len(messages) == 3 for messages in heard.values()), {t: len(m) for t, m in heard.items()}
+    print(call("resume"))
+    wait(lambda: all(len(heard[topic]) >= len(expected[topic]) for topic in topics), "the end")
+    assert heard == expected
+    print("all", sum(map(len, heard.values())))
+    """
+)
+
+
+def test_player_steps_and_plays_the_recorded_bytes(processes: Processes, bag: Path) -> None:
+    topics = ["/hsv/state", "/hsv/command"]
+    words = ["--rate", "20", "--paused", "--topics", *topics]
+    player = processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
+    done = processes.run(sys.executable, "-c", LISTEN, bag, ",".join([*topics, "/clock"]), timeout=120.0)
+    assert done.returncode == 0, done.stdout
+    assert "paused, played up to t = 0.040 s" in done.stdout and f"all {3 * STEPS}" in done.stdout
+    assert player.wait(30.0) == 0
+
+
+def test_player_keeps_the_pace(processes: Processes, bag: Path) -> None:
+    import time
+
+    begun = time.monotonic()
+    done = processes.run("hsv", "play", bag, "--rate", "4", "--delay", "0", "--topic", "/hsv/state")
+    assert done.returncode == 0, done.stdout
+    assert time.monotonic() - begun >= 3.0
+
+
+def test_bad_words_of_the_player_are_one_line(processes: Processes, bag: Path) -> None:
+    for words, said in (
+        ([processes.folder / "nowhere"], "does not exist"),
+        ([bag, "--rate", "-1"], "rate = -1.0"),
+        ([bag, "--topics", "/hsv/nowhere"], "no topic /hsv/nowhere"),
+    ):
+        done: subprocess.CompletedProcess[str] = processes.run("ros2", "run", "hsv_bringup", "player", *words)
+        assert done.returncode == 2 and said in done.stdout
+        assert len([line for line in done.stdout.splitlines() if line]) == 1, done.stdout
