@@ -6,6 +6,7 @@ import signal
 import subprocess
 import time
 from pathlib import Path
+from typing import IO
 
 SHORT = """
 title = "a short Case 1"
@@ -50,13 +51,13 @@ class Processes:
         self.folder = folder
         self._started: list[subprocess.Popen[str]] = []
 
-    def start(self, *command: str | Path) -> subprocess.Popen[str]:
-        """Start a command with its output in a pipe."""
+    def start(self, *command: str | Path, output: IO[str] | int = subprocess.PIPE) -> subprocess.Popen[str]:
+        """Start a command with its output in a pipe, or in ``output``."""
         popen = subprocess.Popen(
             [str(word) for word in command],
             cwd=self.folder,
             env=self.environment,
-            stdout=subprocess.PIPE,
+            stdout=output,
             stderr=subprocess.STDOUT,
             text=True,
         )

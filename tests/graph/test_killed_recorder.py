@@ -1,0 +1,90 @@
+"""A recorder killed at a random moment loses the last fraction of a second and nothing else.
+
+HSV_KILLS=20 python3 -m pytest tests/graph/test_killed_recorder.py
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+from node_processes import Processes, children, short_scenario
+from rosbags.rosbag2 import Reader
+
+from hsv.graph.description import TOPICS
+from hsv.recording.reader import Bag
+
+pytestmark = [pytest.mark.graph, pytest.mark.timeout(180)]
+
+KILLS = int(os.environ.get("HSV_KILLS", "2"))
+PERIOD = 0.02
+LARGEST_LOSS = 0.5
+"""Seconds of simulated time."""
+
+LISTEN = textwrap.dedent(
+    """
+    import struct, time
+    import rclpy
+    from hsv_msgs.msg import VehicleState
+    from hsv_node.qos import STEP
+    from rclpy.experimental import EventsExecutor
+
+    rclpy.init()
+    node = rclpy.create_node("listener")
+
+    def heard(data):
+        sec, nanosec = struct.unpack_from("<iI", data, 4)
+        print(time.monotonic(), round((sec + 1e-9 * nanosec) / 0.02), flush=True)
+
+    node.create_subscription(VehicleState, "/hsv/state", heard, STEP, raw=True)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    while True:
+        executor.spin_once(timeout_sec=0.25)
+    """
+)
+
+
+@pytest.mark.parametrize("seed", range(KILLS))
+def test_bag_opens_and_has_all_but_the_last_moment(processes: Processes, seed: int) -> None:
+    chance = random.Random(seed)
+    bag = processes.folder / "killed"
+    words = processes.folder / "heard.txt"
+    with words.open("w") as stream:
+        listener = processes.start(sys.executable, "-c", LISTEN, output=stream)
+        run = processes.start("hsv", "run", short_scenario(processes.folder, duration=600, fault=3), "--bag", bag)
+        deadline = time.monotonic() + 60.0
+        while not words.stat().st_size:
+            assert time.monotonic() < deadline and run.poll() is None, "no flight"
+            time.sleep(0.05)
+        time.sleep(chance.uniform(0.3, 6.0))
+        recorder = children(run.pid)["recorder"]
+        killed = time.monotonic()
+        os.kill(recorder, signal.SIGKILL)
+        output, _ = run.communicate(timeout=30.0)
+        listener.kill()
+        listener.wait()
+    assert run.returncode == 1 and "recorder was killed by SIGKILL" in output
+    assert _steps(bag) and Bag(bag).complete
+    flown = [line.split() for line in words.read_text().splitlines() if len(line.split()) == 2]
+    last = max(int(step) for moment, step in flown if float(moment) <= killed)
+    lost = (last + 1 - _steps(bag)) * PERIOD
+    print(f"killed at step {last}, lost {lost:.2f} s")
+    assert lost < LARGEST_LOSS
+    with Reader(bag) as reader:
+        assert reader.message_count == sum(topic.count for topic in Bag(bag).topics.values())
+
+
+def _steps(bag: Path) -> int:
+    recorded = Bag(bag)
+    steps = min(recorded.topics[topic].count for topic in TOPICS)
+    for topic in TOPICS:
+        stamps = recorded.times(topic)[:steps]
+        assert stamps.tolist() == [round(k * PERIOD * 1e9) for k in range(steps)], topic
+    return steps
