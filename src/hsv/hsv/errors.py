@@ -29,5 +29,9 @@ class RunError(HsvError, RuntimeError):
     """A flight that did not come to its planned end."""
 
 
+class CampaignError(HsvError, ValueError):
+    """A Monte Carlo campaign with a wrong setting, or its results missing, foreign or of another campaign."""
+
+
 class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""

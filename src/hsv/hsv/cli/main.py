@@ -11,6 +11,7 @@ from hsv.cli.diff import diff
 from hsv.cli.export import export
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
+from hsv.cli.montecarlo import montecarlo
 from hsv.cli.output import errors
 from hsv.cli.play import play
 from hsv.cli.plot import plot
@@ -54,6 +55,7 @@ for command in (
     export,
 ):
     app.command()(command)
+app.add_typer(montecarlo, name="montecarlo")
 
 
 def main() -> None:

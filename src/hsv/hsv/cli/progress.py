@@ -54,3 +54,29 @@ def flight(title: str, duration: float, steps: int) -> Iterator[Callable[[int], 
             bar.update(task, completed=step, note=f"{simulated:.0f} of {duration:.0f} s{factor}")
 
         yield report
+
+
+@contextmanager
+def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Yield a callback (flights finished) that shows flights a second and the time that is left."""
+    import time
+
+    with _bar() as bar:
+        task = bar.add_task(title, total=total, note="starting the workers")
+        begun: list[tuple[float, int]] = []
+
+        def report(finished: int) -> None:
+            # What an interrupted campaign had finished before says nothing of the pace now.
+            begun[:1] = begun[:1] or [(time.monotonic(), finished)]
+            start, before = begun[0]
+            rate = (finished - before) / max(time.monotonic() - start, 1e-9)
+            left = f", {_clock((total - finished) / rate)} left" if finished > before else ""
+            bar.update(task, completed=finished, note=f"{finished} of {total} flights, {rate:.1f} / s{left}")
+
+        yield report
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"

@@ -1,0 +1,104 @@
+"""One flight of a campaign again, alone: in this process, or by the graph of node processes over DDS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from hsv.campaign.factors import scenario_toml
+from hsv.campaign.pilot import Outcome, Pilot
+from hsv.campaign.summary import Results
+from hsv.campaign.table import OUTCOMES
+from hsv.control.design_file import find_design, read_parameters
+from hsv.errors import CampaignError, RunError
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """A flight again: what the campaign recorded, what came out now (SI), and the bag if it was recorded."""
+
+    flight: int
+    recorded: Outcome
+    repeated: Outcome
+    bag: Path | None = None
+
+    @property
+    def differing(self) -> list[str]:
+        """Names of the outcomes in which any bit differs."""
+        return [name for name in self.recorded if not _same(self.recorded[name], self.repeated.get(name))]
+
+
+def in_process(results: Results, flight: int) -> Repetition:
+    """Fly ``flight`` again with the design kept in the results.
+
+    Raises:
+        CampaignError: No such flight.
+    """
+    row, pilot = _row(results, flight), Pilot(results.campaign)
+    data = pilot.fly(pilot.samples[flight]).data()
+    return Repetition(flight, _outcome(row), pilot.outcome(data))
+
+
+def over_dds(
+    results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
+) -> Repetition:
+    """Fly ``flight`` again with the node processes, recorded to ``bag``.
+
+    Args:
+        results: The campaign.
+        flight: Number of the flight.
+        bag: Bag to write, a new directory.
+        progress: Called with the step reached and the last step.
+
+    Raises:
+        CampaignError: No such flight, or the design is not what it was.
+        RunError: A process failed; its last words are in the message.
+    """
+    from hsv.graph.launcher import Launcher
+    from hsv.graph.preparation import prepare
+    from hsv.recording.flight import flight_data
+    from hsv.recording.reader import Bag
+
+    row, pilot = _row(results, flight), Pilot(results.campaign)
+    scenario = pilot.scenario
+    if read_parameters(find_design(scenario.design)) != results.campaign.design:
+        raise CampaignError(
+            f"design {scenario.design!r}: not the one that the campaign flew, expected the same to fly it over DDS"
+        )
+    with TemporaryDirectory(prefix="hsv_campaign_") as folder:
+        path = Path(folder, f"{scenario.name}_flight_{flight}.toml")
+        path.write_text(scenario_toml(scenario, results.campaign.factors, pilot.samples[flight]), encoding="utf-8")
+        prepared = prepare(str(path), bag=bag)
+    arguments = [word for file in prepared.parameter_files for word in ("--params-file", str(file))]
+    with Launcher(
+        prepared.nodes, arguments, lambda step: progress(step, prepared.steps), lambda node, text: None
+    ) as launcher:
+        ending = launcher.wait()
+    if ending.culprit:
+        raise RunError(f"{ending.culprit} {ending.reason}: {' | '.join(ending.last_words)}")
+    recorded = Bag(bag)
+    repeated = pilot.outcome(flight_data(recorded))
+    if repeated["tube_level"] is not None:
+        # What the controller itself published, not what is computed from its messages.
+        repeated["tube_level"] = float(np.max(recorded.columns("/hsv/tube_status")["level"]))
+    return Repetition(flight, _outcome(row), repeated, bag)
+
+
+def _row(results: Results, flight: int) -> dict[str, Any]:
+    if not 0 <= flight < results.campaign.samples:
+        raise CampaignError(f"flight = {flight}: expected 0 to {results.campaign.samples - 1}")
+    return results.row(flight)
+
+
+def _outcome(row: dict[str, Any]) -> Outcome:
+    return {name: row[name] for name in ("diverged", *OUTCOMES)}
+
+
+def _same(a: float | bool | None, b: float | bool | None) -> bool:
+    return a == b or (isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b))

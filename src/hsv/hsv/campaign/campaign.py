@@ -1,0 +1,129 @@
+"""What a campaign flies: a scenario, a design, and the factors that are drawn anew for every flight."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Self
+
+from hsv.campaign.factors import Factor, factors_of
+from hsv.control.design_file import find_design, read_parameters
+from hsv.errors import CampaignError
+from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
+
+METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
+
+_BATCHES = 256
+_BATCH_LIMITS = (8, 256)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Everything that its flights depend on; equal campaigns give equal results, byte for byte."""
+
+    scenario_name: str
+    scenario_text: str
+    design: Mapping[str, Any]
+    """Flat parameters of the controller's design, kept whole: its file may change later."""
+    method: str
+    """How samples are drawn, one of :data:`METHODS`."""
+    samples: int
+    """Number of flights."""
+    seed: int
+    factors: tuple[Factor, ...]
+    commit: str
+    """Version of the program, so that no result mixes two."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario without any change."""
+        return parse_scenario(self.scenario_text, self.scenario_name)
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Flat parameters of the scenario's own flight."""
+        return {**self.design, **self.scenario.parameters()}
+
+    @property
+    def batch(self) -> int:
+        """Flights a batch, the unit that is flown and stored at once."""
+        low, high = _BATCH_LIMITS
+        return max(low, min(high, self.samples // _BATCHES))
+
+    @property
+    def batches(self) -> int:
+        """Number of batches."""
+        return -(-self.samples // self.batch)
+
+    def flights(self, batch: int) -> range:
+        """Return the numbers of the flights of a batch."""
+        return range(batch * self.batch, min((batch + 1) * self.batch, self.samples))
+
+    @property
+    def text(self) -> str:
+        """The campaign as JSON, the same text for the same campaign."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @property
+    def digest(self) -> str:
+        """A name for this campaign and no other."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """Return the campaign written by :attr:`text`."""
+        values = json.loads(text)
+        return cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
+
+    def difference(self, other: Campaign) -> str:
+        """Return the first setting in which ``other`` differs, in words; empty if in none."""
+        for field in fields(self):
+            mine, theirs = getattr(self, field.name), getattr(other, field.name)
+            if mine != theirs:
+                short = isinstance(mine, str | int) and len(str(mine)) < 60
+                return f"{field.name} = {mine} there, {theirs} here" if short else f"its {field.name} differ"
+        return ""
+
+
+def plan(
+    scenario_name: str,
+    *,
+    method: str = "uniform",
+    samples: int = 1000,
+    seed: int = 1,
+    scale: float = 1.0,
+    commit: str = "unknown",
+    **ranges: tuple[float, float] | None,
+) -> Campaign:
+    """Return the campaign over the uncertain parameters of the paper's section 5.1, and over what ``ranges`` name.
+
+    Args:
+        scenario_name: Shipped scenario or path of a TOML file.
+        method: One of :data:`METHODS`; ``"corners"`` flies all combinations of least and largest value.
+        samples: Number of flights; not used for corners.
+        seed: Determines all samples.
+        scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
+        commit: Version of the program.
+        ranges: Least and largest value (SI) of further factors, see :data:`hsv.campaign.factors.OPTIONAL`.
+
+    Raises:
+        CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
+    """
+    text = scenario_text(scenario_name)
+    scenario = parse_scenario(text, Path(scenario_name).stem)
+    factors = factors_of(scenario, scale, ranges)
+    if method not in METHODS:
+        raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
+    if method == "corners":
+        samples = 2 ** len(factors)
+    if not 1 <= samples <= 10**8:
+        raise CampaignError(f"samples = {samples}: expected 1 to 100000000")
+    if method == "sobol" and samples & (samples - 1):
+        raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
+    if not 0 <= seed < 2**63:
+        raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
+    design = read_parameters(find_design(scenario.design))
+    return Campaign(scenario.name, text, design, method, samples, seed, factors, commit)

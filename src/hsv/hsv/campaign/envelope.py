@@ -1,0 +1,99 @@
+"""Between which values the curves of all flights lie, kept while they are flown: the curves themselves are not."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsv.simulation.metrics import FlightData
+
+WINDOWS = 400
+"""Windows into which a flight is cut; of each, least and largest value are kept, so that no peak is lost."""
+
+
+class Signal(NamedTuple):
+    """A curve of the page."""
+
+    name: str
+    unit: str
+
+
+SIGNALS = (
+    Signal("altitude_error", "m"),
+    Signal("velocity_error", "m/s"),
+    Signal("angle_of_attack", "rad"),
+    Signal("pitch_angle", "rad"),
+    Signal("elastic_rate_1", "kg^0.5 m/s"),
+    Signal("elastic_rate_2", "kg^0.5 m/s"),
+    Signal("fuel_equivalence_ratio", "1"),
+    Signal("elevator_deflection", "rad"),
+)
+
+
+def signals(flight: FlightData) -> np.ndarray:
+    """Return the curves (steps, signals) of a flight."""
+    error = flight.state[:, :2] - flight.reference[:, :2]
+    return np.column_stack((error, flight.state[:, [2, 3, 6, 8]], flight.command))
+
+
+@dataclass
+class Envelope:
+    """Least and largest value, sum of the windows' mean values (windows, signals), and number of flights (windows)."""
+
+    low: np.ndarray
+    high: np.ndarray
+    total: np.ndarray
+    count: np.ndarray
+
+    @classmethod
+    def empty(cls, windows: int = WINDOWS) -> Self:
+        """Return the envelope of no flight."""
+        shape = windows, len(SIGNALS)
+        return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
+
+    def add(self, flight: FlightData, steps: int) -> None:
+        """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
+        curves = signals(flight)
+        curves[~np.isfinite(curves)] = np.nan
+        starts = window_starts(steps, len(self.count))
+        starts = starts[starts < len(curves)]
+        n = len(starts)
+        lengths = np.diff(np.append(starts, len(curves)))
+        self.low[:n] = np.fmin(self.low[:n], np.fmin.reduceat(curves, starts))
+        self.high[:n] = np.fmax(self.high[:n], np.fmax.reduceat(curves, starts))
+        means = np.add.reduceat(curves, starts) / lengths[:, None]
+        whole = np.all(np.isfinite(means), axis=1)
+        self.total[:n] += np.where(whole[:, None], means, 0.0)
+        self.count[:n] += whole
+
+    def merge(self, other: Envelope) -> None:
+        """Take in all flights of ``other``."""
+        self.low = np.fmin(self.low, other.low)
+        self.high = np.fmax(self.high, other.high)
+        self.total += other.total
+        self.count += other.count
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean over the flights that reached a window (windows, signals); not a number where none did."""
+        with np.errstate(invalid="ignore"):
+            return np.where(self.count[:, None] > 0.0, self.total / np.maximum(self.count, 1.0)[:, None], np.nan)
+
+    def encode(self) -> str:
+        """Return the envelope as text."""
+        return base64.b64encode(np.column_stack((self.low, self.high, self.total, self.count)).tobytes()).decode()
+
+    @classmethod
+    def decode(cls, text: str) -> Self:
+        """Return the envelope that :meth:`encode` wrote."""
+        s = len(SIGNALS)
+        table = np.frombuffer(base64.b64decode(text)).reshape(-1, 3 * s + 1)
+        return cls(*(table[:, i * s : (i + 1) * s].copy() for i in range(3)), table[:, 3 * s].copy())
+
+
+def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:
+    """Return the first step of each window of a flight of ``steps`` steps, at most ``windows`` of them."""
+    return np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))

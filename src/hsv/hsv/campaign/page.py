@@ -1,0 +1,150 @@
+"""The results of a campaign as one HTML page that asks nothing of the network."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from hsv.campaign.envelope import SIGNALS, signals, window_starts
+from hsv.campaign.pilot import Pilot
+from hsv.campaign.summary import Results, distributions, limits, shares, worst_flights
+from hsv.errors import CampaignError
+from hsv.recording.report import text
+from hsv.recording.report.payload import compressed
+from hsv.simulation.closed_loop import Flight
+
+POINTS = 5000
+"""Flights that scatter plots draw at most: of more, every n-th."""
+
+BINS = 60
+
+
+def write_page(results: Results, out: Path) -> None:
+    """Write the page of ``results`` to the HTML file ``out``.
+
+    Raises:
+        CampaignError: The file cannot be written.
+    """
+    try:
+        out.write_text(render(results), encoding="utf-8")
+    except OSError as error:
+        raise CampaignError(f"{out}: cannot be written ({error.strerror}), expected an HTML file to write") from None
+
+
+def render(results: Results) -> str:
+    """Return the page."""
+    environment = Environment(
+        loader=PackageLoader("hsv.campaign", "template"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": text.number, "words": text.words}
+    worst = worst_flights(results)
+    shown = distributions(results)
+    return environment.get_template("page.html.j2").render(
+        campaign=results.campaign,
+        title=results.campaign.scenario.title,
+        result=results.path.name,
+        shares=shares(results),
+        distributions=shown,
+        units={d.name: d.unit for d in shown},
+        worst=worst,
+        points=POINTS,
+        drawn=len(_drawn(results)),
+        signals=SIGNALS,
+        quantity=text.quantity,
+        style=_shared("style.css"),
+        script=Markup(files("hsv.campaign").joinpath("template", "page.js").read_text(encoding="utf-8")),
+        charts=_shared("charts.js"),
+        data=_data(results, [d.name for d in shown], worst[0].flight),
+        library=Markup(compressed(get_plotlyjs().encode())),
+    )
+
+
+def _data(results: Results, names: Sequence[str], worst: int) -> dict[str, Any]:
+    """Return what the page's script draws, as plain data."""
+    drawn = _drawn(results)
+    columns = {name: results.column(name) for name in names}
+    stated, units = limits(results), {d.name: d.unit for d in distributions(results)}
+    return {
+        "metrics": {
+            name: {
+                "unit": units[name],
+                "limit": stated.get(name),
+                "values": _packed(values[drawn]),
+                **_histogram(values),
+            }
+            for name, values in columns.items()
+        },
+        "factors": [
+            {
+                "name": factor.name,
+                "unit": factor.unit,
+                "values": _packed(results.column(f"sample_{factor.name}")[drawn]),
+            }
+            for factor in results.campaign.factors
+        ],
+        "flights": _packed(drawn),
+        "envelope": _envelope(results, worst),
+    }
+
+
+def _drawn(results: Results) -> np.ndarray:
+    n = results.campaign.samples
+    return np.arange(0, n, -(-n // POINTS))
+
+
+def _histogram(values: np.ndarray) -> dict[str, list[float]]:
+    counts, edges = np.histogram(values[np.isfinite(values)], BINS)
+    return {"counts": counts.tolist(), "edges": edges.tolist()}
+
+
+def _envelope(results: Results, worst: int) -> dict[str, Any]:
+    """Return the envelopes, with the flight of the unchanged scenario and the worst one flown again."""
+    pilot, envelope = Pilot(results.campaign), results.envelope
+    windows = window_starts(pilot.steps)
+    reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
+    time = windows[reached] * float(pilot.fly_unchanged().period)
+    flights = {"unchanged": pilot.fly_unchanged(), f"flight {worst}": pilot.fly(pilot.samples[worst])}
+    return {
+        "time": _packed(time),
+        "signals": [
+            {
+                "name": signal.name,
+                "unit": signal.unit,
+                "low": _packed(envelope.low[reached, i]),
+                "high": _packed(envelope.high[reached, i]),
+                "mean": _packed(envelope.mean[reached, i]),
+                "flights": [
+                    {"label": label, "y": _packed(_curve(flight, windows, i))} for label, flight in flights.items()
+                ],
+            }
+            for i, signal in enumerate(SIGNALS)
+        ],
+        "flight_time": _packed(windows * flights["unchanged"].period),
+    }
+
+
+def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
+    curve = signals(flight.data())[:, index]
+    return np.asarray(curve[windows[windows < len(curve)]])
+
+
+def _packed(values: np.ndarray) -> str:
+    """Return numbers in single precision, as text."""
+    with np.errstate(over="ignore"):
+        return base64.b64encode(np.asarray(values, "<f4").tobytes()).decode()
+
+
+def _shared(name: str) -> Markup:
+    return Markup(files("hsv.recording.report").joinpath("template", name).read_text(encoding="utf-8"))

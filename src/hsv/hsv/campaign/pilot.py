@@ -1,0 +1,71 @@
+"""Flying the samples of a campaign, one at a time: what is common to all flights is built once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+from hsv.campaign.campaign import Campaign
+from hsv.campaign.factors import flown_scenario
+from hsv.campaign.sampling import draw
+from hsv.campaign.tube_levels import TubeLevels
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.faults.actuator import FaultInjector
+from hsv.simulation.assembly import assemble
+from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.metrics import FlightData, flight_metrics
+from hsv.vehicle.envelope import in_model_range
+from hsv.vehicle.plant import Plant
+
+Outcome = dict[str, float | bool | None]
+
+
+class Pilot:
+    """Flies any flight of one campaign, alone or in any order, always with the same bits."""
+
+    def __init__(self, campaign: Campaign) -> None:
+        self.campaign = campaign
+        self.samples, self.seeds = draw(campaign)
+        """(flights, factors) and (flights)."""
+        self.scenario = campaign.scenario
+        self._nominal = campaign.parameters
+        self._parts = assemble(self._nominal)
+        self._levels = TubeLevels(self._nominal)
+        self.steps = self._parts.plant.steps
+        """Control periods of a flight that does not end early."""
+
+    def fly(self, sample: Sequence[float]) -> Flight:
+        """Fly a sample (one value a factor, SI)."""
+        parts = self._parts
+        values = {**self.campaign.design, **flown_scenario(self.scenario, self.campaign.factors, sample).parameters()}
+        trajectory = parts.nominal_trajectory
+        if any(values[name] != self._nominal[name] for name in ("reference.altitude", "reference.velocity")):
+            trajectory = NominalTrajectory.from_parameters(values)
+        return fly(
+            replace(
+                parts,
+                plant=Plant.from_parameters(values),
+                nominal_trajectory=trajectory,
+                fault_injector=FaultInjector.from_parameters(values),
+            )
+        )
+
+    def fly_unchanged(self) -> Flight:
+        """Fly the scenario itself."""
+        return fly(self._parts)
+
+    def outcome(self, flight: FlightData) -> Outcome:
+        """Return what a campaign keeps of a flight: whether and when it ended early, worst tube level, metrics (SI)."""
+        return {
+            "diverged": not in_model_range(flight.state[-1]),
+            "end_time": float(flight.time[-1]),
+            "tube_level": self._levels.worst(flight),
+            **flight_metrics(flight),
+        }
+
+
+@lru_cache(maxsize=1)
+def pilot(text: str) -> Pilot:
+    """Return the pilot of the campaign written in ``text``; a worker keeps the last one."""
+    return Pilot(Campaign.from_text(text))

@@ -1,0 +1,161 @@
+"""What a campaign shows: the share of flights within each limit, with its confidence, and the worst flights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from hsv.campaign.campaign import Campaign
+from hsv.campaign.envelope import Envelope
+from hsv.campaign.store import read_campaign
+from hsv.campaign.table import ENVELOPE, OUTCOMES
+
+CONFIDENCE = 0.95
+
+TUBE_LIMIT = 1.0
+"""Level of e - c up to which the error is in the set."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """How many of the flights satisfy a limit (SI, ``None`` for a yes-or-no statement), and the interval (95 %)."""
+
+    name: str
+    limit: float | None
+    within: int
+    flights: int
+    interval: tuple[float, float] | None
+    """Clopper-Pearson; ``None`` for corners, which are all there are and no sample of anything."""
+
+    @property
+    def fraction(self) -> float:
+        """Share of the flights."""
+        return self.within / self.flights
+
+
+@dataclass(frozen=True)
+class WorstFlight:
+    """A flight, the limit it comes closest to or breaks most, and value over limit (infinite: diverged)."""
+
+    flight: int
+    limit: str
+    ratio: float
+    sample: dict[str, float]
+
+
+class Results:
+    """The result file of a campaign, read back."""
+
+    def __init__(self, path: Path) -> None:
+        """Read ``path``.
+
+        Raises:
+            CampaignError: The file is missing or not the result of a campaign.
+        """
+        self.path = path
+        self.campaign: Campaign = read_campaign(path)
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column (flights); numbers that a flight does not define are not a number."""
+        return np.asarray(pq.read_table(self.path, columns=[name])[name].to_numpy())
+
+    @property
+    def samples(self) -> np.ndarray:
+        """The samples (flights, factors), SI."""
+        return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
+
+    @property
+    def envelope(self) -> Envelope:
+        """The envelope of all flights."""
+        return Envelope.decode(pq.read_metadata(self.path).metadata[ENVELOPE].decode())
+
+    def row(self, flight: int) -> dict[str, Any]:
+        """Return the row of a flight."""
+        [row] = pq.read_table(self.path, filters=[("flight", "==", flight)]).to_pylist()
+        return dict(row)
+
+
+def limits(results: Results) -> dict[str, float]:
+    """Return the limits (SI) to hold flights against: those of the scenario, and the tube where there is a set."""
+    stated = dict(results.campaign.scenario.limits)
+    if np.any(np.isfinite(results.column("tube_level"))):
+        stated["tube_level"] = TUBE_LIMIT
+    return stated
+
+
+def shares(results: Results) -> list[Share]:
+    """Return the share of flights that do not diverge, and within each limit; an undefined metric is not within."""
+    flown = ~results.column("diverged")
+    rows = [_share(results.campaign, "flown_to_the_end", None, flown)]
+    for name, limit in limits(results).items():
+        # A comparison with what is not a number is false.
+        rows.append(_share(results.campaign, name, limit, flown & (np.abs(results.column(name)) <= limit)))
+    return rows
+
+
+def _share(campaign: Campaign, name: str, limit: float | None, within: np.ndarray) -> Share:
+    count, n = int(np.count_nonzero(within)), len(within)
+    return Share(name, limit, count, n, None if campaign.method == "corners" else clopper_pearson(count, n))
+
+
+def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the exact interval of a probability of which ``count`` of ``n`` independent trials were seen."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(count, n).proportion_ci(confidence, method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
+    """Return the flights with the largest metric over limit, those that diverged first (earliest first)."""
+    stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
+    diverged, end = results.column("diverged"), results.column("end_time")
+    ratios = np.zeros((len(diverged), len(stated) or 1))
+    for index, (name, limit) in enumerate(stated.items()):
+        ratio = np.abs(results.column(name)) / limit
+        ratios[:, index] = np.where(np.isnan(ratio), np.inf, ratio)
+    largest = np.where(diverged, np.inf, ratios.max(axis=1))
+    order = np.lexsort((np.arange(len(end)), np.where(diverged, end, math.inf), -largest))[:number]
+    samples, names = results.samples, list(stated) or [""]
+    return [
+        WorstFlight(
+            flight=int(flight),
+            limit="diverged" if diverged[flight] else names[int(np.argmax(ratios[flight]))],
+            ratio=float(largest[flight]),
+            sample={f.name: float(v) for f, v in zip(results.campaign.factors, samples[flight], strict=True)},
+        )
+        for flight in order
+    ]
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A metric over all flights that define it: unit (SI), least, median, 95th percentile, largest, mean."""
+
+    name: str
+    unit: str
+    flights: int
+    minimum: float
+    median: float
+    percentile_95: float
+    maximum: float
+    mean: float
+
+
+def distributions(results: Results) -> list[Distribution]:
+    """Return the distribution of every outcome that any flight defines."""
+    found = []
+    for name, unit in OUTCOMES.items():
+        values = results.column(name)
+        values = values[np.isfinite(values)]
+        if len(values):
+            middle, high = np.percentile(values, (50.0, 95.0))
+            found.append(
+                Distribution(name, unit, len(values), values.min(), middle, high, values.max(), float(values.mean()))
+            )
+    return found

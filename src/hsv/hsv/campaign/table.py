@@ -1,0 +1,60 @@
+"""The table of a campaign's results: one row a flight, units in the columns' metadata."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hsv.campaign.campaign import Campaign
+from hsv.campaign.envelope import Envelope
+from hsv.campaign.pilot import pilot
+from hsv.simulation.metrics import METRICS
+
+CAMPAIGN, ENVELOPE = b"hsv.campaign", b"hsv.envelope"
+"""Keys of the file's metadata."""
+
+OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
+"""Numbers that are kept of a flight, with their SI units; null where a flight does not define one."""
+
+COMPRESSION = "zstd"
+
+
+def schema(campaign: Campaign) -> pa.Schema:
+    """Return the columns: flight, seed, the sample, what became of it."""
+    samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
+    outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
+    fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
+    return pa.schema([*fixed, *samples, pa.field("diverged", pa.bool_(), False), *outcomes])
+
+
+def _number(name: str, unit: str) -> pa.Field:
+    return pa.field(name, pa.float64(), metadata={"unit": unit})
+
+
+def fly_batch(text: str, batch: int) -> bytes:
+    """Fly a batch of the campaign written in ``text``; return its rows and envelope as a Parquet file."""
+    own = pilot(text)
+    campaign, envelope, rows = own.campaign, Envelope.empty(), []
+    for flight in campaign.flights(batch):
+        data = own.fly(own.samples[flight]).data()
+        envelope.add(data, own.steps)
+        rows.append(row(own.samples[flight], flight, int(own.seeds[flight]), campaign, own.outcome(data)))
+    return encode(campaign, rows, envelope)
+
+
+def row(sample: Sequence[float], flight: int, seed: int, campaign: Campaign, outcome: dict[str, Any]) -> dict[str, Any]:
+    """Return the row of a flight."""
+    samples = {f"sample_{f.name}": float(value) for f, value in zip(campaign.factors, sample, strict=True)}
+    return {"flight": flight, "seed": seed, **samples, **outcome}
+
+
+def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -> bytes:
+    """Return rows and envelope as a Parquet file."""
+    table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
+    stream = BytesIO()
+    pq.write_table(table, stream, compression=COMPRESSION)
+    return stream.getvalue()

@@ -1,0 +1,195 @@
+"""The command ``hsv montecarlo``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
+from hsv.cli.output import Units, check_target, console, errors, print_json, to_json
+
+
+class _FlyByDefault(TyperGroup):
+    """Takes a first word that is no command of the group for the scenario to fly."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        if args and args[0] not in (*self.commands, "--help"):
+            args = ["fly", *args]
+        return super().parse_args(ctx, args)
+
+
+class Sampling(StrEnum):
+    """How samples are drawn."""
+
+    uniform = "uniform"
+    latin_hypercube = "latin_hypercube"
+    sobol = "sobol"
+
+
+montecarlo = typer.Typer(
+    cls=_FlyByDefault,
+    no_args_is_help=True,
+    help="""Fly a scenario many times with uncertain parameters; each flight can be repeated alone, bit for bit.
+
+    Without the word fly it is meant: hsv montecarlo case1 is hsv montecarlo fly case1.
+
+    Example: hsv montecarlo case1 --corners""",
+)
+
+ResultArgument = Annotated[Path, typer.Argument(help="Result file of a campaign (.parquet).")]
+Range = tuple[str, str]
+
+
+@montecarlo.command()
+def fly(
+    scenario: ScenarioArgument = "case1",
+    samples: Annotated[int, typer.Option(help="Number of flights.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Determines all samples.")] = 1,
+    sampling: Annotated[Sampling, typer.Option(help="How samples are drawn.")] = Sampling.uniform,
+    corners: Annotated[bool, typer.Option("--corners", help="All combinations of least and largest value.")] = False,
+    scale: Annotated[float, typer.Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
+    fault_start: Annotated[Range | None, typer.Option(help="Vary the start of the fault, e.g. '90 s' '110 s'.")] = None,
+    fault_value: Annotated[Range | None, typer.Option(help="Vary the value of the fault, e.g. 0.85 1.")] = None,
+    initial_altitude: Annotated[Range | None, typer.Option(help="Vary the start, e.g. '85400 ft' '85600 ft'.")] = None,
+    initial_velocity: Annotated[
+        Range | None, typer.Option(help="Vary the start, e.g. '7850 ft/s' '7950 ft/s'.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")] = 0,
+    scheduler: Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers fly instead.")] = "",
+    restart: Annotated[bool, typer.Option("--restart", help="Throw away what is there and begin anew.")] = False,
+    page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
+    units: UnitsOption = Units.si,
+    json: JsonOption = False,
+) -> None:
+    """Fly a campaign. Interrupted, the same command goes on where it was left.
+
+    Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --fault-start "90 s" "110 s"
+    """
+    import os
+
+    from hsv.campaign.campaign import plan
+    from hsv.campaign.conduct import conduct
+    from hsv.campaign.fleet import fleet
+    from hsv.campaign.store import Store
+    from hsv.campaign.summary import Results
+    from hsv.cli.campaign_summary import announce, show
+    from hsv.cli.progress import flights as flights_bar
+    from hsv.errors import CampaignError
+    from hsv.graph.preparation import commit
+
+    method = "corners" if corners else sampling.value
+    ranges = {
+        "fault_start": _range(fault_start, "s", "fault-start"),
+        "fault_value": _range(fault_value, "1", "fault-value"),
+        "initial_altitude": _range(initial_altitude, "m", "initial-altitude"),
+        "initial_velocity": _range(initial_velocity, "m/s", "initial-velocity"),
+    }
+    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, commit=commit(), **ranges)
+    if out is None:
+        Path("campaigns").mkdir(exist_ok=True)
+        count = "" if corners else f"_{campaign.samples}_seed{seed}"
+        out = Path("campaigns", f"{campaign.scenario_name}_{method}{count}.parquet")
+    if out.suffix != ".parquet":
+        raise CampaignError(f"out = {str(out)!r}: expected a file that ends in .parquet")
+    check_target(out, "out")
+    store = Store(out, campaign)
+    try:
+        with (
+            fleet(workers or os.cpu_count() or 1, scheduler) as flying,
+            flights_bar(campaign.scenario_name, campaign.samples) as progress,
+        ):
+            flown = conduct(campaign, store, flying, restart=restart, expect=announce, progress=progress)
+    except KeyboardInterrupt:
+        errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
+        raise
+    show(Results(out), units, json, page, flown)
+
+
+@montecarlo.command()
+def summary(
+    result: ResultArgument,
+    page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
+    units: UnitsOption = Units.si,
+    json: JsonOption = False,
+) -> None:
+    """Show the results of a campaign again.
+
+    Example: hsv montecarlo summary campaigns/case1_corners.parquet --units paper
+    """
+    from hsv.campaign.summary import Results
+    from hsv.cli.campaign_summary import show
+
+    show(Results(result), units, json, page)
+
+
+@montecarlo.command()
+def replay(
+    result: ResultArgument,
+    flight: Annotated[int, typer.Option(help="Number of the flight.")],
+    over_dds: Annotated[bool, typer.Option("--over-dds", help="Fly it with the graph of node processes.")] = False,
+    bag: Annotated[Path | None, typer.Option(help="With --over-dds: bag to write; default: bags/<flight>.")] = None,
+    units: UnitsOption = Units.si,
+    json: JsonOption = False,
+) -> None:
+    """Fly one flight of a campaign again, alone, and compare every outcome bit for bit.
+
+    Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
+    """
+    from hsv.campaign import again
+    from hsv.campaign.summary import Results
+    from hsv.campaign.table import OUTCOMES
+    from hsv.cli.campaign_summary import sample_words
+    from hsv.cli.output import print_table
+    from hsv.cli.progress import stages
+    from hsv.errors import RunError
+
+    results = Results(result)
+    if over_dds:
+        target = bag or Path("bags", f"{result.stem}_flight_{flight}")
+        with stages() as bar:
+            repeated = again.over_dds(results, flight, target, lambda step, steps: bar("over DDS", step, steps))
+    else:
+        repeated = again.in_process(results, flight)
+    sample = {factor.name: results.row(flight)[f"sample_{factor.name}"] for factor in results.campaign.factors}
+    quantities = {
+        name: (float(value), unit)
+        for name, unit in OUTCOMES.items()
+        if (value := repeated.repeated.get(name)) is not None
+    }
+    differing = repeated.differing
+    if json:
+        print_json(
+            {
+                "flight": flight,
+                "identical": not differing,
+                "differing": differing,
+                "diverged": repeated.repeated["diverged"],
+                "sample_si": sample,
+                "outcome": to_json(quantities, units),
+                "bag": str(repeated.bag) if repeated.bag else None,
+            }
+        )
+    else:
+        print_table(f"flight {flight} of {result.name}", quantities, units)
+        console.print("sample  " + sample_words(sample), soft_wrap=True)
+        if repeated.bag:
+            console.print(f"bag     {repeated.bag}", soft_wrap=True)
+        if not differing:
+            console.print("[green]identical to the campaign's flight in every bit[/]")
+    if differing:
+        name = differing[0]
+        raise RunError(
+            f"flight {flight}: {name} is {repeated.repeated.get(name)!r}, the campaign recorded "
+            f"{repeated.recorded[name]!r} ({len(differing)} outcomes differ)"
+        )
+
+
+def _range(words: Range | None, unit: str, field: str) -> tuple[float, float] | None:
+    from hsv.units import parse_quantity
+
+    return None if words is None else (parse_quantity(words[0], unit, field), parse_quantity(words[1], unit, field))
