@@ -65,12 +65,15 @@ def test_numbers(track: Any, a: float, b: float, tolerance: float, equal: bool) 
         assert comparison.first.expected is not None and comparison.different_bytes == 1
 
 
-def test_bytes_that_carry_nothing_are_told(track: Any) -> None:
+def test_bytes_that_are_no_difference_in_value_are_told(track: Any) -> None:
     other = track([1.0, 2.0])
     padded = Track(other.topic, other.type, other.types, other.times, [data + b"\0" for data in other.data])
     comparison = compare(track([1.0, 2.0]), padded)
-    assert not differs(comparison) and not comparison.identical
-    assert comparison.different_bytes == 2 and comparison.largest == {}
+    assert not differs(comparison) and comparison.identical
+    assert comparison.different_bytes == comparison.different_padding == 2 and comparison.largest == {}
+    zeros = compare(track([0.0]), track([-0.0]))
+    assert not differs(zeros) and not zeros.identical
+    assert (zeros.different_bytes, zeros.different_padding) == (1, 0)
 
 
 def test_counts_order_and_ignored_fields(track: Any) -> None:

@@ -65,7 +65,9 @@ def _print(compared: list[Comparison], earliest: Difference | None) -> None:
     if earliest is None:
         count = sum(c.actual_count for c in compared)
         identical = all(c.identical for c in compared)
-        console.print(f"{count} messages: {'identical in every byte' if identical else 'equal within the tolerance'}")
+        console.print(
+            f"{count} messages: {'identical in every byte but padding' if identical else 'equal within the tolerance'}"
+        )
     else:
         console.print(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, header_style="bold")

@@ -78,10 +78,12 @@ def replay(
 def _print(result: ProcessComparison) -> None:
     messages = sum(topic.actual_count for topic in result.topics)
     line = f"{result.process.node.name:18} {messages:7} messages  "
+    padding = sum(topic.different_padding for topic in result.topics)
     if result.identical:
-        console.print(f"{line}[green]identical in every byte[/]")
+        remark = f" but the padding of {padding}" if padding else ""
+        console.print(f"{line}[green]identical in every byte{remark}[/]", soft_wrap=True)
         return
-    different = sum(topic.different_bytes for topic in result.topics)
+    different = sum(topic.different_bytes for topic in result.topics) - padding
     if not result.passed:
         first = min((t.first for t in result.topics if t.first), key=lambda d: d.step)
         console.print(f"{line}[bold red]differ[/]", f"{first}", soft_wrap=True, markup=True)
@@ -95,7 +97,9 @@ def _print(result: ProcessComparison) -> None:
             soft_wrap=True,
         )
     else:
-        console.print(f"{line}equal in every field, but {different} differ in bytes that carry none", soft_wrap=True)
+        console.print(
+            f"{line}equal in every number, but {different} differ in bytes (sign of zero or NaN)", soft_wrap=True
+        )
 
 
 def _as_json(result: ProcessComparison) -> dict[str, Any]:
@@ -111,6 +115,7 @@ def _as_json(result: ProcessComparison) -> dict[str, Any]:
                 "recorded": topic.expected_count,
                 "replayed": topic.actual_count,
                 "different_bytes": topic.different_bytes,
+                "different_padding": topic.different_padding,
                 "largest_difference": topic.largest,
                 "first_difference": topic.first
                 and {

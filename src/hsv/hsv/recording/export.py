@@ -40,7 +40,9 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
         )
     try:
         if form is Format.npz:
-            arrays = {f"{_file_stem(t)}.{name}": a for t in topics for name, a in _fields(bag, t).items()}
+            arrays: dict[str, Any] = {
+                f"{_file_stem(t)}.{name}": a for t in topics for name, a in _fields(bag, t).items()
+            }
             target.parent.mkdir(parents=True, exist_ok=True)
             with target.open("wb") as stream:
                 np.savez_compressed(stream, **arrays)
