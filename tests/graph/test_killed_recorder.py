@@ -59,12 +59,14 @@ def test_bag_opens_and_has_all_but_the_last_moment(processes: Processes, seed: i
     with words.open("w") as stream:
         listener = processes.start(sys.executable, "-c", LISTEN, output=stream)
         run = processes.start("hsv", "run", short_scenario(processes.folder, duration=600, fault=3), "--bag", bag)
-        deadline = time.monotonic() + 60.0
+        deadline = time.monotonic() + 120.0
         while not words.stat().st_size:
             assert time.monotonic() < deadline and run.poll() is None, "no flight"
             time.sleep(0.05)
         time.sleep(chance.uniform(0.3, 6.0))
-        recorder = children(run.pid)["recorder"]
+        nodes = children(run.pid)
+        assert "recorder" in nodes, run.communicate(timeout=30.0)[0]
+        recorder = nodes["recorder"]
         killed = time.monotonic()
         os.kill(recorder, signal.SIGKILL)
         output, _ = run.communicate(timeout=30.0)

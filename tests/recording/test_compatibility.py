@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from bag_readers import READERS, assert_equal, ours
+from bag_readers import READERS, Messages, assert_equal, ours
 
 from hsv.recording.writer import BagWriter
 
@@ -25,6 +26,6 @@ def bag(kit: SimpleNamespace, tmp_path: Path) -> Path:
     return tmp_path / "bag"
 
 
-@pytest.mark.parametrize("name", READERS)
-def test_values_are_equal(bag: Path, kit: SimpleNamespace, name: str) -> None:
-    assert assert_equal(ours(bag), READERS[name](bag)) == MESSAGES * len(kit.types)
+@pytest.mark.parametrize("read", READERS)
+def test_values_are_equal(bag: Path, kit: SimpleNamespace, read: Callable[[Path], Messages]) -> None:
+    assert assert_equal(ours(bag), read(bag)) == MESSAGES * len(kit.types)

@@ -6,7 +6,7 @@ import json
 import math
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +61,12 @@ def by_foxglove(bag: Path) -> Messages:
         yield topic, int(time), message
 
 
-READERS: dict[str, Callable[[Path], Messages]] = {
-    "rosbags": by_rosbags,
-    "mcap-ros2-support": by_mcap_ros2,
-    "foxglove": by_foxglove,
-}
+READERS = [
+    pytest.param(by_rosbags, id="rosbags"),
+    pytest.param(by_mcap_ros2, id="mcap-ros2-support"),
+    pytest.param(by_foxglove, id="foxglove", marks=pytest.mark.viewer),
+]
+"""For parametrized tests."""
 
 
 def assert_equal(expected: Messages, actual: Messages) -> int:
