@@ -1,3 +1,4 @@
+import dataclasses
 import time
 
 import clarabel
@@ -20,14 +21,14 @@ VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
 DATA = nominal_data(DESIGN)
 START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
 STEP = START.state - REFERENCE.state
-# Control study, section 5: U minus F Z of the certified ellipsoid.
-MINIMUM, MAXIMUM = np.array([0.17, np.radians(-18.8)]), np.array([1.33, np.radians(18.9)])
+BOUNDS = DESIGN.plan_bounds
+MINIMUM, MAXIMUM = BOUNDS.lower, BOUNDS.upper
 FAR = 100.0 * STEP
 
 
 @pytest.fixture
 def law():
-    return QpLaw(DESIGN, DATA, REFERENCE, MINIMUM, MAXIMUM)
+    return QpLaw(DESIGN, DATA, REFERENCE)
 
 
 def rigid():
@@ -51,7 +52,7 @@ def test_far_from_the_bounds_it_is_the_linear_quadratic_regulator(law):
     Q, R = 0.02 * np.diag(DESIGN.nominal_state_scale**-2.0), 0.02 * np.diag(DESIGN.nominal_input_scale**-2.0)
     P = solve_discrete_are(A, B, Q, R)
     K = -np.linalg.solve(R + B.T @ P @ B, B.T @ P @ A)
-    small = 0.05 * STEP
+    small = 0.002 * STEP
     result = law.step(small)
     assert_allclose(result.input, K @ small[:5], rtol=1e-6)
     assert (result.gain_index, result.status) == (NOT_IN_FAMILY, NominalStatus.OK)
@@ -62,8 +63,18 @@ def test_plan_of_the_step_keeps_the_bounds_between_block_ends_too(law):
     inputs = predicted(law, STEP, plan)
     lower, upper = MINIMUM - REFERENCE.input, MAXIMUM - REFERENCE.input
     excess = np.maximum(lower - inputs, inputs - upper).max(axis=0)
-    assert excess[0] < 1e-3 and np.degrees(excess[1]) < 0.1
-    assert np.max(np.abs(inputs - upper), axis=0).min() > 0.0 and np.isclose(inputs[:, 0].max(), upper[0], atol=1e-6)
+    assert excess[0] < 2e-3 and np.degrees(excess[1]) < 0.1
+    assert np.isclose(inputs[:, 0].max(), upper[0], atol=1e-6)
+    A, B = rigid()
+    low, high = BOUNDS.pitch_acceleration
+    x, first = STEP[:5], []
+    for u in inputs[:250]:
+        new = A @ x + B @ u
+        first.append((new[4] - x[4]) / 0.02)
+        x = new
+    room = 0.05 * (high - low)
+    assert min(first) > low - room and max(first) < high + room
+    assert max(first) > high - room
 
 
 def test_plan_is_the_optimum(law):
@@ -88,12 +99,11 @@ def test_input_depends_on_the_deviation_alone(law):
     for scale in (0.9, 0.3, 100.0, 0.7):
         law.step(scale * STEP)
     assert np.array_equal(law.step(STEP).input, first)
-    assert np.array_equal(QpLaw(DESIGN, DATA, REFERENCE, MINIMUM, MAXIMUM).step(STEP).input, first)
+    assert np.array_equal(QpLaw(DESIGN, DATA, REFERENCE).step(STEP).input, first)
 
 
 def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
-    bounds = {"nominal.input_minimum": MINIMUM.tolist(), "nominal.input_maximum": MAXIMUM.tolist()}
-    values = {**VALUES, "reference.altitude": 26243.28, "reference.velocity": 2484.12, **bounds}
+    values = {**VALUES, "reference.altitude": 26243.28, "reference.velocity": 2484.12}
     settled, times = {}, []
     for name in ("qp", "family"):
         trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
@@ -110,8 +120,12 @@ def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
                 assert result.status == NominalStatus.OK
         share = np.abs(states)[:, :2] / np.abs(STEP[:2])
         settled[name] = [0.02 * np.nonzero(share[:, axis] > 0.02)[0][-1] for axis in (0, 1)]
-    # Control study, section 6: 14.8 s and 36.5 s.
-    assert_allclose(settled["qp"], [14.8, 36.5], rtol=0.05)
+        if name == "qp":
+            pitch_acceleration = np.diff(np.array(states)[:, 4]) / 0.02
+            low, high = BOUNDS.pitch_acceleration
+            # The programme predicts with the model at the reference, the plan flies that of every point.
+            room = 0.05 * (high - low)
+            assert pitch_acceleration.min() > low - room and pitch_acceleration.max() < high + room
     assert np.all(np.array(settled["qp"]) < settled["family"])
     # A wide margin over the 5 ms of the design: processors differ.
     assert np.percentile(times[:4000], 99) < 0.015
@@ -125,7 +139,7 @@ def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law)
         result = law.step(FAR)
         assert result.status == NominalStatus.SOLVER_FAILED
         assert np.array_equal(result.input, np.clip(law.gain @ FAR + plan[age // 25], lower, upper))
-    law._age = 998
+    law._age = 748
     assert law.step(FAR).status == NominalStatus.SOLVER_FAILED
     result = law.step(FAR)
     assert result.status == NominalStatus.SOLVER_FAILED | NominalStatus.FAMILY_FALLBACK | NominalStatus.OUTSIDE_FAMILY
@@ -141,9 +155,12 @@ def test_without_a_plan_a_failure_flies_the_family(law):
 
 
 def test_bounds_are_needed_and_must_hold_the_reference():
-    with pytest.raises(DesignError, match="expected the reference input"):
-        QpLaw(DESIGN, DATA, REFERENCE, REFERENCE.input + 0.01, MAXIMUM)
-    with pytest.raises(ParameterError, match=r"nominal.input_minimum: 0 values, expected 2 for nominal.law = 'qp'"):
-        NominalTrajectory.from_parameters({**VALUES, "nominal.law": "qp"})
+    with pytest.raises(DesignError, match="expected inside the plan bounds"):
+        moved = dataclasses.replace(BOUNDS, input_minimum=REFERENCE.input + 0.01)
+        QpLaw(dataclasses.replace(DESIGN, plan_bounds=moved), DATA, REFERENCE)
+    prefixes = ("nominal.input_m", "nominal.region")
+    without = {name: value for name, value in VALUES.items() if not name.startswith(prefixes)}
+    with pytest.raises(DesignError, match=r"nominal.input_minimum: empty, expected U minus F Z"):
+        NominalTrajectory.from_parameters({**without, "nominal.law": "qp"})
     with pytest.raises(ParameterError, match=r"nominal.law = 'lucky'"):
         NominalTrajectory.from_parameters({**VALUES, "nominal.law": "lucky"})

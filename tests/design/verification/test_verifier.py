@@ -15,6 +15,7 @@ from hsv.vehicle.parameters import vehicle_parameters
 
 WALKED = ("feedback.gain", "nominal.gains", "nominal.ellipsoids", "tube.centre", "tube.shape", "tube.half_width")
 BOUNDS = ("input.minimum", "input.maximum", "nominal.input_bound", "nominal.state_scale", "nominal.input_scale")
+BOUNDS += ("nominal.input_minimum", "nominal.input_maximum", "nominal.region_minimum", "nominal.region_maximum")
 OTHERS = ("period", "notch.zero_frequency", "notch.zero_damping", "notch.pole_frequency", "notch.pole_damping")
 
 

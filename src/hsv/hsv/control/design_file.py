@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter, NotchSection
+from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
 from hsv.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
@@ -39,6 +40,10 @@ DESIGN_PARAMETERS = (
     Parameter("nominal.state_scale", [], "rigid deviations (5) that weigh equally in the nominal cost (SI)"),
     Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
     Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel (-), elevator (rad)"),
+    Parameter("nominal.input_minimum", [], "least u_r + u_n, U minus F Z: fuel (-), elevator (rad)"),
+    Parameter("nominal.input_maximum", [], "largest u_r + u_n, U minus F Z: fuel (-), elevator (rad)"),
+    Parameter("nominal.region_minimum", [], "least fuel (-), elevator (rad), pitch rad/s^2, that W covers"),
+    Parameter("nominal.region_maximum", [], "largest fuel (-), elevator (rad), pitch rad/s^2, that W covers"),
     Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
@@ -74,6 +79,8 @@ class ControlDesign:
     notch: tuple[NotchSection, ...]
     tube: TubeSet | None = None
     """The invariant set of the tube error, ``None``: the design carries none."""
+    plan_bounds: PlanBounds | None = None
+    """What a nominal plan may use, ``None``: the design carries no tightened inputs."""
     modified: bool = False
     """Whether the parameters differ from those that were written (their digest does not match)."""
 
@@ -105,6 +112,8 @@ class ControlDesign:
         if self.tube:
             tube = {"centre": self.tube.centre, "shape": self.tube.shape, "half_width": self.tube.half_width}
             values |= {f"tube.{name}": value for name, value in tube.items()}
+        if self.plan_bounds:
+            values |= {f"nominal.{name}": value for name, value in vars(self.plan_bounds).items()}
         flat = {
             name: np.asarray(value, float).ravel().tolist() if isinstance(value, np.ndarray) else value
             for name, value in values.items()
@@ -150,6 +159,7 @@ class ControlDesign:
             input_maximum=_shaped(v, "input.maximum", (N_INPUTS,)),
             notch=notch.sections,
             tube=_tube(v, N_RIGID + 2 * len(notch.sections)),
+            plan_bounds=_plan_bounds(v),
             modified=v["design.hash"] != digest(v),
         )
         if len(design.nominal_gains) != len(design.nominal_ellipsoids):
@@ -293,6 +303,17 @@ def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:
     if not (np.allclose(shape, shape.T, rtol=1e-9, atol=0.0) and np.linalg.eigvalsh(shape)[0] > 0.0):
         raise DesignError("parameter tube.shape: expected a symmetric positive definite matrix")
     return TubeSet(_shaped(values, "tube.centre", (n,)), shape, _shaped(values, "tube.half_width", (n,)))
+
+
+def _plan_bounds(values: Mapping[str, Any]) -> PlanBounds | None:
+    sizes = {"input_minimum": 2, "input_maximum": 2, "region_minimum": 3, "region_maximum": 3}
+    if not any(values[f"nominal.{name}"] for name in sizes):
+        return None
+    bounds = PlanBounds(**{name: _shaped(values, f"nominal.{name}", (size,)) for name, size in sizes.items()})
+    for name in ("input", "region"):
+        if not np.all(getattr(bounds, f"{name}_minimum") < getattr(bounds, f"{name}_maximum")):
+            raise DesignError(f"parameter nominal.{name}_minimum: expected values below nominal.{name}_maximum")
+    return bounds
 
 
 def _check_stable(name: str, A: np.ndarray, B: np.ndarray, gain: np.ndarray) -> None:

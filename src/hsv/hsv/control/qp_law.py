@@ -1,4 +1,9 @@
-"""A quadratic programme as the nominal law: u_n = K x_n + c over a horizon, within the tightened inputs, every step."""
+"""A quadratic programme as the nominal law: u_n = K x_n + c over a horizon, every step, where the tube is certified.
+
+Inputs stay in U minus F Z and in the range of the certified plans, the nominal pitch acceleration in theirs: the
+disturbance set was measured along those plans. With the inputs of U minus F Z alone the plan disturbs several times as
+much as that set holds (filtering the pitch rate that it asks for, most of all).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +16,9 @@ from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, Nominal
 from hsv.errors import DesignError
 from hsv.vehicle.trim import Trim
 
-BLOCKS = 40
+PITCH_RATE = 4
+
+BLOCKS = 30
 """Blocks of the horizon, c constant in each."""
 
 BLOCK_TIME = 0.5
@@ -21,32 +28,36 @@ CHECKED_NEAR, CHECKED_FAR = (0.0, 0.24, 0.48, 0.72, 0.96), (0.0, 0.48)
 """Where in a block the bounds are imposed, as shares of it: at its ends only, inputs overshoot between."""
 
 NEAR_BLOCKS = 10
-"""Blocks that count as near, where inputs move fast."""
+"""Blocks that count as near, where inputs move fast; the pitch acceleration is bounded in these."""
 
 _ITERATIONS = 60
 """Of the solver at most; it needs about 10."""
 
 
 class QpLaw:
-    """Horizon 20 s, prediction by the model at the reference, K of its Riccati equation.
+    """Horizon 15 s, prediction by the model at the reference, K of its Riccati equation.
 
     About that K the infinite-horizon cost is x' P x plus the sum of c' (R + B' P B) c: the Hessian does not depend on
     the state, and c = 0 is the answer wherever it keeps the bounds. The solver starts cold each time, so that the input
     depends on x_n alone. Where it fails, the plan before goes on, shifted; where there is none, the family flies.
     """
 
-    def __init__(
-        self, design: ControlDesign, data: NominalData, reference: Trim, minimum: np.ndarray, maximum: np.ndarray
-    ) -> None:
-        """Prepare the programme for bounds ``minimum`` and ``maximum`` (2) of the total nominal input u_r + u_n."""
-        for bound, outside in ((minimum, minimum > reference.input), (maximum, maximum < reference.input)):
-            if outside.any():
-                raise DesignError(
-                    f"tightened input bound {bound.tolist()}: expected the reference input "
-                    f"{reference.input.tolist()} inside"
-                )
+    def __init__(self, design: ControlDesign, data: NominalData, reference: Trim) -> None:
+        """Prepare the programme for the design's plan bounds.
+
+        Raises:
+            DesignError: The design carries none, or the reference input does not lie inside.
+        """
+        bounds = design.plan_bounds
+        if bounds is None:
+            raise DesignError("parameter nominal.input_minimum: empty, expected U minus F Z for nominal.law = 'qp'")
+        if np.any(bounds.lower > reference.input) or np.any(bounds.upper < reference.input):
+            raise DesignError(
+                f"reference input {reference.input.tolist()}: expected inside the plan bounds, "
+                f"{bounds.lower.tolist()} to {bounds.upper.tolist()}, for nominal.law = 'qp'"
+            )
         self._family = FamilyLaw(data)
-        self._lower, self._upper = minimum - reference.input, maximum - reference.input
+        self._lower, self._upper = bounds.lower - reference.input, bounds.upper - reference.input
         self._scale = design.nominal_input_scale
         self._block = round(BLOCK_TIME / design.period)
         A, B = design.polytope.at(*reference.state[:2])
@@ -58,13 +69,16 @@ class QpLaw:
         K = -np.linalg.solve(weight, B.T @ P @ A)
         self.gain = np.zeros(data.gains.shape[1:])
         self.gain[:, :N_RIGID] = K
-        state_map, self._input_map = _predicted_inputs(A + B @ K, B, K, self._block)
-        # Inputs and c in units of their scales.
-        points = len(state_map) // len(self._scale)
-        rows = np.tile(self._scale, points)
-        self._state_map = state_map / rows[:, None]
-        self._input_map *= np.tile(self._scale, BLOCKS) / rows[:, None]
-        self._bounds = np.tile(self._lower, points) / rows, np.tile(self._upper, points) / rows
+        # Inputs and c in units of their scales, the pitch acceleration in units of its range.
+        low, high = bounds.pitch_acceleration
+        size = np.append(self._scale, high - low)
+        rate = np.append(A[PITCH_RATE] - np.eye(N_RIGID)[PITCH_RATE], B[PITCH_RATE]) / design.period
+        state_map, input_map, bounded = _predicted(A + B @ K, B, K, rate, self._block)
+        unit = np.tile(size, len(state_map) // len(size))
+        self._state_map = (state_map / unit[:, None])[bounded]
+        self._input_map = (input_map * np.tile(self._scale, BLOCKS) / unit[:, None])[bounded]
+        lower, upper = np.append(self._lower, low), np.append(self._upper, high)
+        self._bounds = tuple((np.resize(side, len(unit)) / unit)[bounded] for side in (lower, upper))
         scaled = self._scale[:, None] * weight * self._scale
         self._hessian = np.kron(np.eye(BLOCKS), scaled / np.max(scaled))
         self.reset()
@@ -108,25 +122,31 @@ class QpLaw:
         return np.asarray(solver.result.x).reshape(BLOCKS, -1) * self._scale
 
 
-def _predicted_inputs(closed: np.ndarray, B: np.ndarray, K: np.ndarray, block: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return what maps x_n and all c to the inputs where bounds are imposed, block after block."""
+def _predicted(
+    closed: np.ndarray, B: np.ndarray, K: np.ndarray, rate: np.ndarray, block: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what maps x_n and all c to both inputs and to ``rate`` [x; u] where bounds are imposed, block after block.
+
+    The third array tells which of these rows are bounded: the rate in near blocks only.
+    """
     n, m = B.shape
     power, forced = [np.eye(n)], [np.zeros((n, m))]
     for _ in range(block):
         power.append(closed @ power[-1])
         forced.append(closed @ forced[-1] + B)
     from_state, from_plan = np.eye(n), np.zeros((n, m * BLOCKS))
-    state_rows, plan_rows = [], []
+    state_rows, plan_rows, bounded = [], [], []
     for b in range(BLOCKS):
         mine = slice(m * b, m * (b + 1))
         for share in CHECKED_NEAR if b < NEAR_BLOCKS else CHECKED_FAR:
             step = round(share * block)
-            plan = power[step] @ from_plan
+            state, plan = power[step] @ from_state, power[step] @ from_plan
             plan[:, mine] += forced[step]
             inputs = K @ plan
             inputs[:, mine] += np.eye(m)
-            state_rows.append(K @ power[step] @ from_state)
-            plan_rows.append(inputs)
+            state_rows += [K @ state, ((rate[:n] + rate[n:] @ K) @ state)[None]]
+            plan_rows += [inputs, (rate[:n] @ plan + rate[n:] @ inputs)[None]]
+            bounded += [True] * m + [b < NEAR_BLOCKS]
         from_state, from_plan = power[block] @ from_state, power[block] @ from_plan
         from_plan[:, mine] += forced[block]
-    return np.vstack(state_rows), np.vstack(plan_rows)
+    return np.vstack(state_rows), np.vstack(plan_rows), np.array(bounded)

@@ -64,7 +64,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         except DesignError as error:
             bound = literal.nominal.input_bound.array().tolist()
             raise DesignError(f"literal chain (30) to (35), |u_n| at most {bound}: {error}") from error
-    design = replace(gains.design, tube=tube.flown())
+    design = replace(gains.design, tube=tube.flown(), plan_bounds=tube.plan)
     report = {
         **gains.report,
         "versions": {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")},

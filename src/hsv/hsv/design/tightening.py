@@ -11,9 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.plan_bounds import PlanBounds
 from hsv.design.sets.invariant_set import InvariantSet
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS
+
+_KEPT_OFF = 0.05
+"""Share of the input ranges of the certified plans; without it the acceleration channel reaches 1.02 of its bound."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,22 @@ def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> Ti
                 "expected room for the nominal input"
             )
     return bounds
+
+
+def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
+    """Return what another nominal plan may use for the disturbance set to hold for it, too; flights have to show it.
+
+    Another plan may hold for long the inputs that the certified ones only touch. So it is kept off their top; the room
+    below them is that of plans that overshoot a little. The pitch acceleration is as theirs.
+
+    Args:
+        bounds: The tightened bounds.
+        lowest: (3) least u_n + u_r and pitch acceleration of the certified plans.
+        highest: (3) the largest.
+    """
+    shift = _KEPT_OFF * (highest - lowest)
+    shift[2] = 0.0
+    return PlanBounds(bounds.lower, bounds.upper, lowest - shift, highest - shift)
 
 
 def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> dict[str, Any]:

@@ -10,9 +10,10 @@ import numpy as np
 
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
+from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, acceleration_channels
-from hsv.design.error_system import error_system, tube_errors
+from hsv.design.error_system import PITCH_RATE, error_system, tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, corners, fraction, measure, record
 from hsv.design.sets.box import box
@@ -21,7 +22,7 @@ from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.design.sets.modal import modal_box
 from hsv.design.sets.sampling import sample
 from hsv.design.sets.zonotope import zonotope
-from hsv.design.tightening import TightenedInputs, check_plan, tighten
+from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.simulation.closed_loop import Flight
 from hsv.simulation.metrics import flight_metrics
 from hsv.vehicle.parameters import vehicle_parameters
@@ -42,11 +43,12 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Tube:
-    """Disturbance set, invariant set and tightened inputs of a design, with the ``report`` behind them (for JSON)."""
+    """Disturbance set, invariant set, tightened inputs and what a plan may use, with the ``report`` (for JSON)."""
 
     disturbance: DisturbanceSet
     found: InvariantSet
     bounds: TightenedInputs
+    plan: PlanBounds
     report: dict[str, Any]
 
     def flown(self) -> TubeSet | None:
@@ -115,19 +117,24 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
         lambda done: progress("flights in the tube", done, len(everyone)),
     )
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
-    plan = check_plan(bounds, lowest, highest)
+    plan = check_plan(bounds, lowest[:2], highest[:2])
+    allowed = plan_bounds(bounds, lowest, highest)
+    plan["pitch_acceleration"] = [float(lowest[2]), float(highest[2])]
     report = {
         "disturbance": _disturbance_report(measured, disturbance),
         "invariant_set": {**_set_report(found), "certificate": certified, "sampling": sampling},
         "tightening": {"lower": bounds.lower.tolist(), "upper": bounds.upper.tolist(), "plan": plan},
         "flights": _flights_report(flown),
     }
-    return Tube(disturbance, found, bounds, report)
+    return Tube(disturbance, found, bounds, allowed, report)
 
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """What one flight shows: worst ``level``, ratios |e - c| / z (n), membership, inputs of its plan, some metrics."""
+    """What one flight shows: worst ``level``, ratios |e - c| / z (n), membership, extremes of its plan, some metrics.
+
+    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2).
+    """
 
     level: float | None
     ratios: np.ndarray
@@ -144,13 +151,14 @@ def flight_evidence(
     h = flight.history
     errors = tube_errors(h.state, h.deviation, flight.reference, model.notch)
     plan = h.nominal_input + flight.reference_input
+    pitch_acceleration = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
     return FlightEvidence(
         level=float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
         ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
         membership=disturbance.membership(model.signals(record(flight)).channels),
-        lowest=plan.min(axis=0),
-        highest=plan.max(axis=0),
+        lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
+        highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
         metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
     )
 

@@ -12,7 +12,7 @@ from hsv.design.lmi import SolverReport
 from hsv.design.region import Extremes, Region, corners, fraction, measure
 from hsv.design.sets.ellipsoid import EllipsoidSet, from_shape, vertex_residuals
 from hsv.design.sets.sampling import sample
-from hsv.design.tightening import tighten
+from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube import channel_model, flight_evidence, tube_problem
 from hsv.design.verification.claims import Claim, Subject, above, at_most, same
 from hsv.design.verification.gains import inverse
@@ -64,6 +64,12 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     plan = kept["plan"]
     margins = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
     yield above("room of the nominal plan", margins.min(), 0.0)
+    low, high = plan["pitch_acceleration"]
+    allowed = plan_bounds(bounds, np.append(plan["lowest"], low), np.append(plan["highest"], high))
+    yield Claim("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
+    if design.plan_bounds is not None:
+        for name, value in vars(design.plan_bounds).items():
+            yield same(f"nominal.{name} from the tightened bounds and plans", value, getattr(allowed, name))
 
 
 def flight_claims(subject: Subject) -> Iterable[Claim]:
@@ -88,9 +94,11 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
     ratio = max(f.membership.ratio for f in flown)
     yield at_most("disturbances of flown corners", ratio, kept["disturbance_membership"]["worst_ratio"] * (1.0 + 1e-6))
     plan = stored["tightening"]["plan"]
+    low, high = plan["pitch_acceleration"]
+    least, most = np.append(plan["lowest"], low), np.append(plan["highest"], high)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
-    yield above("nominal plan of flown corners, lowest", float(np.min(lowest - np.array(plan["lowest"]))), -1e-9)
-    yield above("nominal plan of flown corners, highest", float(np.min(np.array(plan["highest"]) - highest)), -1e-9)
+    yield above("nominal plan of flown corners, lowest", float(np.min(lowest - least)), -1e-9)
+    yield above("nominal plan of flown corners, highest", float(np.min(most - highest)), -1e-9)
 
 
 def sequence_claims(subject: Subject) -> Iterable[Claim]:

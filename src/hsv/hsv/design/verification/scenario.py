@@ -1,0 +1,63 @@
+"""Claims of a scenario's flight: whether it keeps to what the tube of its design was computed for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from hsv.design.region import Corner, fraction
+from hsv.design.tightening import TightenedInputs
+from hsv.design.tube import FlightEvidence, channel_model, flight_evidence
+from hsv.design.verification.claims import Claim, Subject, above, at_most
+from hsv.design.verification.tube import certified_set
+from hsv.errors import DesignError
+from hsv.simulation.assembly import assemble
+from hsv.simulation.closed_loop import Components, fly
+from hsv.simulation.scenario import Scenario
+from hsv.vehicle.plant import Plant
+
+
+def bounding_corners(subject: Subject) -> list[Corner]:
+    """Return the nominal vehicle and the corners of the parameters that set a bound of the disturbances."""
+    measured = subject.certificate["tube"]["disturbance"]["measured"]
+    seen = fraction()
+    return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
+
+
+def scenario_claims(
+    subject: Subject, scenario: Scenario, over: Iterable[Corner] = ({},), progress: Callable[[int], None] | None = None
+) -> Iterable[Claim]:
+    """Fly ``scenario`` with the design, the vehicle changed to each of ``over``, and check level, disturbances, plan.
+
+    Raises:
+        DesignError: The scenario is not flown by the tube law.
+    """
+    if scenario.controller != "tube_mpc":
+        raise DesignError(f"scenario {scenario.name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
+    parts = assemble({**subject.design.to_parameters(), **scenario.parameters()})
+    found, model = certified_set(subject), channel_model(subject.design)
+    flown: list[FlightEvidence] = []
+    for corner in over:
+        plant = parts.plant
+        vehicle = plant.vehicle.perturbed(corner)
+        flight = fly(
+            Components(
+                Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps),
+                parts.notch_filter,
+                parts.nominal_trajectory,
+                parts.tube_law,
+                parts.fault_injector,
+            )
+        )
+        flown.append(flight_evidence(flight, found, found.problem.disturbance, model))
+        if progress:
+            progress(len(flown))
+    name = scenario.name
+    yield at_most(f"{name}: level in the set", max(f.level or 0.0 for f in flown), 1.0)
+    worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
+    yield at_most(f"{name}: disturbance over its bound, {worst.channel} at step {worst.step}", worst.ratio, 1.0)
+    kept = subject.certificate["tube"]["tightening"]
+    bounds = TightenedInputs(np.array(kept["lower"]), np.array(kept["upper"]))
+    lowest, highest = np.min([f.lowest for f in flown], axis=0)[:2], np.max([f.highest for f in flown], axis=0)[:2]
+    yield above(f"{name}: room of the nominal plan in U minus F Z", bounds.margins(lowest, highest).min(), 0.0)
