@@ -4,7 +4,15 @@ setup(
     name="hsv",
     version="0.1.0",
     packages=find_packages(include=["hsv", "hsv.*"]),
-    package_data={"hsv": ["**/*.toml", "recording/report/template/*", "recording/layouts/*", "bench/*.c", "campaign/template/*"]},
+    package_data={
+        "hsv": [
+            "**/*.toml",
+            "bench/*.c",
+            "campaign/template/*",
+            "recording/layouts/*",
+            "recording/report/template/*",
+        ]
+    },
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv"]),
         ("share/hsv", ["package.xml"]),

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.graph
 INJECT = textwrap.dedent(
     """
     import rclpy
-    from hsv_msgs.msg import Fault
+    from hsv_msgs.msg import Fault, VehicleState
     from hsv_msgs.srv import ClearFault, InjectFault
 
     rclpy.init()
@@ -30,14 +30,13 @@ INJECT = textwrap.dedent(
         return future.result()
 
     def inject(channel, kind, value):
-        return call(InjectFault, "/hsv/inject_fault", InjectFault.Request(fault=Fault(channel=channel, type=kind, value=value)))
+        fault = Fault(channel=channel, type=kind, value=value)
+        return call(InjectFault, "/hsv/inject_fault", InjectFault.Request(fault=fault))
 
     while not node.count_publishers("/hsv/state"):
         rclpy.spin_once(node, timeout_sec=0.1)
     steps = []
-    node.create_subscription(
-        __import__("hsv_msgs.msg", fromlist=["VehicleState"]).VehicleState, "/hsv/state", lambda m: steps.append(m.step), 10
-    )
+    node.create_subscription(VehicleState, "/hsv/state", lambda message: steps.append(message.step), 10)
     while not steps:
         rclpy.spin_once(node, timeout_sec=0.1)
     refused = inject("rudder", "loss_of_effectiveness", 0.5)

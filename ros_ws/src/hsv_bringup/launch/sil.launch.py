@@ -12,7 +12,6 @@ from launch_ros.actions import Node
 from hsv.graph.preparation import PreparedRun, prepare
 from launch import LaunchContext, LaunchDescription
 
-
 _prepared: list[PreparedRun] = []
 """Kept for as long as the launch file runs: with it goes the folder of parameter files."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import typer
 
@@ -26,7 +27,7 @@ from hsv.cli.verify import verify
 from hsv.cli.view import view
 from hsv.errors import HsvError, RunError
 
-UsageError = typer.BadParameter.__bases__[0]
+UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Of an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
 app = typer.Typer(
@@ -64,7 +65,7 @@ def main() -> None:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         sys.exit(app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False))
     except UsageError as error:
-        _fail(f"{error.format_message()} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)", 2)
+        _fail(_usage(error), 2)
     except typer.Abort:
         _fail("interrupted", 130)
     except RunError as error:
@@ -73,6 +74,10 @@ def main() -> None:
         _fail(error, 2)
     except KeyboardInterrupt:
         _fail("interrupted", 130)
+
+
+def _usage(error: Any) -> str:
+    return f"{error.format_message()} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)"
 
 
 def _fail(problem: object, code: int) -> None:

@@ -85,7 +85,8 @@ class NominalTrajectory:
         self._started = False
         # Compile now: a cold cache must not stall a flight.
         rest = FamilyLaw(self.data).step(self._deviation).input
-        nominal_advance(self.data.polytope, *reference.state[:2], self._deviation, rest, *self._scratch)
+        S, new = self._scratch
+        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, S, new)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:

@@ -63,7 +63,7 @@ def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
 
 
 class PolytopeData(NamedTuple):
-    """A polytopic model as compiled functions take it: ``S`` (r, n * (n + m)) holds [A_i, B_i] row by row, flattened."""
+    """A polytopic model as compiled functions take it: ``S`` (r, n * (n + m)) holds [A_i, B_i] row by row."""
 
     S: np.ndarray
     altitude: AxisWeights
@@ -74,8 +74,8 @@ class PolytopeData(NamedTuple):
 class Polytope:
     """A discrete-time polytopic model.
 
-    ``A`` (r, n, n), ``B`` (r, n, m), altitude-major: vertex i * r_velocity + j. Scheduling variables are altitude (m) and
-    velocity (m/s); outside the breakpoints they are clamped.
+    ``A`` (r, n, n), ``B`` (r, n, m), altitude-major: vertex i * r_velocity + j. Scheduling variables are altitude (m)
+    and velocity (m/s); outside the breakpoints they are clamped.
     """
 
     A: np.ndarray

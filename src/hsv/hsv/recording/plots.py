@@ -57,4 +57,3 @@ def save_figure(figure: Figure, path: Path) -> None:
 
 def _mathtext(unit: str) -> str:
     return unit.replace("^0.5", "$^{1/2}$")
-
