@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -83,7 +83,9 @@ def over_dds(
     if ending.culprit:
         raise RunError(f"{ending.culprit} {ending.reason}: {' | '.join(ending.last_words)}")
     recorded = Bag(bag)
-    repeated = pilot.outcome(flight_data(recorded))
+    data = flight_data(recorded)
+    # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
+    repeated = pilot.outcome(replace(data, time=np.arange(len(data.time)) * pilot.period))
     if repeated["tube_level"] is not None:
         # What the controller itself published, not what is computed from its messages.
         repeated["tube_level"] = float(np.max(recorded.columns("/hsv/tube_status")["level"]))

@@ -90,8 +90,8 @@ class Envelope:
     def decode(cls, text: str) -> Self:
         """Return the envelope that :meth:`encode` wrote."""
         s = len(SIGNALS)
-        table = np.frombuffer(base64.b64decode(text)).reshape(-1, 3 * s + 1)
-        return cls(*(table[:, i * s : (i + 1) * s].copy() for i in range(3)), table[:, 3 * s].copy())
+        table = np.frombuffer(base64.b64decode(text)).reshape(-1, 3 * s + 1).copy()
+        return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])
 
 
 def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:

@@ -114,7 +114,7 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
     pilot, envelope = Pilot(results.campaign), results.envelope
     windows = window_starts(pilot.steps)
     reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
-    time = windows[reached] * float(pilot.fly_unchanged().period)
+    time = windows[reached] * pilot.period
     flights = {"unchanged": pilot.fly_unchanged(), f"flight {worst}": pilot.fly(pilot.samples[worst])}
     return {
         "time": _packed(time),
@@ -131,7 +131,7 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
             }
             for i, signal in enumerate(SIGNALS)
         ],
-        "flight_time": _packed(windows * flights["unchanged"].period),
+        "flight_time": _packed(windows * pilot.period),
     }
 
 

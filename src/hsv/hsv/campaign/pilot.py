@@ -32,6 +32,8 @@ class Pilot:
         self._nominal = campaign.parameters
         self._parts = assemble(self._nominal)
         self._levels = TubeLevels(self._nominal)
+        self.period = self._parts.plant.period
+        """Control period, s."""
         self.steps = self._parts.plant.steps
         """Control periods of a flight that does not end early."""
 

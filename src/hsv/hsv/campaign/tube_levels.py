@@ -58,14 +58,15 @@ class TubeLevels:
         """Return the largest level (e - c)' P (e - c) of the flight, ``None`` where no set holds for it."""
         if self._tube is None:
             return None
-        error = (flight.state - flight.reference - flight.deviation)[:, :N_RIGID]
+        state, reference, deviation = (a[:, :N_RIGID] for a in (flight.state, flight.reference, flight.deviation))
+        error = state - reference - deviation
         planned_rate = flight.reference[:, PITCH_RATE] + flight.deviation[:, PITCH_RATE]
         return float(
             _worst(
                 self._notch,
                 self._tube.shape,
                 self._tube.centre,
-                np.ascontiguousarray(error),
+                error,
                 np.ascontiguousarray(flight.state[:, PITCH_RATE]),
                 np.ascontiguousarray(planned_rate),
             )

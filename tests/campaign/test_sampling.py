@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+from scipy.stats import qmc
+
+from hsv.campaign.sampling import draw
+from hsv.errors import CampaignError
+from hsv.vehicle.parameters import uncertainty_bounds
+
+BOUNDS = np.array(list(uncertainty_bounds().values()))
+
+
+def test_uniform_samples_lie_within_the_bounds_and_fill_them(planned):
+    samples, _ = draw(planned(samples=2000, fault_start=None))
+    assert np.all(np.abs(samples) <= BOUNDS)
+    assert np.all(np.ptp(samples, axis=0) > 1.95 * BOUNDS)
+    assert np.all(np.abs(samples.mean(axis=0)) < 0.1 * BOUNDS)
+
+
+def test_a_uniform_flight_can_be_drawn_alone_from_its_own_seed(planned):
+    samples, seeds = draw(planned(samples=50))
+    longer, _ = draw(planned(samples=80))
+    assert np.array_equal(samples, longer[:50])
+    assert len(set(seeds.tolist())) == 50
+    unit = np.random.default_rng(int(seeds[17])).random(samples.shape[1])
+    assert samples[17, :10] == pytest.approx(BOUNDS * (2.0 * unit[:10] - 1.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("method", ["uniform", "latin_hypercube", "sobol"])
+def test_the_seed_determines_the_samples(planned, method):
+    first, again, other = (draw(planned(samples=64, method=method, seed=seed))[0] for seed in (5, 5, 6))
+    assert np.array_equal(first, again)
+    assert not np.any(np.all(first == other, axis=1))
+
+
+def test_corners_are_all_combinations_of_the_bounds_exactly(planned):
+    samples, _ = draw(planned(method="corners", fault_start=None))
+    assert samples.shape == (1024, 10)
+    assert np.array_equal(np.abs(samples), np.broadcast_to(BOUNDS, samples.shape))
+    assert len(np.unique(samples, axis=0)) == 1024
+
+
+def test_latin_hypercube_and_sobol_spread_more_evenly_than_chance(planned):
+    def discrepancy(method):
+        samples, _ = draw(planned(samples=128, method=method, fault_start=None))
+        return qmc.discrepancy((samples / BOUNDS + 1.0) / 2.0)
+
+    assert discrepancy("sobol") < discrepancy("latin_hypercube") < discrepancy("uniform")
+
+
+@pytest.mark.parametrize(
+    ("settings", "field"),
+    [
+        ({"samples": 0}, "samples"),
+        ({"samples": 100, "method": "sobol"}, "samples"),
+        ({"seed": -1}, "seed"),
+        ({"method": "grid"}, "method"),
+    ],
+)
+def test_wrong_settings_are_named(planned, settings, field):
+    with pytest.raises(CampaignError, match=rf"^{field} = .*expected"):
+        planned(**settings)
