@@ -53,6 +53,8 @@ _hsv_env() {
     export HSV_ROOT="$root"
     export HSV_DESIGN_PATH="${HSV_DESIGN_PATH:-$root/offline_design}"
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
+    # Small matrices: more threads would only wait for each other, and change last bits.
+    export OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"
     if [ -z "${HOME:-}${ROS_HOME:-}${ROS_LOG_DIR:-}" ]; then
         # ROS nodes do not start without a place for their log files.
         export ROS_LOG_DIR="$root/ros_ws/log/nodes"
