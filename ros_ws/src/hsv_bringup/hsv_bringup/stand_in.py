@@ -45,7 +45,7 @@ class StandInNode(LockstepNode):
         self._fed = 0
         self._output = BagWriter(Path(values["stand_in.directory"]))
         self._peers: dict[str, Node] = {}
-        # Of topics with several listeners each is a peer of its own; of those with several sources there are none.
+        # The node under test looks for its peers by name on every link: each has to be there under its own.
         self._feeds = {}
         for topic, peer in description.links(self._under_test, self.controller, recorded=False):
             kind = message_class(description.TOPICS[topic])
