@@ -10,6 +10,7 @@ from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS, NominalTrajectory
 from hsv.graph.exchange import plan_nominal
 from hsv_ctrl.design import declare_design
+from hsv_ctrl.step_times import StepTimes
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
 
@@ -20,6 +21,7 @@ class NominalTrajectoryNode(PeerNode):
     def __init__(self) -> None:
         super().__init__("nominal_trajectory")
         self.trajectory = NominalTrajectory.from_parameters(declare_design(self, NOMINAL_PARAMETERS))
+        self._times, self._failed = StepTimes(), False
         self._message = NominalState()
         self._nominal = self.talk("/hsv/nominal")
         self.listen("/hsv/state", self._on_state)
@@ -27,15 +29,21 @@ class NominalTrajectoryNode(PeerNode):
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""
         self.trajectory.reset()
+        self._times, self._failed = StepTimes(), False
 
     def _on_state(self, state: VehicleState) -> None:
-        result = plan_nominal(self.trajectory, state, self._message)
+        with self._times:
+            result = plan_nominal(self.trajectory, state, self._message)
         self._nominal.publish(self._message)
+        failed = NominalStatus.SOLVER_FAILED in result.status
+        fails, self._failed = failed and not self._failed, failed
         self.diagnose(
             state.header.stamp,
             "running" if result.status is NominalStatus.OK else str(result.status.name),
+            warning=fails,
             step=state.step,
             gain_index=result.gain_index,
+            step_time_p99_ms=self._times,
         )
 
 

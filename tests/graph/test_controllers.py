@@ -1,0 +1,93 @@
+"""Other controllers and nominal laws over DDS: the flights of the library, bit for bit, and what is said of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_processes import Processes
+
+from hsv.control.tube_law import TubeStatusCode
+from hsv.recording.flight import input_columns, state_columns
+from hsv.recording.reader import Bag
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import History, fly
+from hsv.simulation.scenario import load_scenario, scenario_text
+
+pytestmark = pytest.mark.graph
+
+
+def _shortened(processes: Processes, scenario: str, duration: float, fault: float, value: float = 0.9) -> Path:
+    text = scenario_text(scenario).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
+    path = processes.folder / f"{scenario}.toml"
+    path.write_text(text.replace("value = 0.9", f"value = {value}").partition("[limits]")[0])
+    return path
+
+
+def _flown(processes: Processes, scenario: Path, name: str) -> Bag:
+    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / name, timeout=120.0)
+    assert done.returncode == 0, done.stdout
+    return Bag(processes.folder / name)
+
+
+def _check_equal(bag: Bag, history: History) -> None:
+    nominal = bag.columns("/hsv/nominal")
+    recorded = {
+        "state": state_columns(bag.columns("/hsv/state")),
+        "deviation": state_columns(nominal, "deviation."),
+        "nominal_input": input_columns(nominal, "input."),
+        "gain_index": nominal["gain_index"],
+        "u_unsaturated": input_columns(bag.columns("/hsv/tube_status"), "u_unsaturated."),
+        "actuator": input_columns(bag.columns("/hsv/actuator")),
+    }
+    for name, column in recorded.items():
+        assert np.array_equal(column, getattr(history, name)), name
+
+
+def _history(scenario: Path) -> History:
+    return fly(assemble(flight_parameters(load_scenario(str(scenario))))).history
+
+
+def test_robust_mpc_flies_as_in_process(processes: Processes) -> None:
+    scenario = _shortened(processes, "case1_rmpc", 3, 2)
+    bag = _flown(processes, scenario, "rmpc")
+    _check_equal(bag, _history(scenario))
+    status = bag.columns("/hsv/tube_status")
+    assert set(status["status"]) == {TubeStatusCode.NO_SET} and np.isnan(status["level"]).all()
+
+
+def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processes) -> None:
+    scenario = _shortened(processes, "case1_qp", 4, 2, value=0.6)
+    bag = _flown(processes, scenario, "left")
+    _check_equal(bag, _history(scenario))
+    assert not bag.columns("/hsv/nominal")["status"].any()
+
+    status = bag.columns("/hsv/tube_status")
+    outside = status["status"] == TubeStatusCode.OUTSIDE
+    assert np.array_equal(outside, status["level"] > 1.0) and np.array_equal(outside, ~status["inside"])
+    first = int(np.argmax(outside))
+    assert 100 < first < 200
+    warned = [
+        (message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, {v.key: v.value for v in entry.values})
+        for _, message in bag.decode("/diagnostics")
+        for entry in message.status
+        if entry.name == "tube_mpc" and entry.level == 1
+    ]
+    assert warned[0][0] == pytest.approx(0.02 * first) and warned[0][1]["component"]
+    said = [message.msg for _, message in bag.decode("/rosout")]
+    assert any(f"left the tube at {0.02 * first:.2f} s: {warned[0][1]['component']}" in text for text in said)
+    told = json.loads(processes.run("hsv", "info", processes.folder / "left", "--json").stdout)["tube"]
+    assert told["outside_steps"] == outside.sum()
+    assert told["excursions"][0]["start_s"] == pytest.approx(0.02 * first)
+
+
+def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> None:
+    scenario = _shortened(processes, "case1_kothare_online", 2.4, 2.2)
+    first, second = (_flown(processes, scenario, name) for name in ("first", "second"))
+    for topic in ("/hsv/nominal", "/hsv/command", "/hsv/state"):
+        assert first.messages(topic) == second.messages(topic), topic
+    _check_equal(first, _history(scenario))
+    indices = first.columns("/hsv/nominal")["gain_index"]
+    assert np.all(indices[:100] < 255) and np.all(indices[100:] == 255)
