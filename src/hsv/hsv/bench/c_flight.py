@@ -91,7 +91,9 @@ class CFlight:
                     len(data.gains), data.ellipsoids.shape[1], self._doubles(data.gains), self._doubles(data.ellipsoids)
                 )
             ),
-            ctypes.byref(_Tube(law.data.tau, *(self._doubles(a) for a in (law.data.gain, law.data.minimum, law.data.maximum)))),
+            ctypes.byref(
+                _Tube(law.data.tau, *(self._doubles(a) for a in (law.data.gain, law.data.minimum, law.data.maximum)))
+            ),
             ctypes.byref(
                 _Faults(
                     len(faults.start),

@@ -7,6 +7,7 @@ from typing import Any
 
 import typer
 
+from hsv.cli.bench import bench
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
@@ -54,6 +55,7 @@ for command in (
     diff,
     recover,
     export,
+    bench,
 ):
     app.command()(command)
 app.add_typer(montecarlo, name="montecarlo")

@@ -1,0 +1,106 @@
+"""One process of the ring: answers with messages of full size as soon as its inputs have come, and computes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from rclpy.node import Node
+
+from hsv.graph import description
+from hsv.recording.definitions import definition, type_hash
+from hsv.recording.topic import Qos, Topic
+from hsv.recording.writer import BagWriter
+from hsv_node.messages import message_class
+from hsv_node.qos import STEP
+
+_CONTROLLER = description.TUBE_MPC.name
+
+_FILLED = {
+    "/hsv/filtered_state": {"filter_state": [0.0] * 2},
+    "/hsv/tube_status": {"error": [0.0] * 7, "tube_centre": [0.0] * 7, "tube_half_width": [0.0] * 7},
+}
+"""Arrays with as many elements as in a flight of Case 1."""
+
+
+class Member:
+    """A process of the graph description without its work."""
+
+    def __init__(self, role: str, laps: int) -> None:
+        """Create publishers and subscriptions of ``role``, for so many laps."""
+        self.node = Node(role)
+        self.finished = False
+        self.lap = 0
+        self._laps = laps
+        self._role = next(node for node in description.graph() if node.name == role)
+        self._came = 0
+        self._outputs = [(topic, self._publisher(topic), self._message(topic)) for topic in self._role.publishes]
+        raw = self._role is description.RECORDER
+        self.inputs = [
+            self.node.create_subscription(self._kind(topic), topic, self._callback(topic), STEP, raw=raw)
+            for topic in self._role.subscribes
+        ]
+
+    def matched(self) -> bool:
+        """Tell whether all links of the graph description stand."""
+        links = description.links(self._role.name, _CONTROLLER, True)
+        counts = {p.topic_name: p.get_subscription_count() for _, p, _ in self._outputs}
+        counts |= {s.topic_name: s.get_publisher_count() for s in self.inputs}
+        return all(count >= sum(topic == linked for linked, _ in links) for topic, count in counts.items())
+
+    def publish(self) -> None:
+        """Publish what this process publishes in a step."""
+        for topic, publisher, message in self._outputs:
+            if topic != "/clock":
+                message.step = self.lap
+            publisher.publish(message)
+
+    def receive(self, message: Any) -> None:
+        """Take an input; answer when all of a step have come."""
+        self._came += 1
+        if self._came < len(self.inputs):
+            return
+        self._came = 0
+        self.lap += 1
+        self.finished = self.lap == self._laps
+        if self._role is not description.PLANT or not self.finished:
+            self.publish()
+
+    def close(self) -> None:
+        """Overridden where something must be saved."""
+
+    def _callback(self, topic: str) -> Callable[[Any], None]:
+        return self.receive
+
+    def _publisher(self, topic: str) -> Any:
+        return self.node.create_publisher(self._kind(topic), topic, STEP)
+
+    @staticmethod
+    def _kind(topic: str) -> Any:
+        return message_class(description.TOPICS[topic])
+
+    def _message(self, topic: str) -> Any:
+        return self._kind(topic)(**_FILLED.get(topic, {}))
+
+
+class Recorder(Member):
+    """Writes all messages to a bag, as they come."""
+
+    def __init__(self, laps: int, bag: Path) -> None:
+        super().__init__(description.RECORDER.name, laps)
+        self._bag = BagWriter(bag)
+        for topic, kind in description.TOPICS.items():
+            self._bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), Qos(depth=STEP.depth)))
+
+    def _callback(self, topic: str) -> Callable[[Any], None]:
+        return partial(self._write, topic)
+
+    def _write(self, topic: str, data: bytes) -> None:
+        self._bag.write(topic, self.lap, data)
+        self.receive(data)
+
+    def close(self) -> None:
+        """Finish the bag."""
+        self._bag.close()

@@ -1,0 +1,75 @@
+"""A figure of the bench: two sides measured in turn, their ratio, and what it is held against."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What was measured, against what, in ``unit``; where there is no other side, ``theirs`` is empty."""
+
+    name: str
+    what: str
+    against: str
+    unit: str
+    ours: tuple[float, ...]
+    theirs: tuple[float, ...] = ()
+    bound: str = ""
+    """``"most"`` or ``"least"``: which side of the limit is good; empty: nothing is promised."""
+    limit: float | None = None
+    goal: float | None = None
+    note: str = ""
+
+    @property
+    def ratios(self) -> np.ndarray:
+        """Ours over theirs, pair by pair; ours alone where there is no other side."""
+        return np.array(self.ours) / np.array(self.theirs) if self.theirs else np.array(self.ours)
+
+    @property
+    def median(self) -> float:
+        """Median of the ratios."""
+        return float(np.median(self.ratios))
+
+    @property
+    def spread(self) -> tuple[float, float]:
+        """10th and 90th percentile of the ratios."""
+        low, high = np.percentile(self.ratios, (10.0, 90.0))
+        return float(low), float(high)
+
+    @property
+    def verdict(self) -> str:
+        """How the median stands to limit and goal, in words; empty where nothing is promised."""
+        if self.limit is None:
+            return ""
+        sign = 1.0 if self.bound == "most" else -1.0
+        if sign * self.median > sign * self.limit:
+            return f"WORSE than the limit, at {self.bound} {self.limit:g}"
+        if self.goal is not None and sign * self.median > sign * self.goal:
+            return f"within the limit {self.limit:g}, short of the goal {self.goal:g}"
+        return f"within {self.goal if self.goal is not None else self.limit:g}"
+
+
+def interleaved(
+    ours: Callable[[], object],
+    theirs: Callable[[], object],
+    repeats: int,
+    clock: Callable[[], float] = time.thread_time,
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the times (s) of both sides, measured in turn after one run of each that is not counted.
+
+    The processor time of the thread by default: what other programs take does not count.
+    """
+    times: tuple[list[float], list[float]] = [], []
+    for job in (ours, theirs):
+        job()
+    for _ in range(repeats):
+        for job, taken in zip((ours, theirs), times, strict=True):
+            started = clock()
+            job()
+            taken.append(clock() - started)
+    return tuple(times[0]), tuple(times[1])

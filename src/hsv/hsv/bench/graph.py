@@ -1,0 +1,68 @@
+"""The graph of nodes against bare processes with the same hops, message sizes and recorder."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+
+from hsv.bench.figure import Figure
+from hsv.bench.ring import ring_lap
+from hsv.errors import RunError
+from hsv.graph.description import COMPOSED
+from hsv.graph.launcher import Launcher
+from hsv.graph.preparation import prepare
+from hsv.simulation.scenario import load_scenario, scenario_text
+
+_PERIOD = 0.02
+
+
+def graph_lap(duration: float, *, composed: bool = False) -> float:
+    """Return the mean time (s) of a step of the first ``duration`` (s) of Case 1 over DDS, recorded.
+
+    Raises:
+        RunError: A process ended before its time, or the workspace is not built.
+    """
+    times: dict[int, float] = {}
+    with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
+        path = Path(folder, "case1.toml")
+        whole = load_scenario("case1").duration
+        path.write_text(scenario_text("case1").replace(f'duration = "{whole:g} s"', f'duration = "{duration:g} s"'))
+        prepared = prepare(str(path), bag=Path(folder, "bag"))
+        nodes = (COMPOSED,) if composed else prepared.nodes
+        arguments = [word for file in prepared.parameter_files for word in ("--params-file", str(file))]
+        with Launcher(
+            nodes, arguments, lambda step: times.setdefault(step, time.perf_counter()), lambda node, text: None
+        ) as launcher:
+            ending = launcher.wait(nodes[-1].name)
+    if ending.culprit:
+        raise RunError(f"{ending.culprit} {ending.reason}: {' '.join(ending.last_words)}")
+    first, last = min(times), max(times)
+    return (times[last] - times[first]) / (last - first)
+
+
+def against_rings(repeats: int, duration: float = 60.0) -> list[Figure]:
+    """Return laps of the graph, as separate processes and in one, against bare rings, all measured in turn."""
+    laps = round(duration / _PERIOD)
+    separate, events, wait_set, composed, ordered = [], [], [], [], []
+    for _ in range(repeats):
+        separate.append(graph_lap(duration))
+        events.append(ring_lap(laps, "events"))
+        wait_set.append(ring_lap(laps, "wait_set"))
+        composed.append(graph_lap(duration, composed=True))
+        ordered.append(ring_lap(laps, "ordered", composed=True))
+    ours, together = tuple(separate), tuple(composed)
+    what, one = "lap of the graph, separate processes, recorded", "lap of the graph, composed, recorded"
+    return [
+        Figure("graph", what, "bare ring, EventsExecutor, same recorder", "s", ours, tuple(events), "most", 1.5, 1.2),
+        Figure("graph_wait_set", what, "bare ring, raw WaitSet, same recorder", "s", ours, tuple(wait_set)),
+        Figure("composed", one, "bare loop in one process, ordered take, same recorder", "s", together, tuple(ordered)),
+        _pace("separate processes", ours, 6.0, 8.0),
+        _pace("composed", together, 25.0, 40.0),
+    ]
+
+
+def _pace(name: str, laps: tuple[float, ...], limit: float, goal: float) -> Figure:
+    what = f"Case 1 over DDS, {name}: simulated over wall time"
+    factors = tuple(_PERIOD / lap for lap in laps)
+    return Figure(f"pace_{name.replace(' ', '_')}", what, "", "x real time", factors, (), "least", limit, goal)

@@ -1,0 +1,116 @@
+"""The compiled flight against a C build of the same arithmetic, and against what people would use instead."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+
+from hsv.bench.c_flight import FLAGS, CFlight, largest_difference
+from hsv.bench.figure import Figure, interleaved
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.vehicle.dynamics import N_STATES, derivative
+from hsv.vehicle.plant import Plant
+
+_STEPS = 200
+"""Control periods of a comparison with a general integrator, which takes too long for whole flights."""
+
+
+def against_c(repeats: int) -> list[Figure]:
+    """Return Case 1 in process against the C build, for any processor and for this one."""
+    components = assemble(flight_parameters(load_scenario("case1")))
+    figures = []
+    for name, flags, limit in (("in_process", FLAGS, 1.5), ("in_process_native", (*FLAGS, "-march=native"), None)):
+        other = CFlight(components, flags)
+        ours, theirs = interleaved(lambda: fly(components), other.fly, repeats)
+        difference = largest_difference(fly(components).history, other.fly())
+        note = "equal in every bit" if difference == 0.0 else f"largest relative difference {difference:.1e}"
+        figures.append(
+            Figure(
+                name,
+                "Case 1, 200 s, compiled loop",
+                f"C, cc {' '.join(flags)}",
+                "s",
+                ours,
+                theirs,
+                "most" if limit else "",
+                limit,
+                1.3 if limit else None,
+                note,
+            )
+        )
+    return figures
+
+
+def against_scipy(repeats: int) -> list[Figure]:
+    """Return the plant alone against scipy's DOP853 on the same equations under the same held inputs."""
+    from scipy.integrate import solve_ivp
+
+    plant = assemble(flight_parameters(load_scenario("case1"))).plant
+    x_0, u = plant.initial.state, plant.initial.input + np.array([0.05, 0.01])
+    ends: dict[str, np.ndarray] = {}
+
+    def ours() -> None:
+        plant.reset()
+        for _ in range(_STEPS):
+            ends["ours"] = plant.step(u).state
+
+    def theirs() -> None:
+        x, rates = x_0.copy(), np.empty(N_STATES)
+
+        def slope(t: float, state: np.ndarray) -> np.ndarray:
+            derivative(state, u, plant.vehicle, rates)
+            return rates.copy()
+
+        for _ in range(_STEPS):
+            x = solve_ivp(slope, (0.0, plant.period), x, "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]
+        ends["theirs"] = x
+
+    times = interleaved(ours, theirs, repeats)
+    difference = np.max(np.abs(ends["ours"] - ends["theirs"]) / np.maximum(1.0, np.abs(ends["theirs"])))
+    return [
+        Figure(
+            "scipy",
+            f"plant, {_STEPS} control periods, one call each",
+            "scipy solve_ivp DOP853, rtol 1e-8, the same compiled right-hand side",
+            "s",
+            *times,
+            note=f"largest relative difference at the end {difference:.1e}",
+        )
+    ]
+
+
+def against_jsbsim(repeats: int) -> list[Figure]:
+    """Return a step of the plant against one of JSBSim's c172x, where JSBSim is installed."""
+    if find_spec("jsbsim") is None:
+        return []
+    import jsbsim
+
+    aircraft = jsbsim.FGFDMExec(None)
+    aircraft.set_debug_level(0)
+    aircraft.load_model("c172x")
+    aircraft["ic/h-sl-ft"], aircraft["ic/vc-kts"] = 5000.0, 100.0
+    aircraft.run_ic()
+    plant: Plant = assemble(flight_parameters(load_scenario("case1"))).plant
+
+    def ours() -> None:
+        plant.reset()
+        for _ in range(_STEPS):
+            plant.step(plant.initial.input)
+
+    def theirs() -> None:
+        for _ in range(_STEPS):
+            aircraft.run()
+
+    return [
+        Figure(
+            "jsbsim",
+            f"plant, {_STEPS} control periods",
+            "JSBSim c172x, as many of its steps",
+            "s",
+            *interleaved(ours, theirs, repeats),
+            note="another aircraft and integrator: the price of a step, no more",
+        )
+    ]

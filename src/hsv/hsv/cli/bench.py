@@ -1,0 +1,95 @@
+"""The command ``hsv bench``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsv.cli.options import JsonOption
+from hsv.cli.output import check_target, console, errors, print_json
+
+if TYPE_CHECKING:
+    from hsv.bench.figure import Figure
+
+
+def bench(
+    only: Annotated[list[str] | None, typer.Option(help="Measure this group only; may be repeated.")] = None,
+    scale: Annotated[float, typer.Option(help="Factor on the number of repetitions.")] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Page whose table to replace, e.g. docs/benchmarks.md.")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Measure this machine: every figure a ratio, both sides measured in turn; worse than promised is said plainly.
+
+    Example: hsv bench --only in_process --only mcap
+    """
+    from hsv.bench.page import replace_table
+    from hsv.bench.suite import groups
+    from hsv.cli.progress import stages
+    from hsv.errors import QuantityError, RunError
+
+    if not 0.0 < scale <= 100.0:
+        raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
+    if out:
+        check_target(out, "out")
+    available = groups(scale)
+    for name in only or ():
+        if name not in available:
+            raise QuantityError(f"only = {name!r}: expected one of {', '.join(available)}")
+    chosen = [name for name in available if not only or name in only]
+    figures: list[Figure] = []
+    skipped: dict[str, str] = {}
+    with stages() as progress:
+        for number, name in enumerate(chosen):
+            progress("measuring", number, len(chosen))
+            try:
+                measured = available[name]()
+            except RunError as error:
+                # Without a compiler or a built workspace, the rest can still be measured.
+                skipped[name] = str(error)
+                continue
+            if not measured:
+                skipped[name] = "not installed"
+            figures += measured
+    if json:
+        print_json({"figures": [_as_json(figure) for figure in figures], "skipped": skipped})
+    else:
+        _print(figures)
+        for name, reason in skipped.items():
+            errors.print(f"{name}: not measured: {reason}", markup=False, soft_wrap=True)
+    if out:
+        replace_table(out, figures)
+
+
+def _as_json(figure: Figure) -> dict[str, Any]:
+    return {
+        "name": figure.name,
+        "what": figure.what,
+        "against": figure.against or None,
+        "unit": figure.unit,
+        "ours": list(figure.ours),
+        "theirs": list(figure.theirs),
+        "ratio" if figure.theirs else "value": figure.median,
+        "spread": figure.spread,
+        "bound": figure.bound or None,
+        "limit": figure.limit,
+        "goal": figure.goal,
+        "verdict": figure.verdict or None,
+        "note": figure.note or None,
+    }
+
+
+def _print(figures: list[Figure]) -> None:
+    from rich.table import Table
+
+    from hsv.bench.page import cells
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("what", "against", "ours", "theirs", "ratio", "spread", "promise"):
+        table.add_column(heading, justify="left" if heading in ("what", "against", "promise") else "right")
+    for figure in figures:
+        row = cells(figure)
+        style = "[bold red]" if "WORSE" in row[-1] else ""
+        table.add_row(*row[:-1], f"{style}{row[-1]}")
+    console.print(table)
