@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-viewers lint references clean
+.PHONY: help setup run test test-viewers lint references bench clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -42,6 +42,9 @@ lint: setup ## set up, then check style and types
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@source ./env.sh && python3 -m pytest -m "not reference" && python3 tools/references.py
+
+bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--only in_process")
+	@$(IN_ENVIRONMENT) hsv bench --out docs/benchmarks.md $(ARGS)
 
 clean: ## remove what set-up and tools made; recorded runs stay
 	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis

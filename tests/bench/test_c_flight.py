@@ -1,0 +1,47 @@
+import shutil
+
+import pytest
+from flights import components
+
+from hsv.bench.c_flight import FLAGS, CFlight, largest_difference
+from hsv.errors import RunError
+from hsv.simulation.closed_loop import fly
+
+TOLERANCE = 1e-12
+"""Relative; zero where the C library's functions and those of the compiled loop are the same."""
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+
+
+@needs_compiler
+@pytest.mark.parametrize("scenario", ["case1", "case1_derived", "case1_no_notch", "case1_uncertain", "case1_single_k"])
+def test_the_c_build_flies_the_same_flight(scenario):
+    parts = components(scenario, duration=110.0)
+    assert largest_difference(fly(parts).history, CFlight(parts).fly()) <= TOLERANCE
+
+
+@needs_compiler
+def test_a_flight_that_diverges_ends_at_the_same_step():
+    parts = components("case1_derived_no_notch")
+    flown, other = fly(parts).history, CFlight(parts).fly()
+    assert len(flown.state) == len(other.state) < parts.plant.steps
+    # Rounding grows with a diverging flight.
+    assert largest_difference(flown, other) < 1e-6
+
+
+@needs_compiler
+def test_another_flight_is_seen():
+    parts, other = components(duration=110.0), components(duration=110.0, fault__values=[0.9000001])
+    assert largest_difference(fly(parts).history, CFlight(other).fly()) > 1e-9
+    assert largest_difference(fly(parts).history, CFlight(components(duration=100.0)).fly()) == float("inf")
+
+
+@needs_compiler
+def test_a_failed_build_says_so():
+    with pytest.raises(RunError, match="C build"):
+        CFlight(components(duration=1.0), (*FLAGS, "--no-such-flag"))
+
+
+def test_components_that_the_c_build_does_not_know_are_refused():
+    with pytest.raises(RunError, match="nested family"):
+        CFlight(components(duration=1.0, controller="robust_mpc"))

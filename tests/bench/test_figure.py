@@ -1,0 +1,55 @@
+import time
+
+import pytest
+
+from hsv.bench.figure import Figure, interleaved
+from hsv.bench.page import BEGIN, END, replace_table
+from hsv.errors import QuantityError
+
+
+def figure(*ours, theirs=(1.0, 1.0, 1.0), **promise):
+    return Figure("f", "ours", "theirs", "s", ours, theirs, **promise)
+
+
+def test_ratios_are_taken_pair_by_pair():
+    measured = figure(2.0, 6.0, 4.0, theirs=(1.0, 2.0, 4.0))
+    assert measured.ratios.tolist() == [2.0, 3.0, 1.0]
+    assert measured.median == 2.0
+    assert measured.spread == pytest.approx((1.2, 2.8))
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "verdict"),
+    [
+        (1.2, "most", "within 1.3"),
+        (1.4, "most", "within the limit 1.5, short of the goal 1.3"),
+        (1.6, "most", "WORSE than the limit, at most 1.5"),
+        (1.6, "least", "within 1.3"),
+        (1.2, "least", "WORSE than the limit, at least 1.5"),
+    ],
+)
+def test_what_is_worse_than_promised_is_said_plainly(value, bound, verdict):
+    limit, goal = (1.5, 1.3)
+    assert figure(value, theirs=(1.0,), bound=bound, limit=limit, goal=goal).verdict == verdict
+
+
+def test_the_two_sides_are_measured_in_turn():
+    order = []
+    ours, theirs = interleaved(lambda: order.append("a"), lambda: order.append("b"), 3, time.perf_counter)
+    assert "".join(order) == "ab" * 4
+    assert len(ours) == len(theirs) == 3
+
+
+def test_the_table_replaces_the_one_before(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(f"# Before\n{BEGIN}\nold\n{END}\nAfter\n")
+    for _ in range(2):
+        replace_table(page, [figure(1.4, theirs=(1.0,), bound="most", limit=1.5, note="noted")])
+    text = page.read_text()
+    assert text.startswith("# Before\n") and text.endswith("\nAfter\n")
+    assert "old" not in text
+    assert text.count("| ours | theirs | 1.4 s") == 1
+    assert "within 1.5; noted" in text
+    page.write_text("nothing")
+    with pytest.raises(QuantityError, match="marks"):
+        replace_table(page, [])

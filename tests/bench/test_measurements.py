@@ -1,0 +1,39 @@
+"""Each measurement once, small: that it measures, not what."""
+
+import pytest
+from domain_coordinator import domain_id
+
+from hsv.bench.graph import graph_lap
+from hsv.bench.in_process import against_scipy
+from hsv.bench.ring import ring_lap
+from hsv.bench.writing import against_mcap
+
+
+def test_scipy_arrives_at_the_same_state():
+    [measured] = against_scipy(1)
+    assert measured.median < 1.0
+    assert float(measured.note.split()[-1]) < 1e-3
+
+
+def test_writing_is_measured():
+    [measured] = against_mcap(1)
+    assert measured.median > 0.5
+
+
+@pytest.fixture
+def own_domain(monkeypatch):
+    with domain_id() as number:
+        monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        yield
+
+
+@pytest.mark.graph
+@pytest.mark.parametrize(("loop", "composed"), [("events", False), ("wait_set", False), ("ordered", True)])
+def test_a_lap_of_the_ring(own_domain, loop, composed):
+    assert 0.0 < ring_lap(100, loop, composed=composed) < 1.0
+
+
+@pytest.mark.graph
+def test_a_lap_of_the_graph(own_domain):
+    assert 0.0 < graph_lap(2.0) < 1.0
