@@ -35,7 +35,20 @@ def within_limits(name, metrics):
     return {metric: metrics[metric] for metric, limit in limits.items() if abs(metrics[metric]) > limit}
 
 
-@pytest.mark.parametrize("name", ["case1", "case1_derived", "case1_no_notch", "case1_uncertain", "case1_heavy"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "case1",
+        "case1_derived",
+        "case1_no_notch",
+        "case1_uncertain",
+        "case1_heavy",
+        "case1_tube_dm",
+        "case1_tube_dm_family",
+        "case1_integral_heavy",
+        "case1_integral_light",
+    ],
+)
 def test_limits_of_the_scenario_are_kept(flown, name):
     flight, metrics = flown(name)
     assert flight.status is FlightStatus.FINISHED
@@ -108,6 +121,26 @@ def test_the_paper_s_decoupled_plant_flies_case1_too():
     m = flight_metrics(fly(components("case1", vehicle__model="DM")).data())
     assert abs(m["altitude_end_error"]) <= 8 * FOOT
     assert m["post_fault_attitude_deviation"] <= 0.25 * DEGREE
+
+
+@pytest.mark.parametrize(
+    ("robust", "tube", "altitude_error"),
+    [("case1_rmpc", "case1_tube_dm", 1059), ("case1_rmpc_last_k", "case1_tube_dm_family", 23)],
+)
+def test_what_the_fault_leaves_of_the_altitude_without_a_tube(flown, robust, tube, altitude_error):
+    # Control study, section 7: the size of the error is that of K.
+    _, without = flown(robust)
+    _, with_tube = flown(tube)
+    assert without["altitude_end_error"] == pytest.approx(altitude_error * FOOT, rel=0.02)
+    assert abs(with_tube["altitude_end_error"]) < 10 * FOOT
+
+
+def test_integral_action_removes_the_offset_of_a_wrong_mass(flown):
+    for name in ("case1_integral_heavy", "case1_integral_light"):
+        _, m = flown(name)
+        assert abs(m["altitude_end_error"]) < 0.5 * FOOT
+    off = flight_metrics(fly(components("case1_integral_light", integral__rate=0.0)).data())
+    assert abs(off["altitude_end_error"]) > 10 * FOOT
 
 
 def test_without_fault_the_flight_ends_at_its_command():

@@ -1,0 +1,102 @@
+"""The table of results of the shipped designs: ``python -m hsv.design.results > offline_design/results.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hsv.control.design_file import find_design
+from hsv.design.certificate import certificate_path, read_certificate
+from hsv.units import to_paper
+
+DESIGNS = ("baseline", "baseline_single_k", "baseline_derived")
+
+_HEADER = """# Results of the shipped designs
+Made by `python -m hsv.design.results > offline_design/results.md` from the certificates that `hsv design NAME` writes
+and `hsv verify offline_design/NAME.yaml` recomputes. Units of the paper; the certificates are in SI.
+"""
+
+
+def results() -> str:
+    """Return the page, a column a design."""
+    certificates = [read_certificate(certificate_path(find_design(name))) for name in DESIGNS]
+    lines = [_HEADER, "| | " + " | ".join(DESIGNS) + " |", "| --- |" + " --- |" * len(DESIGNS)]
+    for name, value in _ROWS.items():
+        lines.append(f"| {name} | " + " | ".join(value(certificate) for certificate in certificates) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _in(unit: str, *values: float) -> str:
+    return ", ".join(f"{to_paper(float(value), unit)[0]:.4g}" for value in values)
+
+
+def _half_width(certificate: dict[str, Any]) -> str:
+    units = ("m", "m/s", "rad", "rad", "rad/s")
+    half_width: Sequence[float] = certificate["tube"]["invariant_set"]["half_width"]
+    return ", ".join(_in(unit, value) for unit, value in zip(units, half_width, strict=False))
+
+
+def _each(certificate: dict[str, Any], values: Sequence[float]) -> str:
+    return f"{_in('1', values[0])}; {_in('rad', values[1])}"
+
+
+def _range(certificate: dict[str, Any]) -> str:
+    bounds = certificate["tube"]["tightening"]
+    (low, low_elevator), (high, high_elevator) = bounds["lower"], bounds["upper"]
+    return f"{_in('1', low)} to {_in('1', high)}; {_in('rad', low_elevator)} to {_in('rad', high_elevator)}"
+
+
+def _room(certificate: dict[str, Any]) -> str:
+    plan = certificate["tube"]["tightening"]["plan"]
+    return _each(
+        certificate, [min(pair) for pair in zip(plan["margin_to_lower"], plan["margin_to_upper"], strict=True)]
+    )
+
+
+def _membership(certificate: dict[str, Any]) -> str:
+    membership = certificate["tube"]["flights"]["disturbance_membership"]
+    return f"{membership['worst_ratio']:.4g}, {membership['outside']} flights outside"
+
+
+_ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
+    "vertices, altitude x velocity (eq. 12)": lambda c: " x ".join(str(n) for n in c["model"]["vertices"]),
+    "error of the model off the grid, relative": lambda c: f"{c['model']['accuracy']['relative_frobenius_error']:.2g}",
+    "its Bode deviation, dB; deg": lambda c: (
+        f"{c['model']['accuracy']['bode_magnitude_error_db']:.2g}; {c['model']['accuracy']['bode_phase_error_deg']:.2g}"
+    ),
+    "(24), least eigenvalue over the vertices": lambda c: f"{min(c['feedback']['lmi_smallest_eigenvalues']):.3g}",
+    "spectral radius of A + BF, rigid; all states": lambda c: (
+        f"{max(c['feedback']['spectral_radii']):.5f}; {c['feedback']['spectral_radius_all_states']:.5f}"
+    ),
+    "nominal gains; certified cost of the outermost, s (eq. 32)": lambda c: (
+        f"{len(c['nominal'])}; {c['nominal'][0]['certified_gamma']:.1f}"
+    ),
+    "notch filter, rad/s": lambda c: ", ".join(f"{n['zero_frequency']:g}" for n in c["inputs"]["notch"]),
+    "inertial coupling; share of W in the tube": lambda c: (
+        f"{c['inputs']['disturbance']['coupling']}; {c['inputs']['disturbance']['share']:g}"
+    ),
+    "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": _half_width,
+    "half-range of F Z: fuel; elevator deg": lambda c: _each(c, c["tube"]["invariant_set"]["feedback_half_range"]),
+    "U minus F Z with trim: fuel; elevator deg (eq. 30)": _range,
+    "least room of the nominal plan in it: fuel; elevator deg": _room,
+    "worst level of 1e5 random sequences of 600 steps": lambda c: (
+        f"{c['tube']['invariant_set']['sampling']['worst_level']:.4f}"
+    ),
+    "worst level of flights; their number": lambda c: (
+        f"{c['tube']['flights']['worst_level']:.3f}; {c['tube']['flights']['flights']}"
+    ),
+    "their worst disturbance over its bound": _membership,
+    "their worst end errors: ft; ft/s": lambda c: (
+        f"{_in('m', c['tube']['flights']['worst']['altitude_end_error'])}; "
+        f"{_in('m/s', c['tube']['flights']['worst']['velocity_end_error'])}"
+    ),
+    "their worst attitude after the fault, from before it; from nominal: deg": lambda c: (
+        f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_deviation'])}; "
+        f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_from_nominal'])}"
+    ),
+    "their saturated steps": lambda c: f"{c['tube']['flights']['worst']['saturated_steps']:g}",
+}
+
+
+if __name__ == "__main__":
+    print(results(), end="")
