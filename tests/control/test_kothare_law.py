@@ -7,7 +7,8 @@ from hsv.control.design_file import find_design, read_design
 from hsv.control.kothare_law import SOLVE_STEPS, KothareLaw
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
-from hsv.design.nominal import NominalProblem, nominal_gain
+from hsv.design.nominal import nominal_gain
+from hsv.design.nominal_problem import NominalProblem
 from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
 

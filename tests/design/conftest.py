@@ -4,8 +4,10 @@ import pytest
 
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import read_inputs
-from hsv.design.verification.tube import certified_set
+from hsv.design.model import polytopic_model
+from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
+from hsv.vehicle.parameters import vehicle_parameters
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
@@ -13,6 +15,11 @@ OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 @pytest.fixture(scope="session")
 def inputs():
     return read_inputs(OFFLINE_DESIGN / "baseline.toml")
+
+
+@pytest.fixture(scope="session")
+def model(inputs):
+    return polytopic_model(inputs.model, vehicle_parameters("decoupled"))
 
 
 @pytest.fixture(scope="session")

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from hsv.design.disturbance import DisturbanceSet, inflated
 from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, corners, fraction, record
-from hsv.design.tube import channel_model, tube_problem
+from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.vehicle.parameters import uncertainty_bounds
 
 

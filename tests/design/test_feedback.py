@@ -3,7 +3,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.design.baseline import disturbance_columns
-from hsv.design.feedback import feedback_gain, lyapunov_residuals
+from hsv.design.feedback import feedback_gain
+from hsv.design.lyapunov import lyapunov_residuals
 from hsv.errors import DesignError
 from hsv.vehicle.parameters import vehicle_parameters
 

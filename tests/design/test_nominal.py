@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.design.baseline import initial_deviation
-from hsv.design.nominal import NominalProblem, certified_cost, nested_gains
+from hsv.design.nominal import nested_gains
+from hsv.design.nominal_problem import NominalProblem, certified_cost
 from hsv.errors import DesignError
 from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim

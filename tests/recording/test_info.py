@@ -69,6 +69,7 @@ def test_description(described: dict[str, object]) -> None:
         "outside_steps": 5,
         "largest_level": 1.5,
         "excursions": [{"start_s": 0.7, "end_s": 0.75}],
+        "uncertified_steps": 0,
     }
 
 

@@ -6,17 +6,28 @@ from collections.abc import Sequence
 
 from hsv.control.control_law import tube_law
 from hsv.control.integral_action import INTEGRAL_PARAMETERS
+from hsv.control.tube_law import TUBE_PARAMETERS
+from hsv.design.certificate import CERTIFICATE_PARAMETERS
+from hsv.design.verification.preflight import preflight
 from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
 from hsv_node.main import run_node
 
 
 class TubeMpcNode(ControllerNode):
-    """Feedback about the nominal trajectory (paper eq. 36)."""
+    """Feedback about the nominal trajectory (paper eq. 36); a design that fails its quick claims is refused at start."""
 
     def __init__(self) -> None:
         super().__init__("tube_mpc")
-        self.law = tube_law(declare_design(self, INTEGRAL_PARAMETERS))
+        values = declare_design(self, (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
+        if warning := preflight(values):
+            self.get_logger().warning(warning)
+        certified, flown = values["design.coupling"], values["vehicle.coupling"]
+        if certified not in ("", flown):
+            self.get_logger().warning(
+                f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
+            )
+        self.law = tube_law(values)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -66,7 +66,7 @@ def design(
 def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
     from hsv.design.disturbance import DisturbanceSet
     from hsv.design.sets.compare import compare_sets
-    from hsv.design.tube import tube_problem
+    from hsv.design.tube_problem import tube_problem
 
     disturbance = report["tube"]["disturbance"]
     problem = tube_problem(design, DisturbanceSet.from_report(disturbance["channels"]))

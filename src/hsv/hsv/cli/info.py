@@ -87,6 +87,8 @@ def _tube(tube: dict[str, Any] | None) -> str:
     text = (
         f"largest level {tube['largest_level']:.4g}, {tube['outside_steps']} of {tube['checked_steps']} steps outside"
     )
+    if tube["uncertified_steps"]:
+        text += ", vehicle outside the set that it is certified for"
     excursions = tube["excursions"]
     shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
     more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""

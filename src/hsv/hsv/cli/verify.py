@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
+from rich.table import Table
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import console, errors, print_json
+
+if TYPE_CHECKING:
+    from hsv.design.verification.claims import Claim
 
 
 def verify(
@@ -28,7 +33,7 @@ def verify(
     """
     from hsv.cli.progress import stages
     from hsv.design.verification.scenario import bounding_corners, scenario_claims
-    from hsv.design.verification.verifier import load_subject, require
+    from hsv.design.verification.verifier import load_subject
     from hsv.design.verification.verifier import verify as recompute
     from hsv.simulation.scenario import load_scenario
 
@@ -38,10 +43,29 @@ def verify(
         if scenario:
             loaded = load_scenario(scenario)
             over = bounding_corners(subject) if corners else [{}]
-            claims += scenario_claims(subject, loaded, over, lambda done: progress("flights", done, len(over)))
+            flights = scenario_claims(subject, loaded, over, lambda done: progress("flights", done, len(over)))
+            claims["scenario"] = list(flights)
+    failing = [(part, claim) for part, made in claims.items() for claim in made if not claim.ok]
     if json:
-        print_json({"claims": [vars(claim) for claim in claims], "ok": all(claim.ok for claim in claims)})
+        rows = [{"part": part, **vars(claim)} for part, made in claims.items() for claim in made]
+        print_json({"claims": rows, "ok": not failing})
     else:
-        for claim in claims:
-            console.print(f"{'ok  ' if claim.ok else 'FAIL'} {claim}", soft_wrap=True, markup=False)
-    require(claims)
+        console.print(_table(claims))
+    if failing:
+        part, claim = failing[0]
+        errors.print(f"[bold red]hsv: error:[/] {escape(f'{part}: claim fails: {claim}')}", soft_wrap=True)
+        raise typer.Exit(1)
+
+
+def _table(claims: dict[str, list[Claim]]) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("", "claim", "came out", "expected"):
+        table.add_column(name, overflow="fold")
+    for part, made in claims.items():
+        table.add_row("", f"[bold]{escape(part)}[/]", "", "")
+        for claim in made:
+            cells = (escape(text) for text in (f"  {claim.name}", claim.shown, claim.expected))
+            table.add_row("ok" if claim.ok else "FAIL", *cells, style=None if claim.ok else "bold red")
+    total, held = sum(len(made) for made in claims.values()), sum(c.ok for made in claims.values() for c in made)
+    table.add_row("", f"[bold]{held} of {total} claims hold[/]", "", "")
+    return table

@@ -34,6 +34,7 @@ DESIGN_PARAMETERS = (
     Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
+    Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
     Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
     Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),
     Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
@@ -77,6 +78,8 @@ class ControlDesign:
     input_minimum: np.ndarray
     input_maximum: np.ndarray
     notch: tuple[NotchSection, ...]
+    coupling: str = ""
+    """Set of inertial coupling that the tube is certified for, empty: the design carries no tube."""
     tube: TubeSet | None = None
     """The invariant set of the tube error, ``None``: the design carries none."""
     plan_bounds: PlanBounds | None = None
@@ -111,7 +114,7 @@ class ControlDesign:
         }
         if self.tube:
             tube = {"centre": self.tube.centre, "shape": self.tube.shape, "half_width": self.tube.half_width}
-            values |= {f"tube.{name}": value for name, value in tube.items()}
+            values |= {"design.coupling": self.coupling} | {f"tube.{name}": value for name, value in tube.items()}
         if self.plan_bounds:
             values |= {f"nominal.{name}": value for name, value in vars(self.plan_bounds).items()}
         flat = {
@@ -158,6 +161,7 @@ class ControlDesign:
             input_minimum=_shaped(v, "input.minimum", (N_INPUTS,)),
             input_maximum=_shaped(v, "input.maximum", (N_INPUTS,)),
             notch=notch.sections,
+            coupling=v["design.coupling"],
             tube=_tube(v, N_RIGID + 2 * len(notch.sections)),
             plan_bounds=_plan_bounds(v),
             modified=v["design.hash"] != digest(v),
@@ -178,7 +182,7 @@ class ControlDesign:
 def digest(values: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a design's flat parameters, ``design.hash`` and what is empty left out."""
     known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash"}
-    text = json.dumps({name: values[name] for name in sorted(known & values.keys()) if values[name] != []})
+    text = json.dumps({name: values[name] for name in sorted(known & values.keys()) if values[name] not in ([], "")})
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from hsv.control.design_file import N_RIGID, ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus, level
+from hsv.design.nominal_problem import NominalProblem
 from hsv.errors import DesignError
 
 SOLVE_STEPS = 100
@@ -35,8 +36,9 @@ class KothareLaw:
 
     def __init__(self, design: ControlDesign, data: NominalData) -> None:
         # Modelling and solver take a second to import: only this law pays for them.
-        from hsv.design.nominal import NominalProblem
+        from hsv.design.nominal import nominal_gain
 
+        self._nominal_gain = nominal_gain
         polytope = design.polytope
         self._problem = NominalProblem(
             polytope.A[:, :N_RIGID, :N_RIGID],
@@ -76,10 +78,8 @@ class KothareLaw:
         return LawResult(gain @ deviation, gain, NOT_IN_FAMILY, self._status)
 
     def _solve(self, state: np.ndarray) -> _Solution | None:
-        from hsv.design.nominal import nominal_gain
-
         try:
-            found = nominal_gain(self._problem, _HEADROOM * state)
+            found = self._nominal_gain(self._problem, _HEADROOM * state)
         except DesignError:
             return None
         gain = np.zeros(self._family.data.gains.shape[1:])

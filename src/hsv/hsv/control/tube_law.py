@@ -14,6 +14,8 @@ from numba import njit
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import NotchData, discretise, filter_step
 from hsv.control.tube_set import TubeSet
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.parameters import COUPLING_SETS
 
 PITCH_RATE = 4
 N_RIGID = 5
@@ -26,6 +28,13 @@ class TubeStatusCode(IntEnum):
     NO_SET = 1
     OUTSIDE = 2
     INVALID_INPUT = 3
+    UNCERTIFIED_VEHICLE = 4
+
+
+TUBE_PARAMETERS = (
+    Parameter("vehicle.coupling", "paper_like", "set of inertial coupling of the vehicle flown", choices=COUPLING_SETS),
+)
+"""Of the tube law, beside those of the design."""
 
 
 class TubeData(NamedTuple):
@@ -129,8 +138,10 @@ class TubeMonitor:
 class TubeLaw:
     """The controller's last stage; only its monitor has a memory, so that a restart in flight changes no input."""
 
-    def __init__(self, design: ControlDesign, tau: float = 1.0) -> None:
+    def __init__(self, design: ControlDesign, tau: float = 1.0, coupling: str | None = None) -> None:
+        """Fly ``design`` on a vehicle with this set of inertial coupling, ``None``: the one it is certified for."""
         self.data = TubeData(design.feedback_gain, tau, design.input_minimum, design.input_maximum)
+        self._certified = coupling in (None, design.coupling)
         self._monitor = TubeMonitor(design.tube, discretise(design.notch, design.period))
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
@@ -139,8 +150,9 @@ class TubeLaw:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Build from the design's parameters; a wrong one raises DesignError with its name."""
-        return cls(ControlDesign.from_parameters(values))
+        """Build from the design's parameters and :data:`TUBE_PARAMETERS`; a wrong one is named in the error."""
+        coupling = check_all(TUBE_PARAMETERS, values)["vehicle.coupling"]
+        return cls(ControlDesign.from_parameters(values), coupling=coupling)
 
     def reset(self) -> None:
         """Start a new run."""
@@ -179,8 +191,10 @@ class TubeLaw:
             status = TubeStatusCode.INVALID_INPUT
         elif tube is None:
             status = TubeStatusCode.NO_SET
+        elif not inside:
+            status = TubeStatusCode.OUTSIDE
         else:
-            status = TubeStatusCode.OK if inside else TubeStatusCode.OUTSIDE
+            status = TubeStatusCode.OK if self._certified else TubeStatusCode.UNCERTIFIED_VEHICLE
         return TubeResult(
             input=u,
             error=error,

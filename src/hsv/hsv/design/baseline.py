@@ -13,10 +13,11 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
-from hsv.design.inputs import DesignInputs, FlightPoint
+from hsv.design.inputs import DesignInputs
 from hsv.design.lmi import spectral_radii
 from hsv.design.model import DesignModel, design_model
-from hsv.design.nominal import NominalGain, NominalProblem, nested_gains
+from hsv.design.nominal import NominalGain, nested_gains
+from hsv.design.nominal_problem import NominalProblem, step_deviation
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import design_tube
 from hsv.errors import DesignError
@@ -64,7 +65,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         except DesignError as error:
             bound = literal.nominal.input_bound.array().tolist()
             raise DesignError(f"literal chain (30) to (35), |u_n| at most {bound}: {error}") from error
-    design = replace(gains.design, tube=tube.flown(), plan_bounds=tube.plan)
+    design = replace(gains.design, coupling=inputs.disturbance.coupling, tube=tube.flown(), plan_bounds=tube.plan)
     report = {
         **gains.report,
         "versions": {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")},
@@ -137,11 +138,9 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
 
 def initial_deviation(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
     """Return x_n(0) (5) of the design's step: trim at its start less trim at its target, SI."""
-
-    def rigid(point: FlightPoint) -> np.ndarray:
-        return trim(vehicle, point.altitude, point.velocity).state[:N_RIGID]
-
-    return rigid(inputs.nominal.start) - rigid(inputs.nominal.target)
+    start, target = inputs.nominal.start, inputs.nominal.target
+    points = (start.altitude, start.velocity), (target.altitude, target.velocity)
+    return step_deviation(vehicle, *points)
 
 
 def disturbance_columns(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:

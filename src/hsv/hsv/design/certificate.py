@@ -7,6 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from hsv.errors import DesignError
+from hsv.parameters import Parameter
+
+CERTIFICATE_PARAMETERS = (
+    Parameter("design.certificate", "", "certificate to check the design with; empty: that of the design of its name"),
+)
+"""Of the node that checks the design before it flies."""
 
 
 def certificate_path(design_file: Path) -> Path:

@@ -227,3 +227,22 @@ class DisturbanceSet:
 def inflated(lower: np.ndarray, upper: np.ndarray, factor: float) -> DisturbanceSet:
     """Return the set between ``lower`` and ``upper`` (7), widened to hold zero and then scaled by ``factor``."""
     return DisturbanceSet(factor * np.minimum(lower, 0.0), factor * np.maximum(upper, 0.0))
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Least and largest values over flights, with the flight of each: bounds (c), indices (c) into the corners."""
+
+    lower: np.ndarray
+    upper: np.ndarray
+    lower_flight: np.ndarray
+    upper_flight: np.ndarray
+
+    @classmethod
+    def over(cls, lower: np.ndarray, upper: np.ndarray) -> Extremes:
+        """Return the extremes of per-flight ones (flights, c)."""
+        return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
+
+    def structured(self, inflation: float) -> DisturbanceSet:
+        """Return the structured set that these extremes of its channels give."""
+        return inflated(self.lower, self.upper, inflation)

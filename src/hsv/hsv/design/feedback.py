@@ -10,8 +10,10 @@ import numpy as np
 from cvxpy.atoms.affine.bmat import bmat
 from cvxpy.atoms.affine.trace import trace
 
-from hsv.design.lmi import SolverReport, smallest_eigenvalues, solve, spectral_radii
+from hsv.design.lmi import SolverReport, spectral_radii
+from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.scaling import Whitening, lqr_whitening
+from hsv.design.solver import solve
 from hsv.errors import DesignError
 
 METHODS = ("guaranteed_cost", "feasibility")
@@ -93,33 +95,6 @@ def feedback_gain(
     F = white.gain(np.linalg.solve(N_white, M_white.T).T)
     residuals = lyapunov_residuals(A + B @ F, N_si, "feedback gain F, LMI (24)")
     return FeedbackGain(F, M_si, N_si, residuals, spectral_radii(A + B @ F), method, solver)
-
-
-def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.ndarray:
-    """Return the smallest eigenvalue (r) of [N, (A_c N)'; A_c N, N] at each vertex, where N is scaled to the identity.
-
-    Args:
-        closed_loop: (r, n, n) A_i + B_i F.
-        N: (n, n) the matrix of (24).
-        name: What is being verified, for the error message.
-
-    Raises:
-        DesignError: N is not positive definite, or an eigenvalue is not positive.
-    """
-    try:
-        factor = np.linalg.cholesky(N)
-    except np.linalg.LinAlgError as error:
-        raise DesignError(f"{name}: N = {N.tolist()}, expected a positive definite matrix") from error
-    contraction = np.linalg.solve(factor, closed_loop @ factor)
-    identity = np.broadcast_to(np.eye(len(N)), contraction.shape)
-    blocks = np.block([[identity, np.swapaxes(contraction, 1, 2)], [contraction, identity]])
-    residuals = smallest_eigenvalues(blocks)
-    worst = int(np.argmin(residuals))
-    if not residuals[worst] > 0.0:
-        raise DesignError(
-            f"{name}: smallest eigenvalue at vertex {worst} = {residuals[worst]:.3g}, expected above zero"
-        )
-    return residuals
 
 
 def _guaranteed_cost(

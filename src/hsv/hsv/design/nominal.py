@@ -16,8 +16,10 @@ import cvxpy as cp
 import numpy as np
 from cvxpy.atoms.affine.bmat import bmat
 
-from hsv.design.lmi import SolverReport, smallest_eigenvalues, solve, spectral_radii
+from hsv.design.lmi import SolverReport, smallest_eigenvalues, spectral_radii
+from hsv.design.nominal_problem import NominalProblem, certified_cost
 from hsv.design.scaling import Whitening, lqr_whitening
+from hsv.design.solver import solve
 from hsv.errors import DesignError
 
 _MARGIN = 1e-5
@@ -65,23 +67,6 @@ class NominalGain:
             "nesting_residual": self.nesting,
             "spectral_radii": self.radii.tolist(),
         }
-
-
-@dataclass(frozen=True)
-class NominalProblem:
-    """The data of (31)-(35).
-
-    ``A`` (r, n, n) and ``B`` (r, n, m) the vertices at sampling ``period``; ``state_scale`` (n) and ``input_scale`` (m)
-    the deviations that cost as much as each other: psi = period diag(1 / state_scale^2) and sigma likewise, so that
-    costs are in seconds and do not depend on the period; ``input_bound`` (m) the largest |u_n|. All SI.
-    """
-
-    A: np.ndarray
-    B: np.ndarray
-    period: float
-    state_scale: np.ndarray
-    input_scale: np.ndarray
-    input_bound: np.ndarray
 
 
 def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
@@ -167,53 +152,6 @@ def _solve(
     K = white.gain(np.linalg.solve(Q_white, Y_white.T).T)
     cost = float(np.asarray(gamma.value)) * size**2 * problem.period
     return _verified(problem, state, outside, K, white.cross(Y_white), white.covariance(Q_white), cost, solver, name)
-
-
-def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: str) -> tuple[float, np.ndarray]:
-    """Return the cost that no state of the ellipsoid exceeds under K, and the residuals (r) of (34) with it.
-
-    The least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex: (34) for the given matrices.
-
-    Args:
-        problem: Vertices and weights.
-        K: (m, n) gain, SI.
-        Q: (n, n) ellipsoid, SI.
-        name: What is being verified, for the error message.
-
-    Raises:
-        DesignError: Q is not positive definite, or x' Q^-1 x does not decrease at a vertex.
-    """
-    try:
-        factor = np.linalg.cholesky(Q)
-    except np.linalg.LinAlgError as error:
-        raise DesignError(f"{name}: Q = {Q.tolist()}, expected a positive definite matrix") from error
-    contraction = np.linalg.solve(factor, (problem.A + problem.B @ K) @ factor)
-    decrease = np.eye(len(Q)) - np.swapaxes(contraction, 1, 2) @ contraction
-    margins = smallest_eigenvalues(decrease)
-    worst = int(np.argmin(margins))
-    if not margins[worst] > 0.0:
-        raise DesignError(f"{name}: decrease at vertex {worst} = {margins[worst]:.3g}, expected above zero")
-    weighted = np.vstack((factor / problem.state_scale[:, None], K @ factor / problem.input_scale[:, None]))
-    weighted *= np.sqrt(problem.period)
-    root = np.linalg.inv(np.linalg.cholesky(0.5 * (decrease + np.swapaxes(decrease, 1, 2))))
-    cost = root @ (weighted.T @ weighted) @ np.swapaxes(root, 1, 2)
-    # A part in 1e9 more than the least bound, so that its residuals are not negative by rounding.
-    gamma = float(np.linalg.eigvalsh(cost).max()) * (1.0 + 1e-9)
-    scaled = weighted / np.sqrt(gamma)
-    residuals = smallest_eigenvalues(_decrease_blocks(contraction, scaled))
-    return gamma, residuals
-
-
-def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarray:
-    r, n, _ = contraction.shape
-    k = n + len(weighted)
-    blocks = np.zeros((r, n + k, n + k))
-    blocks[:] = np.eye(n + k)
-    blocks[:, n : 2 * n, :n] = contraction
-    blocks[:, 2 * n :, :n] = weighted
-    blocks[:, :n, n : 2 * n] = np.swapaxes(contraction, 1, 2)
-    blocks[:, :n, 2 * n :] = weighted.T
-    return blocks
 
 
 def _verified(

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, Record, Signals, inflated
+from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
 from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
@@ -116,25 +116,6 @@ def record(flight: Flight) -> Record:
     """Return the part of ``flight`` that disturbances are computed from."""
     h = flight.history
     return Record(h.state, h.deviation, h.command, h.actuator, flight.reference, flight.reference_input)
-
-
-@dataclass(frozen=True)
-class Extremes:
-    """Least and largest values over flights, with the flight of each: bounds (c), indices (c) into the corners."""
-
-    lower: np.ndarray
-    upper: np.ndarray
-    lower_flight: np.ndarray
-    upper_flight: np.ndarray
-
-    @classmethod
-    def over(cls, lower: np.ndarray, upper: np.ndarray) -> Extremes:
-        """Return the extremes of per-flight ones (flights, c)."""
-        return cls(lower.min(axis=0), upper.max(axis=0), lower.argmin(axis=0), upper.argmax(axis=0))
-
-    def structured(self, inflation: float) -> DisturbanceSet:
-        """Return the structured set that these extremes of its channels give."""
-        return inflated(self.lower, self.upper, inflation)
 
 
 @dataclass(frozen=True)

@@ -9,23 +9,23 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.control.notch_filter import discretise
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, acceleration_channels
-from hsv.design.error_system import PITCH_RATE, error_system, tube_errors
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership
+from hsv.design.error_system import PITCH_RATE, tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, corners, fraction, measure, record
 from hsv.design.sets.box import box
-from hsv.design.sets.ellipsoid import EllipsoidSet, ellipsoid
+from hsv.design.sets.ellipsoid import ellipsoid
+from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.design.sets.modal import modal_box
 from hsv.design.sets.sampling import sample
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
+from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.simulation.closed_loop import Flight
 from hsv.simulation.metrics import flight_metrics
-from hsv.vehicle.parameters import vehicle_parameters
 
 Progress = Callable[[str, int, int], None]
 
@@ -56,21 +56,6 @@ class Tube:
         if not isinstance(self.found, EllipsoidSet):
             return None
         return TubeSet(self.found.centre, self.found.shape, self.found.half_width)
-
-
-def channel_model(design: ControlDesign) -> ChannelModel:
-    """Return how disturbances are measured against the model of ``design``."""
-    columns = acceleration_channels(vehicle_parameters("decoupled"), design.period)
-    return ChannelModel(design.polytope, discretise(design.notch, design.period), columns)
-
-
-def tube_problem(design: ControlDesign, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design`` under ``disturbance``."""
-    model = channel_model(design)
-    polytope = design.polytope
-    return TubeProblem(
-        error_system(polytope.A, polytope.B, design.feedback_gain, model.notch, model.columns), disturbance
-    )
 
 
 def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> InvariantSet:

@@ -8,6 +8,8 @@ from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
+from hsv.control.tube_law import TUBE_PARAMETERS
+from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.faults.actuator import FAULT_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.vehicle.plant import PLANT_PARAMETERS
@@ -44,7 +46,7 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     "plant": (*PLANT_PARAMETERS, *PACE_PARAMETERS),
     "notch_filter": NOTCH_PARAMETERS,
     "nominal_trajectory": (*NOMINAL_PARAMETERS, *DESIGN_PARAMETERS),
-    "tube_mpc": (*INTEGRAL_PARAMETERS, *DESIGN_PARAMETERS),
+    "tube_mpc": (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS, *DESIGN_PARAMETERS),
     "robust_mpc": (*ROBUST_MPC_PARAMETERS, *DESIGN_PARAMETERS),
     "fault_injector": FAULT_PARAMETERS,
     "recorder": RECORDER_PARAMETERS,

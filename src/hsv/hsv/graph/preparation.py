@@ -69,7 +69,9 @@ def prepare(
         files["certificate.json"] = certificate.read_text(encoding="utf-8")
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
+    certified = {"design.certificate": str(folder / "certificate.json")} if "certificate.json" in files else {}
     run = {
+        **certified,
         "real_time_factor": float(real_time_factor),
         "step_timeout": float(step_timeout),
         "recorder": True,

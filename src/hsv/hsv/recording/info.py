@@ -84,6 +84,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
         "outside_steps": int(outside.sum()),
         "largest_level": float(levels.max()) if len(levels) else None,
         "excursions": _intervals(columns["header.stamp"], outside),
+        "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
     }
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hsv.design.sets.ellipsoid import EllipsoidSet
+from hsv.design.sets.ellipsoid_set import EllipsoidSet
 
 KINDS = ("iid", "held", "switching", "adversarial")
 """Sequence j is of kind j mod 4."""

@@ -7,12 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsv.design.baseline import initial_deviation
-from hsv.design.feedback import lyapunov_residuals
 from hsv.design.lmi import smallest_eigenvalues, spectral_radii
-from hsv.design.nominal import NominalProblem, certified_cost
-from hsv.design.verification.claims import Claim, Subject, above, at_most, same
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.design.lyapunov import lyapunov_residuals
+from hsv.design.nominal_problem import NominalProblem, certified_cost, step_deviation
+from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same
+from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, STATE_NAMES
 from hsv.vehicle.parameters import vehicle_parameters
 
 
@@ -25,33 +24,34 @@ def feedback_claims(subject: Subject) -> Iterable[Claim]:
     yield same("feedback.gain on flexible states", F[:, N_RIGID:], np.zeros_like(F[:, N_RIGID:]))
     rigid = A[:, :N_RIGID, :N_RIGID] + B[:, :N_RIGID] @ F[:, :N_RIGID]
     residuals = lyapunov_residuals(rigid, N, "feedback gain F, LMI (24)")
-    yield above("(24) smallest eigenvalue", residuals.min(), 0.0)
+    yield required(above("(24) smallest eigenvalue", residuals.min(), 0.0))
     yield same("(24) eigenvalues as certified", residuals, stored["lmi_smallest_eigenvalues"], 1e-6, 1e-9)
     yield same("spectral radii of A + BF as certified", spectral_radii(rigid), stored["spectral_radii"], 1e-9)
-    yield at_most("spectral radius of A + BF, all states", spectral_radii(A + B @ F).max(), 1.0 - 1e-6)
+    yield required(at_most("spectral radius of A + BF, all states", spectral_radii(A + B @ F).max(), 1.0 - 1e-6))
 
 
 def nominal_claims(subject: Subject) -> Iterable[Claim]:
     """Recompute every K and its inequalities."""
-    design, inputs = subject.design, subject.inputs.nominal
+    design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
     A, B = design.polytope.A, design.polytope.B
     problem = NominalProblem(
         A[:, :N_RIGID, :N_RIGID],
         B[:, :N_RIGID],
         design.period,
-        inputs.state_scale.array(),
-        inputs.input_scale.array(),
-        inputs.input_bound.array(),
+        _sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]),
+        _sizes(inputs["input_scale"], INPUT_NAMES),
+        _sizes(inputs["input_bound"], INPUT_NAMES),
     )
     yield same("nominal.state_scale", design.nominal_state_scale, problem.state_scale)
     yield same("nominal.input_scale", design.nominal_input_scale, problem.input_scale)
     yield same("nominal.input_bound", design.nominal_input_bound, problem.input_bound)
     stored = subject.certificate["nominal"]
     sizes = [float(len(design.nominal_gains)), float(len(design.nominal_ellipsoids))]
-    yield same("number of nominal gains and ellipsoids", sizes, [float(len(inputs.scales))] * 2)
-    start = initial_deviation(subject.inputs, vehicle_parameters("decoupled"))
+    yield same("number of nominal gains and ellipsoids", sizes, [float(len(inputs["scales"]))] * 2)
+    points = [(inputs[point]["altitude"], inputs[point]["velocity"]) for point in ("start", "target")]
+    start = step_deviation(vehicle_parameters("decoupled"), points[0], points[1])
     ellipsoids = [np.array(one["Q"]) for one in stored]
-    for i, (one, Q, scale) in enumerate(zip(stored, ellipsoids, inputs.scales, strict=True)):
+    for i, (one, Q, scale) in enumerate(zip(stored, ellipsoids, inputs["scales"], strict=True)):
         K = design.nominal_gains[i]
         yield same(f"nominal.gains[{i}] = Y Q^-1", K[:, :N_RIGID], _quotient(np.array(one["Y"]), Q))
         yield same(f"nominal.gains[{i}] on flexible states", K[:, N_RIGID:], np.zeros_like(K[:, N_RIGID:]))
@@ -64,19 +64,15 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         reach = np.einsum("ij,jk,ik->i", K[:, :N_RIGID], Q, K[:, :N_RIGID]) / problem.input_bound**2
         yield at_most(f"(35) largest squared input over its bound, gain {i}", reach.max(), 1.0)
         radius = spectral_radii(A + B @ K).max()
-        yield at_most(f"spectral radius of A + BK, gain {i}", radius, 1.0 - 1e-6)
+        yield required(at_most(f"spectral radius of A + BK, gain {i}", radius, 1.0 - 1e-6))
     for i, (outer, inner) in enumerate(pairwise(ellipsoids)):
         factor = np.linalg.inv(np.linalg.cholesky(outer))
         room = float(smallest_eigenvalues(np.eye(len(outer)) - factor @ inner @ factor.T))
         yield above(f"ellipsoid {i + 1} inside the one before", room, -1e-12)
 
 
-def inverse(name: str, P: np.ndarray, Q: np.ndarray) -> Claim:
-    """Claim that P = Q^-1, entry by entry; entries that all but vanish beside their diagonal to that size."""
-    expected = np.linalg.inv(Q)
-    expected = 0.5 * (expected + expected.T)
-    size = np.sqrt(np.diag(expected))
-    return same(name, P, expected, 1e-6, 1e-11 * np.outer(size, size))
+def _sizes(table: dict[str, float], names: tuple[str, ...]) -> np.ndarray:
+    return np.array([table[name] for name in names])
 
 
 def _quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:

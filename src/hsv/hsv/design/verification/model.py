@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hsv.design.model import DesignModel
 from hsv.design.verification.claims import Claim, Subject, above, same
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+
+if TYPE_CHECKING:
+    from hsv.design.model import DesignModel
 
 _NOISE = 1e-15
 """An entry that is smaller at all vertices is the rounding of an exact zero (SI; real ones are far above)."""
 
 _MODEL = 1e-7
-"""Relative difference of a vertex that is allowed. The last function kept has a relative singular value of 1e-9, so that
+"""Relative difference of a vertex that is allowed. The last function kept has a relative singular value of 1e-9:
 processors that round differently agree on its direction to 1e-7 only, and on vertices to 1e-8."""
 
 _WEIGHT, _WEIGHT_FLOOR = 1e-6, 4e-8
@@ -23,10 +26,12 @@ _WEIGHT, _WEIGHT_FLOOR = 1e-6, 4e-8
 
 def input_claims(subject: Subject) -> Iterable[Claim]:
     """Compare what a design copies from its inputs, and check that weights are weights."""
-    design, inputs = subject.design, subject.inputs
-    yield same("period", design.period, inputs.model.period)
-    notch = [list(section.model_dump().values()) for section in inputs.notch]
+    design, inputs = subject.design, subject.certificate["inputs"]
+    yield same("period", design.period, inputs["model"]["period"])
+    notch = [[section[name] for name in vars(design.notch[0])] for section in inputs["notch"]]
     yield same("notch", [list(vars(section).values()) for section in design.notch], notch)
+    coupling = inputs["disturbance"]["coupling"]
+    yield Claim("design.coupling", design.coupling, repr(coupling), design.coupling == coupling)
     yield same("input.minimum", design.input_minimum, INPUT_MINIMUM)
     yield same("input.maximum", design.input_maximum, INPUT_MAXIMUM)
     for axis, (_, weights) in (("altitude", design.altitude_samples), ("velocity", design.velocity_samples)):

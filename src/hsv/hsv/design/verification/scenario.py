@@ -8,9 +8,10 @@ import numpy as np
 
 from hsv.design.region import Corner, fraction
 from hsv.design.tightening import TightenedInputs
-from hsv.design.tube import FlightEvidence, channel_model, flight_evidence
+from hsv.design.tube import FlightEvidence, flight_evidence
+from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most
-from hsv.design.verification.tube import certified_set
+from hsv.design.verification.invariant_set import certified_set
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import Components, fly

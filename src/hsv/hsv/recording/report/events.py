@@ -39,7 +39,13 @@ class Event:
 
 def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
     """Return the events of ``bag``, whose ``description`` is that of :func:`hsv.recording.info.describe`."""
-    events = [*_faults(description), *_excursions(description), *_saturation(bag), *_ending(bag)]
+    events = [
+        *_faults(description),
+        *_excursions(description),
+        *_uncertified(description),
+        *_saturation(bag),
+        *_ending(bag),
+    ]
     # Nodes say some things both in the log and in their diagnostics.
     said = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
     events += [*_joined(said, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
@@ -56,6 +62,13 @@ def _faults(description: dict[str, Any]) -> Iterator[Event]:
 def _excursions(description: dict[str, Any]) -> list[Event]:
     excursions = description["tube"]["excursions"] if description["tube"] else ()
     return _joined(Event(e["start_s"], e["end_s"], "tube", "error outside the invariant set") for e in excursions)
+
+
+def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
+    # A property of the vehicle, not of a moment: told once.
+    if description["tube"] and description["tube"]["uncertified_steps"]:
+        start = description["start_s"]
+        yield Event(start, start, "warning", "vehicle outside the set that the tube is certified for", "tube_mpc")
 
 
 def _saturation(bag: Bag) -> Iterator[Event]:

@@ -1,0 +1,65 @@
+"""Claims of the invariant set: invariance at every vertex, half-widths, disturbance bounds, tightened bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from hsv.design.disturbance import DisturbanceSet, Extremes
+from hsv.design.lmi import SolverReport
+from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape, vertex_residuals
+from hsv.design.tightening import plan_bounds, tighten
+from hsv.design.tube_problem import tube_problem
+from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same
+
+
+def certified_set(subject: Subject) -> EllipsoidSet:
+    """Return the ellipsoid that the certificate describes, for the design as it flies."""
+    stored = subject.certificate["tube"]
+    s = stored["invariant_set"]
+    disturbance = DisturbanceSet.from_report(stored["disturbance"]["channels"])
+    return from_shape(
+        tube_problem(subject.design, disturbance),
+        np.array(s["centre"]),
+        np.array(s["Q"]),
+        s["contraction"],
+        np.array(s["multipliers"]),
+        SolverReport(**s["solver"], time=0.0),
+    )
+
+
+def set_claims(subject: Subject) -> Iterable[Claim]:
+    """Recompute invariance, half-widths and tightened bounds from the stored matrices; milliseconds."""
+    stored, design = subject.certificate["tube"], subject.design
+    s = stored["invariant_set"]
+    yield Claim("invariant set", s["kind"], "ellipsoid", s["kind"] == "ellipsoid")
+    yield Claim("tube parameters", str(design.tube is not None), "True", design.tube is not None)
+    found = certified_set(subject)
+    if design.tube is not None:
+        yield required(same("tube.centre", design.tube.centre, found.centre))
+        yield required(inverse("tube.shape = Q^-1", design.tube.shape, found.Q))
+        yield required(same("tube.half_width from Q", design.tube.half_width, found.half_width))
+    yield same("certified half-widths from Q", s["half_width"], found.half_width)
+    yield same("feedback half-ranges from Q", s["feedback_half_range"], found.feedback)
+    measured, inputs = stored["disturbance"]["measured"], subject.certificate["inputs"]["disturbance"]
+    extremes = Extremes(*(np.array(measured[k]) for k in ("lower", "upper", "lower_flight", "upper_flight")))
+    expected = extremes.structured(inputs["inflation"]).scaled(inputs["share"])
+    given = found.problem.disturbance
+    yield same("disturbance bounds, lower", given.lower, expected.lower)
+    yield same("disturbance bounds, upper", given.upper, expected.upper)
+    residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
+    yield required(above("invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0))
+    yield required(at_most("level of e = 0", float(found.level(np.zeros(len(found.Q)))), 1.0))
+    bounds, kept = tighten(found, design.input_minimum, design.input_maximum), stored["tightening"]
+    yield same("tightened bounds, lower", kept["lower"], bounds.lower)
+    yield same("tightened bounds, upper", kept["upper"], bounds.upper)
+    plan = kept["plan"]
+    margins = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
+    yield above("room of the nominal plan", margins.min(), 0.0)
+    low, high = plan["pitch_acceleration"]
+    allowed = plan_bounds(bounds, np.append(plan["lowest"], low), np.append(plan["highest"], high))
+    yield Claim("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
+    if design.plan_bounds is not None:
+        for name, value in vars(design.plan_bounds).items():
+            yield same(f"nominal.{name} from the tightened bounds and plans", value, getattr(allowed, name))
