@@ -112,6 +112,7 @@ def fleet(workers: int, scheduler: str = "") -> Iterator[Fleet]:
             threads_per_worker=1,
             processes=True,
             dashboard_address=None,
+            preload=["hsv.campaign.worker"],
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
