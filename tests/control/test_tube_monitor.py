@@ -76,3 +76,12 @@ def test_a_shape_that_is_not_positive_definite_is_refused(design):
     values["tube.shape"] = values["tube.shape"][:-1]
     with pytest.raises(DesignError, match=r"tube\.shape: 48 values, expected 49"):
         ControlDesign.from_parameters(values)
+
+
+def test_a_vehicle_that_the_tube_is_not_certified_for_is_told(design):
+    values = read_design(find_design("baseline_derived")).to_parameters()
+    for coupling, status in (("derived", TubeStatusCode.OK), ("paper_like", TubeStatusCode.UNCERTIFIED_VEHICLE)):
+        law = TubeLaw.from_parameters({**values, "vehicle.coupling": coupling})
+        assert step(law, design, np.zeros(5)).status is status
+        result = step(law, design, [1111.1, 0.0, 0.0, 0.0, 0.0])
+        assert result.status is TubeStatusCode.OUTSIDE

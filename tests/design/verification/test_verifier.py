@@ -98,7 +98,10 @@ def test_every_vertex_and_weight_is_caught(subject, model):
         "velocity weights": design.velocity_samples[1],
     }.items():
         noise = np.broadcast_to(np.abs(array).max(axis=0) < 1e-15, array.shape) if name in "AB" else False
-        assert (name, missed(array, lambda: all(claim.ok for claim in model_claims(subject, model)), noise)) == (name, [])
+        assert (name, missed(array, lambda: all(claim.ok for claim in model_claims(subject, model)), noise)) == (
+            name,
+            [],
+        )
 
 
 @pytest.mark.parametrize(
