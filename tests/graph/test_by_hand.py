@@ -107,6 +107,12 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
         ),
         ("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),
         ("hsv_ctrl", "tube_mpc", ["-p", "input.minimum:=[.nan, 0.0]"], ["input.minimum[0] = nan"]),
+        (
+            "hsv_ctrl",
+            "tube_mpc",
+            ["-p", "tube.centre:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"],
+            ["design 'baseline': claim fails: tube.centre[0]"],
+        ),
         ("hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]),
         ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocity:=1.0"], ["reference.velocity = 1.0"]),
         ("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),

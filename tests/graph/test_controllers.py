@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from node_processes import Processes
+from node_processes import Processes, short_scenario
 
 from hsv.control.tube_law import TubeStatusCode
 from hsv.recording.flight import input_columns, state_columns
@@ -91,3 +91,10 @@ def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> 
     _check_equal(first, _history(scenario))
     indices = first.columns("/hsv/nominal")["gain_index"]
     assert np.all(indices[:100] < 255) and np.all(indices[100:] == 255)
+
+
+def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> None:
+    bag = _flown(processes, short_scenario(processes.folder, duration=1, coupling="derived"), "uncertified")
+    status = bag.columns("/hsv/tube_status")
+    assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
+    assert "vehicle outside the set" in processes.run("hsv", "info", processes.folder / "uncertified").stdout
