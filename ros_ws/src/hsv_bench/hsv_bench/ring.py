@@ -34,9 +34,10 @@ def spin_events(members: Sequence[Member]) -> None:
 def spin_wait_set(members: Sequence[Member]) -> None:
     """Wait on a wait set and take, without any executor: the least that rclpy can do between processes."""
     inputs = [(member, subscription) for member in members for subscription in member.inputs]
-    context = rclpy.get_default_context()
-    with context.handle:
-        wait_set = rclpy_implementation.WaitSet(len(inputs), 0, 0, 0, 0, 0, context.handle)
+    handle = rclpy.get_default_context().handle
+    assert handle is not None
+    with handle:
+        wait_set = rclpy_implementation.WaitSet(len(inputs), 0, 0, 0, 0, 0, handle)
         while not all(member.finished for member in members):
             wait_set.clear_entities()
             indices = [wait_set.add_subscription(subscription.handle) for _, subscription in inputs]

@@ -31,9 +31,11 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
         prepared = prepare(str(path), bag=Path(folder, "bag"))
         nodes = (COMPOSED,) if composed else prepared.nodes
         arguments = [word for file in prepared.parameter_files for word in ("--params-file", str(file))]
-        with Launcher(
-            nodes, arguments, lambda step: times.setdefault(step, time.perf_counter()), lambda node, text: None
-        ) as launcher:
+
+        def on_step(step: int) -> None:
+            times[step] = time.perf_counter()
+
+        with Launcher(nodes, arguments, on_step, lambda node, text: None) as launcher:
             ending = launcher.wait(nodes[-1].name)
     if ending.culprit:
         raise RunError(f"{ending.culprit} {ending.reason}: {' '.join(ending.last_words)}")

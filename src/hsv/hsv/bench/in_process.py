@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from importlib.util import find_spec
 
 import numpy as np
@@ -86,9 +87,7 @@ def against_jsbsim(repeats: int) -> list[Figure]:
     """Return a step of the plant against one of JSBSim's c172x, where JSBSim is installed."""
     if find_spec("jsbsim") is None:
         return []
-    import jsbsim
-
-    aircraft = jsbsim.FGFDMExec(None)
+    aircraft = import_module("jsbsim").FGFDMExec(None)
     aircraft.set_debug_level(0)
     aircraft.load_model("c172x")
     aircraft["ic/h-sl-ft"], aircraft["ic/vc-kts"] = 5000.0, 100.0
