@@ -61,6 +61,9 @@ def design(
     console.print(f"written              {target}, {certificate_path(target).name}")
     if rows:
         console.print(_table(rows))
+        for row in rows:
+            if row.note:
+                console.print(f"{row.name}: {row.note}", markup=False)
 
 
 def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
@@ -91,11 +94,10 @@ def _table(rows: list[Row]) -> Table:
     table.add_column("set")
     for name in columns:
         table.add_column(name, justify="right")
-    table.add_column("")
     for row in rows:
         cells = ["-"] * len(columns)
         if row.half_width is not None and row.feedback is not None and row.size is not None:
             values = [*row.half_width[:5], *row.feedback, row.size]
             cells = [f"{to_paper(float(v), unit)[0]:.3g}" for v, unit in zip(values, columns.values(), strict=True)]
-        table.add_row(row.name, *cells, row.note)
+        table.add_row(row.name, *cells)
     return table

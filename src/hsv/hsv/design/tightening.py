@@ -49,7 +49,7 @@ def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> Ti
     for name, unit, low, high in zip(INPUT_NAMES, INPUT_UNITS, bounds.lower, bounds.upper, strict=True):
         if not low < high:
             raise DesignError(
-                f"tightening: the feedback needs {low - high:.4g} {unit} more of {name} than there is, "
+                f"tightening: the feedback needs {_amount(low - high, unit)} more of {name} than there is, "
                 "expected room for the nominal input"
             )
     return bounds
@@ -88,7 +88,7 @@ def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray)
             side = ("lower", "upper")[int(np.argmin(sides))]
             raise DesignError(
                 f"tightening: the nominal plan passes the {side} tightened bound of {name} "
-                f"by {-sides.min():.4g} {unit}, expected it inside"
+                f"by {_amount(-sides.min(), unit)}, expected it inside"
             )
     return {
         "lowest": lowest.tolist(),
@@ -96,3 +96,7 @@ def check_plan(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray)
         "margin_to_lower": margins[:, 0].tolist(),
         "margin_to_upper": margins[:, 1].tolist(),
     }
+
+
+def _amount(value: float, unit: str) -> str:
+    return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"

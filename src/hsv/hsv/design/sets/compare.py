@@ -66,7 +66,7 @@ def compare_sets(
     bounds = DisturbanceSet(inflation * np.array(delta["lower"]), inflation * np.array(delta["upper"]))
     scales = inputs.state_scale.array(), inputs.input_scale.array()
     ways = {
-        "box, as printed: nine states, no filter": lambda: box(TubeProblem(system, bounds)),
+        "box, nine states": lambda: box(TubeProblem(system, bounds)),
         "box": lambda: box(problem),
         "modal box": lambda: modal_box(problem),
         "zonotope": lambda: zonotope(problem),
