@@ -1,0 +1,58 @@
+"""The linear loop behind docs/derived_coupling.md: what the notch at 15 rad/s does to one corner of the parameters."""
+
+import numpy as np
+import pytest
+
+from hsv.control.design_file import find_design, read_design
+from hsv.control.notch_filter import discretise
+from hsv.design.error_system import notch_matrices
+from hsv.design.region import corners
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+FOOT = 0.3048
+WORST = 764
+"""Index of the corner with the least moment of inertia, the largest mass and the strongest elevator."""
+
+
+def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
+    """Return the largest real part (1/s) of the elastic modes of the sampled loop at 86100 ft, 8150 ft/s."""
+    design = read_design(find_design(name))
+    vehicle = vehicle_parameters(coupling).perturbed(corner)
+    point = trim(vehicle, 86100.0 * FOOT, 8150.0 * FOOT)
+    A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), design.period)
+    B = B * [1.0, effectiveness]
+    A_s, B_s, C_s, D_s = notch_matrices(discretise(design.notch, design.period))
+    F, n = design.feedback_gain.copy(), len(A_s)
+    rate = F[:, 4].copy()
+    F[:, 4] *= D_s
+    loop = np.zeros((9 + n, 9 + n))
+    loop[:9, :9], loop[:9, 9:] = A + B @ F, B @ np.outer(rate, C_s)
+    loop[9:, 4], loop[9:, 9:] = B_s, A_s
+    poles = np.log(np.linalg.eigvals(loop).astype(complex)) / design.period
+    return poles[np.abs(poles.imag) > 8.0].real.max()
+
+
+def test_the_baseline_s_notch_leaves_a_corner_of_the_derived_coupling_without_damping():
+    corner = corners()[WORST]
+    signs = {name: np.sign(change) for name, change in corner.items()}
+    assert (signs["moment_of_inertia"], signs["mass"], signs["moment_elevator"]) == (-1.0, 1.0, 1.0)
+    assert elastic_damping("baseline", corner) == pytest.approx(0.034, abs=2e-3)
+    assert elastic_damping("baseline", corner, effectiveness=0.9) == pytest.approx(-0.083, abs=2e-3)
+    assert elastic_damping("baseline", {}) == pytest.approx(-0.204, abs=2e-3)
+    assert elastic_damping("baseline", corner, "paper_like") < -0.28
+
+
+def test_the_derived_design_damps_that_corner_and_others():
+    worst = max(elastic_damping("baseline_derived", corner) for corner in corners()[WORST::-61])
+    assert worst < -0.17
+    assert elastic_damping("baseline_derived", {}) == pytest.approx(-0.186, abs=2e-3)
+
+
+def test_two_designs_have_the_same_gains():
+    baseline, derived = read_design(find_design("baseline")), read_design(find_design("baseline_derived"))
+    assert np.array_equal(baseline.feedback_gain, derived.feedback_gain)
+    assert np.array_equal(baseline.nominal_gains, derived.nominal_gains)
+    assert (baseline.coupling, derived.coupling) == ("paper_like", "derived")
