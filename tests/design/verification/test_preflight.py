@@ -72,5 +72,7 @@ def test_a_design_without_a_certificate_flies_with_a_warning(shipped):
 
 
 def test_the_check_needs_neither_solvers_nor_units():
-    code = "import sys, hsv.design.verification.preflight; print([m for m in ('cvxpy', 'pydantic') if m in sys.modules])"
+    code = (
+        "import sys, hsv.design.verification.preflight; print([m for m in ('cvxpy', 'pydantic') if m in sys.modules])"
+    )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
