@@ -15,7 +15,7 @@ from hsv_node.main import run_node
 
 
 class TubeMpcNode(ControllerNode):
-    """Feedback about the nominal trajectory (paper eq. 36); a design that fails its quick claims is refused at start."""
+    """Feedback about the nominal trajectory (paper eq. 36); refuses a design that fails its quick claims."""
 
     def __init__(self) -> None:
         super().__init__("tube_mpc")

@@ -54,7 +54,8 @@ def nominal_advance(
         for j in range(m):
             total += S[row + n + j] * u_n[j]
         new[i] = total
-    deviation[:] = new
+    for i in range(n):
+        deviation[i] = new[i]
     return inside
 
 

@@ -79,7 +79,8 @@ class FaultSchedule(NamedTuple):
 @njit(cache=True)
 def apply_faults(schedule: Any, step: int, command: np.ndarray, actuator: np.ndarray) -> None:
     """Write into ``actuator`` (2) what becomes of ``command`` (2) in this step."""
-    actuator[:] = command
+    for i in range(len(command)):
+        actuator[i] = command[i]
     for row in range(len(schedule.start)):
         if schedule.start[row] <= step < schedule.stop[row]:
             channel = schedule.channel[row]

@@ -84,19 +84,25 @@ def _fly(
     for k in range(rows):
         if k > 0:
             advance(x, actuator, vehicle, period, substeps, work)
-        history.state[k] = x
+        for i in range(n):
+            history.state[k, i] = x[i]
         q_f = filter_step(notch, filter_state, x[4])
         history.filtered_pitch_rate[k] = q_f
-        history.deviation[k] = x_n
+        for i in range(n):
+            history.deviation[k, i] = x_n[i]
         index, _ = nominal_input(nominal, x_n, u_n)
         history.gain_index[k] = index
-        history.nominal_input[k] = u_n
+        for i in range(m):
+            history.nominal_input[k, i] = u_n[i]
         tube_input(tube, x, q_f, x_r, x_n, u_n, u_r, u_feedback, total, u)
-        history.u_unsaturated[k] = total
-        history.command[k] = u
+        for i in range(m):
+            history.u_unsaturated[k, i] = total[i]
+        for i in range(m):
+            history.command[k, i] = u[i]
         nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, S, new)
         apply_faults(faults, k, u, actuator)
-        history.actuator[k] = actuator
+        for i in range(m):
+            history.actuator[k, i] = actuator[i]
         if not in_model_range(x):
             return k + 1
     return rows

@@ -35,7 +35,7 @@ N_RIGID = 5
 """The first five states are those of the rigid body."""
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def forces(x: Any, u: Any, p: Any) -> Any:
     """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa (paper eq. 2-3).
 
@@ -70,7 +70,7 @@ def forces(x: Any, u: Any, p: Any) -> Any:
     return lift, drag, thrust, moment, pressure
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
     """Write dx/dt into ``out`` (9): the coupled model (paper eq. 1), decoupled (eq. 4) where both couplings are zero.
 
@@ -110,7 +110,7 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
     out[8] = acceleration_2
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def jacobian(x: np.ndarray, u: np.ndarray, p: VehicleParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return A = df/dx (9, 9) and B = df/du (9, 2), exact to rounding, by the complex step (paper eq. 6-9).
 

@@ -15,7 +15,7 @@ def workspace() -> np.ndarray:
     return np.empty((3, N_STATES))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def advance(x: Any, u: Any, p: Any, period: float, substeps: int, work: Any) -> None:
     """Replace ``x`` (9) by the state one ``period`` (s) later, input ``u`` (2) held, by ``substeps`` steps of RK4."""
     h = period / substeps
