@@ -52,6 +52,8 @@ class Parameter:
             (False, True): f" of at most {high:.10g}",
             (True, True): f" from {low:.10g} to {high:.10g}",
         }[(math.isfinite(low), math.isfinite(high))]
+        if self.kind == "double_array":
+            words = words or " of finite numbers"
         return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}"
 
     def check(self, value: object) -> Any:

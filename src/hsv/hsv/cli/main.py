@@ -28,6 +28,8 @@ from hsv.cli.verify import verify
 from hsv.cli.view import view
 from hsv.errors import HsvError, RunError
 
+_INTERRUPTED = 130
+
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Of an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
@@ -65,17 +67,18 @@ def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
-        sys.exit(app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False))
+        code = app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False)
+        if code == _INTERRUPTED:
+            raise KeyboardInterrupt  # typer swallows it
+        sys.exit(code)
     except UsageError as error:
         _fail(_usage(error), 2)
-    except typer.Abort:
-        _fail("interrupted", 130)
     except RunError as error:
         _fail(error, 1)
     except HsvError as error:
         _fail(error, 2)
-    except KeyboardInterrupt:
-        _fail("interrupted", 130)
+    except (KeyboardInterrupt, typer.Abort):
+        _fail("interrupted", _INTERRUPTED)
 
 
 def _usage(error: Any) -> str:
