@@ -81,10 +81,10 @@ def test_jazzy_without_its_packages_is_refused(python):
         checks.require(routes.JAZZY, replace(python, has_ros=False), os.environ)
 
 
-@pytest.mark.parametrize("path", ["/home/a b/hsv", "/home/a:b/hsv", "/home/a;b", "/home/it's"])
+@pytest.mark.parametrize("path", ["/srv/a b/hsv", "/srv/a:b/hsv", "/srv/a;b", "/srv/it's"])
 def test_a_path_that_colcon_cannot_build_in_is_refused(path):
     assert path in checks.path_problems(path)[0].text
-    assert checks.path_problems("/home/jürgen/hsv-2.0_(1)") == []
+    assert checks.path_problems("/srv/jürgen/hsv-2.0_(1)") == []
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,8 @@ def test_set_up_does_not_depend_on_what_the_shell_has_sourced():
         "AMENT_PREFIX_PATH": f"{root}/ros_ws/install/hsv:/opt/other",
         "VIRTUAL_ENV": f"{root}/.venv",
         "MAKEFLAGS": "-j",
-        "HOME": "/home/somebody",
+        "HOME": "/srv/somebody",
     }
-    assert routes.clean_environment(routes.WHEELS, sourced) == {"PATH": "/usr/bin", "HOME": "/home/somebody"}
+    assert routes.clean_environment(routes.WHEELS, sourced) == {"PATH": "/usr/bin", "HOME": "/srv/somebody"}
     kept = routes.clean_environment(routes.JAZZY, sourced)
-    assert kept == {"PATH": "/usr/bin", "HOME": "/home/somebody", "AMENT_PREFIX_PATH": "/opt/other"}
+    assert kept == {"PATH": "/usr/bin", "HOME": "/srv/somebody", "AMENT_PREFIX_PATH": "/opt/other"}
