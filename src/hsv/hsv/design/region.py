@@ -20,9 +20,9 @@ from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
 from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
-from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.closed_loop import Flight, fly
 from hsv.vehicle.parameters import uncertainty_bounds
-from hsv.vehicle.plant import FlightStatus, Plant
+from hsv.vehicle.plant import FlightStatus
 
 Corner = Mapping[str, float]
 Result = TypeVar("Result")
@@ -78,17 +78,7 @@ class Region:
             DesignError: The flight diverged or saturated; no set can be computed from it.
         """
         parts = self._parts
-        plant = parts.plant
-        vehicle = plant.vehicle.perturbed(corner)
-        flight = fly(
-            Components(
-                Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps),
-                parts.notch_filter,
-                parts.nominal_trajectory,
-                parts.tube_law,
-                parts.fault_injector,
-            )
-        )
+        flight = fly(parts.perturbed(corner))
         saturated = np.count_nonzero(np.any(flight.history.command != flight.history.u_unsaturated, axis=1))
         if flight.status is not FlightStatus.FINISHED or saturated:
             raise DesignError(

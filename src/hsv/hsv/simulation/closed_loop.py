@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,6 +30,12 @@ class Components:
     nominal_trajectory: NominalTrajectory
     tube_law: ControlLaw
     fault_injector: FaultInjector
+
+    def perturbed(self, perturbation: Mapping[str, float]) -> Components:
+        """Return the loop around the perturbed vehicle, relative changes by parameter name; the rest is shared."""
+        plant = self.plant
+        vehicle = plant.vehicle.perturbed(perturbation)
+        return replace(self, plant=Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps))
 
 
 class History(NamedTuple):

@@ -14,9 +14,8 @@ from hsv.design.verification.claims import Claim, Subject, above, at_most
 from hsv.design.verification.invariant_set import certified_set
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
-from hsv.simulation.closed_loop import Components, fly
+from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import Scenario
-from hsv.vehicle.plant import Plant
 
 
 def bounding_corners(subject: Subject) -> list[Corner]:
@@ -40,17 +39,7 @@ def scenario_claims(
     found, model = certified_set(subject), channel_model(subject.design)
     flown: list[FlightEvidence] = []
     for corner in over:
-        plant = parts.plant
-        vehicle = plant.vehicle.perturbed(corner)
-        flight = fly(
-            Components(
-                Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps),
-                parts.notch_filter,
-                parts.nominal_trajectory,
-                parts.tube_law,
-                parts.fault_injector,
-            )
-        )
+        flight = fly(parts.perturbed(corner))
         flown.append(flight_evidence(flight, found, found.problem.disturbance, model))
         if progress:
             progress(len(flown))
