@@ -62,6 +62,14 @@ def test_without_a_set_or_without_the_filter_there_is_no_level(design):
         assert len(result.tube_centre) == 0
 
 
+def test_the_set_is_not_that_of_another_notch_filter(design):
+    [section] = design.notch
+    other = (dataclasses.replace(section, zero_frequency=19.5),)
+    assert step(TubeLaw(design, notch=design.notch), design, np.zeros(5)).status is TubeStatusCode.OK
+    assert step(TubeLaw(design, notch=other), design, np.zeros(5)).status is TubeStatusCode.NO_SET
+    assert step(TubeLaw(design, notch=other * 2), design, np.zeros(5), np.zeros(4)).status is TubeStatusCode.NO_SET
+
+
 def test_the_set_survives_the_parameter_file(design):
     checked = ControlDesign.from_parameters(design.to_parameters())
     assert not checked.modified

@@ -1,6 +1,6 @@
 import pytest
 
-from hsv.errors import ScenarioError
+from hsv.errors import ParameterError, ScenarioError
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_names, scenario_text
 
@@ -88,6 +88,8 @@ def test_metres_serve_as_well_as_feet():
         ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
         ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected the largest magnitude"),
         ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: input should be a valid boolean"),
+        ("[limits]", "[notch]\nzero_frequency = 15\n[limits]", "notch.zero_frequency = 15: the unit is missing"),
+        ("[limits]", '[notch]\nzero_damping = "1 s"\n[limits]', "notch.zero_damping = '1 s': wrong unit"),
         ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: input should be 'CM' or 'DM'"),
         ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
         ('title = "', 'title = 3 # "', "title = 3: input should be a valid string"),
@@ -149,3 +151,14 @@ def test_a_design_that_is_not_there_is_named():
     scenario = parse_scenario(CASE1.replace('"baseline"', '"absent"'), "mine")
     with pytest.raises(DesignError, match=r"design = 'absent': no such file"):
         flight_parameters(scenario)
+
+
+def test_a_flight_may_have_another_notch_filter_than_its_design():
+    table = '[notch]\nzero_frequency = ["15 rad/s", "19.5 rad/s"]\npole_frequency = ["15 rad/s", "19.5 rad/s"]\n'
+    scenario = parse_scenario(CASE1 + table + "zero_damping = [0.02, 0.02]\npole_damping = [0.5, 0.4]\n", "two")
+    flown = assemble(flight_parameters(scenario)).notch_filter.sections
+    assert [(s.zero_frequency, s.pole_damping) for s in flown] == [(15.0, 0.5), (19.5, 0.4)]
+    with pytest.raises(
+        ParameterError, match=r"parameter notch.zero_damping: 1 values, expected as many as notch.flown"
+    ):
+        assemble(flight_parameters(parse_scenario(CASE1 + table, "two")))

@@ -90,6 +90,8 @@ def scenario_toml(base: Scenario, factors: Sequence[Factor], sample: Sequence[fl
 
 
 def _quantity(value: object, unit: str) -> object:
+    if isinstance(value, list | tuple):
+        return [_quantity(entry, unit) for entry in value]
     return value if unit == "1" else f"{value!r} {unit}"
 
 
@@ -101,6 +103,8 @@ _UNITS = {
     "command.velocity_step": "m/s",
     "fault.start": "s",
     "integral.rate": "1/s",
+    "notch.zero_frequency": "rad/s",
+    "notch.pole_frequency": "rad/s",
 }
 """Fields that a scenario file writes with a unit."""
 

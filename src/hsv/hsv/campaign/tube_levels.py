@@ -12,7 +12,7 @@ from numba import njit
 from hsv.control.control_law import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import level
-from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, rest
+from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, flown_sections, rest
 from hsv.control.tube_law import N_RIGID, PITCH_RATE
 from hsv.parameters import check_all
 from hsv.simulation.metrics import FlightData
@@ -50,7 +50,7 @@ class TubeLevels:
         """Read design, controller and filter from flat flight parameters."""
         design = ControlDesign.from_parameters(values)
         controller = check_all(CONTROLLER_PARAMETERS, values)["controller"]
-        in_loop = check_all(NOTCH_PARAMETERS, values)["notch.enabled"]
+        in_loop = check_all(NOTCH_PARAMETERS, values)["notch.enabled"] and flown_sections(values) == design.notch
         self._tube = design.tube if controller == "tube_mpc" and in_loop else None
         self._notch = discretise(design.notch, design.period)
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter, NotchSection
+from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS, NotchFilter, NotchSection
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
@@ -23,7 +23,7 @@ from hsv.parameters import Parameter, check_all
 DESIGN_PARAMETERS = (
     Parameter("design.name", "", "name of the design"),
     Parameter("design.hash", "", "digest of all other parameters of the design, as it was written"),
-    *(p for p in NOTCH_PARAMETERS if p.name != "notch.enabled"),
+    *DESIGN_NOTCH_PARAMETERS,
     Parameter("model.a", [], "state matrices A_i of all vertices, row by row, altitude-major (SI, discrete time)"),
     Parameter("model.b", [], "input matrices B_i of all vertices, row by row, altitude-major (SI, discrete time)"),
     Parameter("scheduling.interpolation", "linear", "weights between breakpoints", choices=INTERPOLATIONS),

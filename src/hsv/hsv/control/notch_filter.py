@@ -15,13 +15,25 @@ from hsv.parameters import Parameter, check_all
 
 MAX_SECTIONS = 4
 
-NOTCH_PARAMETERS = (
+DESIGN_NOTCH_PARAMETERS = (
     Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
-    Parameter("notch.enabled", True, "false: the pitch rate passes unfiltered"),
     Parameter("notch.zero_frequency", [15.0], "centre of the notch, one value per section", "rad/s", 0.1, 1e3),
     Parameter("notch.zero_damping", [0.02], "damping ratio of the zeros: smaller is deeper", "", 0.0, 10.0),
     Parameter("notch.pole_frequency", [15.0], "natural frequency of the poles", "rad/s", 0.1, 1e3),
     Parameter("notch.pole_damping", [0.5], "damping ratio of the poles: larger is wider", "", 1e-3, 10.0),
+)
+"""The filter that a design is made for."""
+
+FLOWN_NOTCH_PARAMETERS = tuple(
+    Parameter(p.name.replace("notch.", "notch.flown."), [], f"flown instead of {p.name}", p.unit, p.minimum, p.maximum)
+    for p in DESIGN_NOTCH_PARAMETERS[1:]
+)
+"""What a flight may have otherwise; empty: the design's. The invariant set does not hold for another filter."""
+
+NOTCH_PARAMETERS = (
+    *DESIGN_NOTCH_PARAMETERS,
+    Parameter("notch.enabled", True, "false: the pitch rate passes unfiltered"),
+    *FLOWN_NOTCH_PARAMETERS,
 )
 
 
@@ -101,6 +113,26 @@ def filter_step(data: Any, state: np.ndarray, value: float) -> float:
     return value
 
 
+def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
+    """Return the sections of the filter in flight: the design's, with what the flight has otherwise in their place.
+
+    Raises:
+        ParameterError: A wrong value, or arrays of different lengths.
+    """
+    v = check_all((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
+    pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
+    chosen = [flown if v[flown.name] else designed for designed, flown in pairs]
+    columns = [v[parameter.name] for parameter in chosen]
+    n = len(columns[0])
+    for parameter, column in zip(chosen, columns, strict=True):
+        if len(column) != n or not 1 <= n <= MAX_SECTIONS:
+            raise ParameterError(
+                f"parameter {parameter.name}: {len(column)} values, "
+                f"expected as many as {chosen[0].name}, 1 to {MAX_SECTIONS}"
+            )
+    return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
+
+
 @dataclass(frozen=True)
 class NotchResult:
     """``filtered_pitch_rate`` (rad/s) and the filter states (2 n) before the update of this step."""
@@ -128,16 +160,8 @@ class NotchFilter:
             ParameterError: A wrong value, or arrays of different lengths.
         """
         v = check_all(NOTCH_PARAMETERS, values)
-        columns = [v[f"notch.{name}"] for name in ("zero_frequency", "zero_damping", "pole_frequency", "pole_damping")]
-        n = len(columns[0])
-        for parameter, column in zip(NOTCH_PARAMETERS[2:], columns, strict=True):
-            if len(column) != n or not 1 <= n <= MAX_SECTIONS:
-                raise ParameterError(
-                    f"parameter {parameter.name}: {len(column)} values, "
-                    f"expected as many as notch.zero_frequency, 1 to {MAX_SECTIONS}"
-                )
-        sections = [NotchSection(*row) for row in zip(*columns, strict=True)] if v["notch.enabled"] else []
-        return cls(sections, v["period"])
+        sections = flown_sections(values)
+        return cls(sections if v["notch.enabled"] else [], v["period"])
 
     def reset(self) -> None:
         """Forget the past: the next step starts at rest for its own input."""

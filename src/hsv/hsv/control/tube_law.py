@@ -12,7 +12,14 @@ import numpy as np
 from numba import njit
 
 from hsv.control.design_file import ControlDesign
-from hsv.control.notch_filter import NotchData, discretise, filter_step
+from hsv.control.notch_filter import (
+    FLOWN_NOTCH_PARAMETERS,
+    NotchData,
+    NotchSection,
+    discretise,
+    filter_step,
+    flown_sections,
+)
 from hsv.control.tube_set import TubeSet
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.parameters import COUPLING_SETS
@@ -33,6 +40,7 @@ class TubeStatusCode(IntEnum):
 
 TUBE_PARAMETERS = (
     Parameter("vehicle.coupling", "paper_like", "set of inertial coupling of the vehicle flown", choices=COUPLING_SETS),
+    *FLOWN_NOTCH_PARAMETERS,
 )
 """Of the tube law, beside those of the design."""
 
@@ -138,21 +146,31 @@ class TubeMonitor:
 class TubeLaw:
     """The controller's last stage; only its monitor has a memory, so that a restart in flight changes no input."""
 
-    def __init__(self, design: ControlDesign, tau: float = 1.0, coupling: str | None = None) -> None:
-        """Fly ``design`` on a vehicle with this set of inertial coupling, ``None``: the one it is certified for."""
+    def __init__(
+        self,
+        design: ControlDesign,
+        tau: float = 1.0,
+        coupling: str | None = None,
+        notch: tuple[NotchSection, ...] | None = None,
+    ) -> None:
+        """Fly ``design`` on a vehicle with this set of inertial coupling, ``None``: the one it is certified for.
+
+        The set is one of the error with the design's notch filter: with another ``notch`` there is none.
+        """
         self.data = TubeData(design.feedback_gain, tau, design.input_minimum, design.input_maximum)
         self._certified = coupling in (None, design.coupling)
-        self._monitor = TubeMonitor(design.tube, discretise(design.notch, design.period))
+        flown = notch or design.notch
+        self._monitor = TubeMonitor(design.tube if flown == design.notch else None, discretise(flown, design.period))
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
-        self.step(x, 0.0, np.zeros(2 * len(design.notch)), x, u, x, u)
+        self.step(x, 0.0, np.zeros(2 * len(flown)), x, u, x, u)
         self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
         """Build from the design's parameters and :data:`TUBE_PARAMETERS`; a wrong one is named in the error."""
         coupling = check_all(TUBE_PARAMETERS, values)["vehicle.coupling"]
-        return cls(ControlDesign.from_parameters(values), coupling=coupling)
+        return cls(ControlDesign.from_parameters(values), coupling=coupling, notch=flown_sections(values))
 
     def reset(self) -> None:
         """Start a new run."""

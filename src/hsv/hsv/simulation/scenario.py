@@ -46,6 +46,18 @@ Velocity = Annotated[float, _quantity("m/s", *VELOCITY_RANGE, shown=_range(VELOC
 Time = Annotated[float, _quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
 
 
+def _quantities(unit: str) -> BeforeValidator:
+    def parse(given: object, info: ValidationInfo) -> tuple[float, ...]:
+        texts = given if isinstance(given, list | tuple) else [given]
+        return tuple(parse_quantity(text, unit, str(info.field_name)) for text in texts)
+
+    return BeforeValidator(parse)
+
+
+Frequencies = Annotated[tuple[float, ...], _quantities("rad/s")]
+Numbers = Annotated[tuple[float, ...], _quantities("1")]
+
+
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -73,9 +85,13 @@ class CommandTable(_Table):
 
 
 class NotchTable(_Table):
-    """The notch filter in flight; its parameters are the design's."""
+    """The notch filter in flight: the design's, but for what is given here, one value or one a section."""
 
     enabled: StrictBool = True
+    zero_frequency: Frequencies = ()
+    zero_damping: Numbers = ()
+    pole_frequency: Frequencies = ()
+    pole_damping: Numbers = ()
 
 
 class NominalTable(_Table):
@@ -148,6 +164,8 @@ class Scenario(_Table):
             "integral.rate": self.integral.rate,
             "robust_mpc.gain_index": self.robust_mpc.gain_index,
         }
+        flown = self.notch.model_dump(exclude={"enabled"})
+        values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
         if self.fault:
             values["fault.channels"] = [fault.channel for fault in self.fault]
