@@ -10,6 +10,7 @@ setup(
             "bench/*.c",
             "campaign/template/*",
             "recording/layouts/*",
+            "recording/report/plotly/*",
             "recording/report/template/*",
         ]
     },

@@ -42,13 +42,12 @@ class Browser:
         self.driver = webdriver.Chrome(options=options, service=service.Service(driver))
 
     def open(self, page: Path) -> float:
-        """Open a report and wait until every plot is drawn; return the seconds until it had loaded."""
+        """Open a report; return the seconds until every plot was drawn."""
         self.console()
         start = time.monotonic()
         self.driver.get(page.as_uri())
-        loaded = time.monotonic() - start
         self.settle()
-        return loaded
+        return time.monotonic() - start
 
     def settle(self) -> None:
         """Wait until nothing is left to draw."""

@@ -178,16 +178,18 @@ def test_on_paper_it_is_light_without_controls_and_plots_fit(opened):
     assert base64.b64decode(printed["data"]).startswith(b"%PDF")
 
 
-def test_three_whole_flights_make_a_small_page(browser, bags, tmp_path, record_property, capsys):
-    scenarios = ("case1", "case1_no_notch", "case1_derived")
-    flown = [record_flight(bags / name, name, duration=200.0, fault=100.0) for name in scenarios]
-    page = tmp_path / "three.html"
+@pytest.mark.parametrize("scenarios", [["case1"], ["case1", "case1_no_notch", "case1_derived"]], ids=len)
+def test_whole_flights_make_a_small_page_that_opens_soon(browser, bags, tmp_path, record_property, capsys, scenarios):
+    flown = [record_flight(bags / f"{len(scenarios)}_{name}", name, 200.0, 100.0) for name in scenarios]
+    page = tmp_path / "whole.html"
     write_report(flown, page)
     size = page.stat().st_size / MEGABYTE
-    seconds = browser.open(page)
+    # The best of three: what else the machine does is not the page's doing.
+    seconds = min(browser.open(page) for _ in range(3))
     record_property("page_megabytes", size)
-    record_property("page_load_seconds", seconds)
+    record_property("page_open_seconds", seconds)
     with capsys.disabled():
-        print(f"\nreport of three flights: {size:.2f} MB, loaded in {seconds:.2f} s")
+        print(f"\nreport of {len(flown)} flights: {size:.2f} MB, all plots drawn after {seconds:.2f} s")
     assert browser.console() == []
     assert size < 8.0
+    assert seconds < 3.0

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
@@ -20,6 +19,9 @@ from hsv.recording.report.run import ReportedRun, reported_runs
 from hsv.recording.report.values import Quantity, Section, Table
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import scenario_names
+
+LIBRARY = files("hsv.recording.report").joinpath("plotly", "plotly-basic.min.js")
+"""The plotting library; see the README beside it."""
 
 EVENTS_SHOWN = 200
 """Events of a run that are listed; of a run with more, the page says how many there are."""
@@ -74,7 +76,7 @@ def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
         scripts=[_asset("charts.js"), _asset("page.js")],
         plots=plots,
         numbers=Markup(numbers),
-        library=Markup(compressed(get_plotlyjs().encode())),
+        library=Markup(compressed(LIBRARY.read_bytes())),
     )
 
 
