@@ -16,7 +16,7 @@ from hsv.campaign.pilot import Outcome, Pilot
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
-from hsv.errors import CampaignError, RunError
+from hsv.errors import CampaignError
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def over_dds(
         CampaignError: No such flight, or the design is not what it was.
         RunError: A process failed; its last words are in the message.
     """
-    from hsv.graph.launcher import Launcher
+    from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
     from hsv.recording.flight import flight_data
     from hsv.recording.reader import Bag
@@ -75,13 +75,7 @@ def over_dds(
         path = Path(folder, f"{scenario.name}_flight_{flight}.toml")
         path.write_text(scenario_toml(scenario, results.campaign.factors, pilot.samples[flight]), encoding="utf-8")
         prepared = prepare(str(path), bag=bag)
-    arguments = [word for file in prepared.parameter_files for word in ("--params-file", str(file))]
-    with Launcher(
-        prepared.nodes, arguments, lambda step: progress(step, prepared.steps), lambda node, text: None
-    ) as launcher:
-        ending = launcher.wait()
-    if ending.culprit:
-        raise RunError(f"{ending.culprit} {ending.reason}: {' | '.join(ending.last_words)}")
+    fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.

@@ -30,14 +30,11 @@ def run(
 
     from hsv.cli.progress import flight as flight_bar
     from hsv.cli.summary import report_flight
-    from hsv.errors import QuantityError, RunError
-    from hsv.graph.description import COMPOSED
-    from hsv.graph.launcher import Launcher
+    from hsv.errors import QuantityError
+    from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
     from hsv.recording.flight import flight_data
-    from hsv.recording.metadata import FILE_NAME
     from hsv.recording.reader import Bag
-    from hsv.recording.recover import recover
     from hsv.simulation.metrics import flight_metrics
 
     if not 0.0 <= real_time_factor <= 1000.0:
@@ -48,9 +45,6 @@ def run(
     if prepared.bag.exists():
         raise QuantityError(f"bag = {str(prepared.bag)!r}: exists already, expected a new directory")
     loaded = prepared.scenario
-    arguments = [word for path in prepared.parameter_files for word in ("--params-file", str(path))]
-    # The last one to start flies the plant: when it ends, the run does.
-    started = (COMPOSED,) if composed else prepared.nodes
     clock: dict[str, float] = {}
 
     def line(node: str, text: str) -> None:
@@ -64,16 +58,7 @@ def run(
             clock["end"] = time.monotonic()
             show(number)
 
-        try:
-            with Launcher(started, arguments, step, line) as launcher:
-                ending = launcher.wait(started[-1].name)
-        finally:
-            # A recorder that was killed could not finish its bag.
-            if prepared.bag.is_dir() and not (prepared.bag / FILE_NAME).exists():
-                recover(prepared.bag)
-    if ending.culprit:
-        words = "".join(f"\n  {word}" for word in ending.last_words)
-        raise RunError(f"{ending.culprit} {ending.reason}; the bag is {prepared.bag}. Its last words:{words}")
+        ending = fly_graph(prepared, composed=composed, on_step=step, on_line=line)
     recorded = Bag(prepared.bag)
     data = flight_data(recorded)
     extra = {"bag": str(prepared.bag)}
