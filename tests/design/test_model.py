@@ -1,9 +1,17 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from hsv.design.model import design_model
+from hsv.control.notch_filter import NotchSection, continuous, series
+from hsv.design.inputs import read_inputs
+from hsv.design.model import design_model, polytopic_model
+from hsv.errors import DesignError
 from hsv.lpv.hull import smallest_weight
+from hsv.vehicle.extended import Filter, from_true_rate
 from hsv.vehicle.parameters import vehicle_parameters
+
+OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
 
 @pytest.fixture(scope="module")
@@ -53,3 +61,48 @@ def test_grid_is_the_simple_and_less_accurate_alternative(inputs):
     assert model.interpolation == "linear"
     assert model.report["vertices"] == [4, 5]
     assert 1e-6 < model.report["accuracy"]["relative_frobenius_error"] < 1e-4
+
+
+@pytest.fixture(scope="module")
+def codesign():
+    return read_inputs(OFFLINE_DESIGN / "adjustable.toml")
+
+
+def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
+    notch = sections(codesign)
+    model = design_model(codesign.model, vehicle_parameters("decoupled"), notch)
+    accuracy = model.report["accuracy"]
+    assert model.report["vertices"] == [2, 3]
+    assert accuracy["relative_frobenius_error"] < 5e-5
+    assert accuracy["bode_magnitude_error_db"] < 0.3
+    assert accuracy["bode_phase_error_deg"] < 1.5
+    assert accuracy["smallest_weight"] >= -1e-9
+    assert model.whole.A.shape == (6, 11, 11) and model.polytope.A.shape == (6, 9, 9)
+
+
+def test_singular_functions_alone_miss_the_phase_at_an_antiresonance(codesign):
+    options = codesign.model.tensor_product.model_copy(update={"functions": "singular"})
+    inputs = codesign.model.model_copy(update={"tensor_product": options})
+    accuracy = design_model(inputs, vehicle_parameters("decoupled"), sections(codesign)).report["accuracy"]
+    assert accuracy["bode_phase_error_deg"] > 1.5
+
+
+def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
+    notch = sections(codesign)
+    model = polytopic_model(codesign.model, vehicle_parameters("decoupled"), notch)
+    T = from_true_rate(Filter(*series(continuous(notch))))
+    A, _ = model.whole.at(26100.0, 2450.0)
+    joined = np.linalg.solve(T, A @ T)
+    np.testing.assert_allclose(joined[:9, :9], model.polytope.at(26100.0, 2450.0)[0], atol=1e-9)
+    assert np.abs(joined[:9, 9:]).max() < 1e-9
+
+
+def test_scales_of_the_filter_are_asked_for(codesign):
+    options = codesign.model.tensor_product.model_copy(update={"filter_scale": None})
+    inputs = codesign.model.model_copy(update={"tensor_product": options})
+    with pytest.raises(DesignError, match="filter_scale: missing"):
+        polytopic_model(inputs, vehicle_parameters("decoupled"), sections(codesign))
+
+
+def sections(inputs):
+    return tuple(NotchSection(**section.model_dump()) for section in inputs.notch)

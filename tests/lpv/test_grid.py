@@ -1,3 +1,5 @@
+from functools import partial
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -13,7 +15,7 @@ VELOCITIES = np.linspace(*VELOCITY_RANGE, 5)
 
 @pytest.fixture(scope="module")
 def polytope():
-    return grid_polytope(vehicle_parameters(), ALTITUDES, VELOCITIES, 0.02)
+    return grid_polytope(partial(linearise, vehicle_parameters()), ALTITUDES, VELOCITIES, 0.02)
 
 
 def test_model_at_a_node_is_the_vertex(polytope):

@@ -67,3 +67,19 @@ def test_too_few_samples_and_wrong_shapes_are_refused():
         tensor_product(A, B, ALTITUDES, VELOCITIES[:-1], np.ones(3), np.ones(2), 1e-10)
     with pytest.raises(DesignError, match=r"expected \(3,\) and \(2,\)"):
         tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(4), np.ones(2), 1e-10)
+
+
+def test_polynomial_functions_are_exact_where_the_model_is_a_polynomial():
+    def at(h, v):
+        return model(h, 1.0 / (v / 100.0))  # b = 10 / v, so linear in what is given
+
+    pairs = [[at(h, v) for v in VELOCITIES] for h in ALTITUDES]
+    A, B = np.array([[p[0] for p in row] for row in pairs]), np.array([[p[1] for p in row] for row in pairs])
+    product = tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10, "polynomial")
+    assert len(product.polytope.A) == 6
+    assert_allclose(product.polytope.at(131.7, 17.3)[0], at(131.7, 17.3)[0], atol=1e-12)
+    for _, weights in (product.altitude_samples, product.velocity_samples):
+        assert weights.min() >= 0.0
+        assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-12)
+    with pytest.raises(DesignError, match="tensor_product.functions = 'splines': expected one of"):
+        tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10, "splines")

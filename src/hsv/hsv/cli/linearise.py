@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, UnitsOption, VelocityOption
 from hsv.cli.output import Units, console, print_json
 
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from hsv.vehicle.modes import Mode
+
+READINGS = ("physical", "printed")
+
+FILTER_UNITS = ("rad", "rad s")
 UNIT_SYSTEMS = {Units.si: "SI", Units.paper: "ft, ft/s, deg, slug^0.5 ft"}
 
 
@@ -16,52 +24,66 @@ def linearise(
     altitude: AltitudeOption = "85000 ft",
     velocity: VelocityOption = "7702.0808 ft/s",
     coupling: CouplingOption = "paper_like",
-    model: Annotated[str, typer.Option(help="Coupled (CM) or decoupled (DM) model.")] = "CM",
+    model: Annotated[
+        str, typer.Option(help="Coupled (CM) or decoupled (DM) model, or CM with the notch filter in it (ECM).")
+    ] = "CM",
+    reading: Annotated[
+        str, typer.Option(help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q').")
+    ] = "physical",
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
-    """Jacobians A, B and poles at a trim point (paper eq. 6-9).
+    """Jacobians A, B and poles at a trim point (paper eq. 6-9; of the ECM, with the default notch filter, 40-43).
 
-    Example: hsv linearise --coupling derived
+    Example: hsv linearise --coupling derived --model ECM
     """
     import numpy as np
 
+    from hsv.control.notch_filter import continuous, default_sections, series
     from hsv.errors import QuantityError
     from hsv.units import parse_quantity, to_paper
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
+    from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
     from hsv.vehicle.modes import modes
     from hsv.vehicle.parameters import MODELS, vehicle_parameters
     from hsv.vehicle.trim import trim
 
-    if model not in MODELS:
-        raise QuantityError(f"model = {model!r}: expected one of {', '.join(MODELS)}")
+    if model not in (*MODELS, "ECM"):
+        raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
+    if reading not in READINGS:
+        raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
     vehicle = vehicle_parameters(coupling)
     if model == "DM":
         vehicle = vehicle.decoupled()
     point = trim(vehicle, parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity"))
-    A, B = jacobian(point.state, point.input, vehicle)
+    names, state_units = STATE_NAMES, STATE_UNITS
+    difference: list[Mode] = []
+    if model == "ECM":
+        notch = Filter(*series(continuous(default_sections())))
+        state = extended_state(point.state, notch)
+        made = {name: extended_jacobian(state, point.input, vehicle, notch, name == "printed") for name in READINGS}
+        A, B = made[reading]
+        difference = modes(next(made[name][0] for name in READINGS if name != reading))
+        names = tuple("filtered_pitch_rate" if name == "pitch_rate" else name for name in STATE_NAMES)
+        names += tuple(f"filter_{i + 1}" for i in range(len(notch.B)))
+        state_units += FILTER_UNITS * (len(notch.B) // 2)
+    else:
+        A, B = jacobian(point.state, point.input, vehicle)
     poles = modes(A)
     if units is Units.paper:
-        state, inputs = (np.array([to_paper(1.0, unit)[0] for unit in row]) for row in (STATE_UNITS, INPUT_UNITS))
+        state, inputs = (np.array([to_paper(1.0, unit)[0] for unit in row]) for row in (state_units, INPUT_UNITS))
         A = A * state[:, None] / state
         B = B * state[:, None] / inputs
     if json:
         print_json(
             {
-                "states": STATE_NAMES,
+                "states": names,
                 "inputs": INPUT_NAMES,
                 f"A_{units}": A.tolist(),
                 f"B_{units}": B.tolist(),
-                "poles": [
-                    {
-                        "real_rad_per_s": mode.pole.real,
-                        "imag_rad_per_s": mode.pole.imag,
-                        "natural_frequency_rad_per_s": mode.natural_frequency,
-                        "damping_ratio": mode.damping_ratio,
-                    }
-                    for mode in poles
-                ],
+                "poles": [_pole(mode) for mode in poles],
             }
+            | ({"poles_of_the_other_reading": [_pole(mode) for mode in difference]} if difference else {})
         )
         return
     from rich.console import Console
@@ -69,16 +91,33 @@ def linearise(
 
     # Nine columns need more room than some terminals have: a wrapped line is better than a cut number.
     wide = Console(highlight=False, width=max(console.width, 130))
-    for name, matrix, columns in (("A", A, STATE_NAMES), ("B", B, INPUT_NAMES)):
+    for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
         title = f"{name} ({UNIT_SYSTEMS[units]})"
         table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
         table.add_column("", no_wrap=True)
         for column in columns:
             table.add_column(column.replace("_", "\n"), justify="right", no_wrap=True)
-        for row, label in zip(matrix, STATE_NAMES, strict=True):
+        for row, label in zip(matrix, names, strict=True):
             table.add_row(label, *(f"{value:.4g}" for value in row))
         wide.print(table)
-    table = Table(title="Poles", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    console.print(_poles("Poles", poles))
+    if difference:
+        console.print(_poles("Poles of the other reading of eq. 40", difference))
+
+
+def _pole(mode: Mode) -> dict[str, float]:
+    return {
+        "real_rad_per_s": mode.pole.real,
+        "imag_rad_per_s": mode.pole.imag,
+        "natural_frequency_rad_per_s": mode.natural_frequency,
+        "damping_ratio": mode.damping_ratio,
+    }
+
+
+def _poles(title: str, poles: list[Mode]) -> Table:
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
     for column in ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio"):
         table.add_column(column, justify="right")
     for mode in poles:
@@ -88,4 +127,4 @@ def linearise(
             f"{mode.natural_frequency:.4f}",
             f"{mode.damping_ratio:.4f}",
         )
-    console.print(table)
+    return table

@@ -56,6 +56,11 @@ class NotchSection:
         return A, B, C, gain
 
 
+def default_sections() -> tuple[NotchSection, ...]:
+    """Return the filter that the parameters describe when none is given."""
+    return NotchFilter.from_parameters({}).sections
+
+
 class NotchData(NamedTuple):
     """Discrete sections in series for compiled functions: A (n, 2, 2), B, C (n, 2), D (n), G (n, 2): rest per input."""
 
@@ -91,6 +96,31 @@ def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
         data.D[i] = D + 0.5 * warped * C @ inverse @ B
         data.G[i] = np.linalg.solve(np.eye(2) - data.A[i], data.B[i])
     return data
+
+
+def continuous(sections: Sequence[NotchSection]) -> NotchData:
+    """Return the sections as they are in continuous time (paper eq. 39)."""
+    n = len(sections)
+    data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
+    for i, section in enumerate(sections):
+        data.A[i], data.B[i], data.C[i], data.D[i] = section.state_space()
+        data.G[i] = np.linalg.solve(-data.A[i], data.B[i])
+    return data
+
+
+def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return A (2 n, 2 n), B (2 n), C (2 n), D of all n sections in series, states in the order of flight."""
+    size = 2 * len(data.D)
+    A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
+    for i in range(len(data.D)):
+        rows = slice(2 * i, 2 * i + 2)
+        A[rows] = np.outer(data.B[i], C)
+        A[rows, rows] = data.A[i]
+        B[rows] = data.B[i] * D
+        C = data.D[i] * C
+        C[rows] = data.C[i]
+        D = float(data.D[i] * D)
+    return A, B, C, D
 
 
 @njit(cache=True)

@@ -84,7 +84,8 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
     vehicle = vehicle_parameters("decoupled")
 
     tell("polytopic model", 0, 1)
-    model = design_model(inputs.model, vehicle)
+    notch = tuple(NotchSection(**section.model_dump()) for section in inputs.notch)
+    model = design_model(inputs.model, vehicle, notch)
     polytope = model.polytope
     # The flexible states of the decoupled model follow the rigid ones: gains act on the rigid states alone.
     A, B = polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID]
@@ -131,7 +132,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         nominal_input_bound=problem.input_bound,
         input_minimum=INPUT_MINIMUM.copy(),
         input_maximum=INPUT_MAXIMUM.copy(),
-        notch=tuple(NotchSection(**section.model_dump()) for section in inputs.notch),
+        notch=notch,
     )
     return DesignResult(design, _report(inputs, design, model, feedback, nominal))
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
 
 from hsv.control.design_file import find_file
 from hsv.errors import DesignError
@@ -26,11 +26,16 @@ def _quantity(unit: str) -> BeforeValidator:
     return BeforeValidator(parse)
 
 
+def _listed(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
 Number = Annotated[float, _quantity("1")]
 Length = Annotated[float, _quantity("m")]
 Speed = Annotated[float, _quantity("m/s")]
 Acceleration = Annotated[float, _quantity("m/s^2")]
 Angle = Annotated[float, _quantity("rad")]
+AngleTime = Annotated[float, _quantity("rad s")]
 AngularRate = Annotated[float, _quantity("rad/s")]
 AngularAcceleration = Annotated[float, _quantity("rad/s^2")]
 ElasticCoordinate = Annotated[float, _quantity("kg^0.5 m")]
@@ -89,6 +94,17 @@ class StateScale(RigidScale):
         return np.append(super().array(), elastic)
 
 
+class FilterScale(_Table):
+    """Sizes of the two states of a section of the notch filter that count as equal to those of the vehicle."""
+
+    state_1: Angle = Positive
+    state_2: AngleTime = Positive
+
+    def array(self) -> np.ndarray:
+        """Return the scales (2), SI."""
+        return np.array([self.state_1, self.state_2], float)
+
+
 class GridInputs(_Table):
     """Vertices at grid points over the envelope, weights linear between them."""
 
@@ -99,16 +115,22 @@ class GridInputs(_Table):
 class TensorProductInputs(_Table):
     """Vertices by the tensor-product model transformation: ranks by ``tolerance``, relative, over the scales."""
 
+    functions: Literal["singular", "polynomial"] = "singular"
+    """What spans the model at these ranks, see :func:`hsv.lpv.tensor_product.tensor_product`."""
     tolerance: Number = Field(gt=0.0, lt=1.0)
     altitude_samples: int = Field(ge=5, le=100)
     velocity_samples: int = Field(ge=5, le=100)
     state_scale: StateScale
     input_scale: InputSize
+    filter_scale: FilterScale | None = None
+    """Of the model with the notch filter in it."""
 
 
 class ModelInputs(_Table):
-    """The polytopic model of the decoupled vehicle over the envelope (paper eq. 10-12)."""
+    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 10-12), or of the decoupled vehicle
+    with its notch filter (eq. 44-45)."""
 
+    system: Literal["DM", "ECM"] = "DM"
     period: Duration = Positive
     representation: Literal["tensor_product", "grid"]
     grid: GridInputs
@@ -154,6 +176,19 @@ class NotchInputs(_Table):
     pole_damping: Number = Positive
 
 
+class RampInputs(_Table):
+    """When the commands leave the start, and when they reach the target."""
+
+    start: Duration = Field(ge=0.0)
+    end: Duration = Positive
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.end <= self.start:
+            raise ValueError(f"end = {self.end} s: expected later than start = {self.start} s")
+        return self
+
+
 class DisturbanceInputs(_Table):
     """The declared region over which disturbances are measured (paper eq. 13-19): the nominal step, every corner."""
 
@@ -165,6 +200,8 @@ class DisturbanceInputs(_Table):
     """Factor on everything measured."""
     share: Number = Field(gt=0.0, le=1.0)
     """Share of the inflated set that the invariant set is certified for."""
+    ramp: RampInputs | None = None
+    """The commands go from the nominal start to its target on a ramp; without it, in a step at t = 0."""
 
 
 class InvariantSetInputs(_Table):
@@ -184,8 +221,24 @@ class TighteningInputs(_Table):
     """"literal": the bounds of (35) are those that (30) leaves; "design_bounds": as given, the plan checked by (30)."""
 
 
+class AdjustableInputs(_Table):
+    """The adjustable factor (paper section 4.3): one value, or one for each of the five rigid states."""
+
+    tau: Annotated[list[Number], BeforeValidator(_listed)] = Field(min_length=1, max_length=5)
+
+    @model_validator(mode="after")
+    def _shares(self) -> Self:
+        if len(self.tau) not in (1, 5) or not all(0.0 < value <= 1.0 for value in self.tau):
+            raise ValueError(f"tau = {self.tau}: expected one value, or five, above 0 and at most 1")
+        return self
+
+    def array(self) -> np.ndarray:
+        """Return the factors (5)."""
+        return np.full(5, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
+
+
 class DesignInputs(_Table):
-    """All inputs of a baseline design, SI after reading."""
+    """All inputs of a design, SI after reading; with ``adjustable`` it is that of the paper's section 4."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     description: str
@@ -196,6 +249,7 @@ class DesignInputs(_Table):
     disturbance: DisturbanceInputs
     invariant_set: InvariantSetInputs
     tightening: TighteningInputs
+    adjustable: AdjustableInputs | None = None
 
 
 def parse_inputs(table: dict[str, Any]) -> DesignInputs:

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import ModelInputs
+from hsv.errors import DesignError
 from hsv.lpv.accuracy import model_accuracy, off_grid
 from hsv.lpv.discretisation import zero_order_hold
-from hsv.lpv.grid import grid_polytope, linearise, sample
+from hsv.lpv.grid import Linearised, grid_polytope, linearise, linearise_extended, sample
 from hsv.lpv.polytope import Polytope
 from hsv.lpv.tensor_product import tensor_product
+from hsv.vehicle.dynamics import N_STATES
 from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
+from hsv.vehicle.extended import Filter, from_true_rate
 from hsv.vehicle.parameters import VehicleParameters
 
 _POINTS = 46
@@ -25,36 +31,69 @@ _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
 
 @dataclass(frozen=True)
 class DesignModel:
-    """The model with its weights as a design file keeps them, and the evidence for it (ready for JSON)."""
+    """The model with its weights as a design file keeps them, and the evidence for it (ready for JSON).
+
+    ``polytope``: nine states, as it flies. ``whole``: as it was found; for the ECM with the filtered pitch rate in
+    place of the true one, and the filter's states after the nine.
+    """
 
     polytope: Polytope
+    whole: Polytope
     interpolation: str
     altitude_samples: tuple[np.ndarray, np.ndarray]
     velocity_samples: tuple[np.ndarray, np.ndarray]
     report: dict[str, Any]
 
 
-def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel:
-    """Return the polytopic model of ``vehicle``, decoupled, over the envelope, in the representation asked for.
+def linearised(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection]) -> Linearised:
+    """Return the continuous-time model that ``inputs`` ask for, as a function of altitude (m) and velocity (m/s)."""
+    if inputs.system == "DM":
+        return partial(linearise, vehicle)
+    return partial(linearise_extended, vehicle, Filter(*series(continuous(notch))))
+
+
+def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarray:
+    """Return the sizes (n) of the model's states that count as equal, SI.
 
     Raises:
-        DesignError: Too few samples for the tolerance, or no hull.
+        DesignError: Those of the filter are missing.
     """
-    scales = inputs.tensor_product.state_scale.array(), inputs.tensor_product.input_scale.array()
+    sizes = inputs.tensor_product
+    if inputs.system == "DM":
+        return sizes.state_scale.array()
+    if sizes.filter_scale is None:
+        raise DesignError("model.tensor_product.filter_scale: missing, expected the sizes of the notch filter's states")
+    return np.concatenate((sizes.state_scale.array(), *[sizes.filter_scale.array()] * len(notch)))
+
+
+def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection] = ()) -> DesignModel:
+    """Return the polytopic model of ``vehicle``, decoupled, over the envelope, in the representation asked for.
+
+    Args:
+        inputs: What is asked for.
+        vehicle: Parameters; their inertial coupling is left out.
+        notch: The filter that is a part of the ECM.
+
+    Raises:
+        DesignError: Too few samples for the tolerance, no hull, or scales that are missing.
+    """
+    model = linearised(inputs, vehicle, notch)
+    scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
     singular_values: tuple[np.ndarray, ...] = ()
     if inputs.representation == "grid":
         altitudes = np.linspace(*ALTITUDE_RANGE, inputs.grid.altitude_vertices)
         velocities = np.linspace(*VELOCITY_RANGE, inputs.grid.velocity_vertices)
-        polytope = grid_polytope(vehicle, altitudes, velocities, inputs.period)
+        whole = grid_polytope(model, altitudes, velocities, inputs.period)
         interpolation = "linear"
         altitude_samples = (altitudes, np.eye(len(altitudes)))
         velocity_samples = (velocities, np.eye(len(velocities)))
     else:
-        altitudes = np.linspace(*ALTITUDE_RANGE, inputs.tensor_product.altitude_samples)
-        velocities = np.linspace(*VELOCITY_RANGE, inputs.tensor_product.velocity_samples)
-        samples = sample(vehicle, altitudes, velocities, inputs.period)
-        product = tensor_product(*samples, altitudes, velocities, *scales, inputs.tensor_product.tolerance)
-        polytope, interpolation = product.polytope, "cubic"
+        options = inputs.tensor_product
+        altitudes = np.linspace(*ALTITUDE_RANGE, options.altitude_samples)
+        velocities = np.linspace(*VELOCITY_RANGE, options.velocity_samples)
+        samples = sample(model, altitudes, velocities, inputs.period)
+        product = tensor_product(*samples, altitudes, velocities, *scales, options.tolerance, options.functions)
+        whole, interpolation = product.polytope, "cubic"
         altitude_samples, velocity_samples = product.altitude_samples, product.velocity_samples
         singular_values = product.singular_values
     report = {
@@ -62,28 +101,39 @@ def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignMo
         "vertices": [altitude_samples[1].shape[1], velocity_samples[1].shape[1]],
         "singular_values": [values[:8].tolist() for values in singular_values],
     }
-    return DesignModel(polytope, interpolation, altitude_samples, velocity_samples, report)
+    polytope = whole if inputs.system == "DM" else _vehicle(whole, Filter(*series(continuous(notch))))
+    return DesignModel(polytope, whole, interpolation, altitude_samples, velocity_samples, report)
 
 
-def design_model(inputs: ModelInputs, vehicle: VehicleParameters) -> DesignModel:
-    """Return :func:`polytopic_model` with its accuracy between the samples in the report.
-
-    Raises:
-        DesignError: Too few samples for the tolerance, or no hull.
-    """
-    model = polytopic_model(inputs, vehicle)
+def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection] = ()) -> DesignModel:
+    """Return :func:`polytopic_model` with its accuracy between the samples in the report."""
+    model = polytopic_model(inputs, vehicle, notch)
+    continuous_model = linearised(inputs, vehicle, notch)
 
     def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-        return zero_order_hold(*linearise(vehicle, altitude, velocity), inputs.period)
+        return zero_order_hold(*continuous_model(altitude, velocity), inputs.period)
 
     accuracy = model_accuracy(
-        model.polytope,
+        model.whole,
         exact,
         off_grid(*ALTITUDE_RANGE, _POINTS),
         off_grid(*VELOCITY_RANGE, _POINTS),
-        inputs.tensor_product.state_scale.array(),
+        state_scale(inputs, notch),
         inputs.tensor_product.input_scale.array(),
         _FREQUENCIES,
         inputs.period,
     )
     return replace(model, report=model.report | {"accuracy": accuracy.report()})
+
+
+def _vehicle(whole: Polytope, notch: Filter) -> Polytope:
+    """Return the vehicle's part of the polytopic ECM: with the true pitch rate, no filter state acts on it."""
+    T = from_true_rate(notch)
+    A, B = np.linalg.solve(T, whole.A @ T), np.linalg.solve(T, whole.B)
+    vehicle = slice(N_STATES)
+    return Polytope(
+        np.ascontiguousarray(A[:, vehicle, vehicle]),
+        np.ascontiguousarray(B[:, vehicle]),
+        whole.altitude,
+        whole.velocity,
+    )

@@ -14,6 +14,9 @@ from hsv.lpv.polytope import Polytope, evaluate
 Model = Callable[[float, float], tuple[np.ndarray, np.ndarray]]
 """Discrete-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s)."""
 
+_BODE_POINTS = 6
+"""Altitudes, and velocities, at which Bode plots are compared."""
+
 
 @dataclass(frozen=True)
 class ModelAccuracy:
@@ -48,6 +51,11 @@ def off_grid(low: float, high: float, points: int) -> np.ndarray:
     return low + (high - low) * (np.arange(points) + 0.5) / points
 
 
+def _few(values: np.ndarray) -> list[float]:
+    kept: list[float] = values[np.unique(np.linspace(0, len(values) - 1, _BODE_POINTS).round().astype(int))].tolist()
+    return kept
+
+
 def model_accuracy(
     polytope: Polytope,
     model: Model,
@@ -60,8 +68,8 @@ def model_accuracy(
 ) -> ModelAccuracy:
     """Return the worst deviations of ``polytope`` from ``model`` on all combinations of altitude and velocity.
 
-    The Bode plots, of every state to every input, are compared at the point of the largest Frobenius error, at the
-    corners and in the middle.
+    The Bode plots, of every state to every input, are compared at the point of the largest Frobenius error, and at
+    every combination of about six altitudes and velocities, the outermost among them.
 
     Args:
         polytope: The model to judge.
@@ -87,10 +95,8 @@ def model_accuracy(
         error = float(np.linalg.norm((approximate[i, j] - exact) * scale) / np.linalg.norm((exact - identity) * scale))
         if error > worst:
             worst, worst_point = error, (altitude, velocity)
-    ends = product((float(altitudes[0]), float(altitudes[-1])), (float(velocities[0]), float(velocities[-1])))
-    middle = (float(altitudes[len(altitudes) // 2]), float(velocities[len(velocities) // 2]))
     magnitude, phase = np.zeros((n, m)), np.zeros((n, m))
-    for point in (worst_point, middle, *ends):
+    for point in (worst_point, *product(_few(altitudes), _few(velocities))):
         decibel, degree = bode_difference(
             frequency_response(*polytope.at(*point), frequencies, period),
             frequency_response(*model(*point), frequencies, period),

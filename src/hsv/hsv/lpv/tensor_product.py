@@ -11,6 +11,9 @@ from hsv.lpv.hull import hull_weights
 from hsv.lpv.polytope import Polytope, axis_weights
 
 
+FUNCTIONS = ("singular", "polynomial")
+
+
 @dataclass(frozen=True)
 class TensorProduct:
     """A polytopic model found from samples.
@@ -33,6 +36,7 @@ def tensor_product(
     state_scale: np.ndarray,
     input_scale: np.ndarray,
     tolerance: float,
+    functions: str = "singular",
 ) -> TensorProduct:
     """Return the polytopic model of discrete-time samples on a grid, with a tight hull.
 
@@ -46,11 +50,16 @@ def tensor_product(
         velocities: (n_v) m/s, increasing.
         state_scale: (n) sizes of the states that count as equal, SI.
         input_scale: (m) sizes of the inputs, SI.
-        tolerance: Singular values below this share of the largest are left out.
+        tolerance: Singular values below this share of the largest are left out; the rest are the rank r.
+        functions: What spans the model in a variable: the constant and r - 1 ``"singular"`` functions, which have the
+            least error of all entries together, or the ``"polynomial"`` of degree r - 1, which at a low rank spreads
+            the error more evenly over small and large entries.
 
     Raises:
-        DesignError: Shapes that do not match, too few samples for the rank, or no hull.
+        DesignError: Shapes that do not match, unknown functions, too few samples for the rank, or no hull.
     """
+    if functions not in FUNCTIONS:
+        raise DesignError(f"tensor_product.functions = {functions!r}: expected one of {', '.join(FUNCTIONS)}")
     n, m = B.shape[2:]
     shape = (len(altitudes), len(velocities))
     if A.shape != (*shape, n, n) or B.shape != (*shape, n, m):
@@ -67,9 +76,13 @@ def tensor_product(
         rank = int(np.count_nonzero(values > tolerance * values[0]))
         if rank >= len(breakpoints):
             raise DesignError(f"{len(breakpoints)} samples of rank {rank}: expected more samples or a larger tolerance")
-        # The mean takes the place of one function: with the constant in the basis the weights can sum to one exactly.
-        functions = np.linalg.svd(unfolded - unfolded.mean(axis=0), full_matrices=False)[0][:, : rank - 1]
-        weights.append(hull_weights(breakpoints, functions))
+        # With the constant in the basis, in place of one function, the weights can sum to one exactly.
+        if functions == "singular":
+            basis = np.linalg.svd(unfolded - unfolded.mean(axis=0), full_matrices=False)[0][:, : rank - 1]
+        else:
+            middle, half = 0.5 * (breakpoints[0] + breakpoints[-1]), 0.5 * (breakpoints[-1] - breakpoints[0])
+            basis = np.vander((breakpoints - middle) / half, rank, increasing=True)[:, 1:]
+        weights.append(hull_weights(breakpoints, basis))
         singular_values.append(values / values[0])
 
     inverse = [np.linalg.pinv(w) for w in weights]

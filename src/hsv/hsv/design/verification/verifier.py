@@ -19,7 +19,9 @@ Progress = Callable[[str, int, int], None]
 
 
 def _recomputed_model(subject: Subject) -> Iterable[Claim]:
-    return model_claims(subject, polytopic_model(subject.inputs.model, vehicle_parameters("decoupled")))
+    return model_claims(
+        subject, polytopic_model(subject.inputs.model, vehicle_parameters("decoupled"), subject.design.notch)
+    )
 
 
 SLOW: dict[str, Part] = {
@@ -36,8 +38,7 @@ def load_subject(path: Path) -> Subject:
     Raises:
         DesignError: A file that is missing or malformed.
     """
-    certificate = read_certificate(certificate_path(path))
-    return Subject(read_design(path), certificate)
+    return Subject(read_design(path), read_certificate(certificate_path(path)))
 
 
 def verify(subject: Subject, quick: bool = False, progress: Progress | None = None) -> dict[str, list[Claim]]:
