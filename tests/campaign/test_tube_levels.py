@@ -11,13 +11,13 @@ from hsv.simulation.scenario import load_scenario
 def published_levels(parts, flight):
     """Return what the controller says of each step."""
     h, notch, law = flight.history, parts.notch_filter, parts.tube_law
-    reference, reference_input = flight.reference, flight.reference_input
     for part in (notch, law):
         part.reset()
     levels = []
-    for x, x_n, u_n in zip(h.state, h.deviation, h.nominal_input, strict=True):
+    references = zip(flight.reference, flight.reference_input, strict=True)
+    for x, x_n, u_n, (x_r, u_r) in zip(h.state, h.deviation, h.nominal_input, references, strict=True):
         filtered = notch.step(float(x[4]))
-        result = law.step(x, filtered.filtered_pitch_rate, filtered.filter_state, reference, reference_input, x_n, u_n)
+        result = law.step(x, filtered.filtered_pitch_rate, filtered.filter_state, x_r, u_r, x_n, u_n)
         levels.append(result.level)
     return levels
 

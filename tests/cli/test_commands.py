@@ -190,7 +190,7 @@ def test_bad_input_is_one_line_with_code_2_and_nothing_written(hsv, tmp_path, wo
     ("old", "new", "message"),
     [
         ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key"),
-        ('"600 ft"', '"600 s"', "command.altitude_step = '600 s': wrong unit"),
+        ('"600 ft"', '"600 s"', "command[0].altitude_change = '600 s': wrong unit"),
         ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft"),
         ('"baseline"', '"absent"', "design = 'absent': no such file"),
         ('"baseline"', '"nan.yaml"', "parameter feedback.gain[0] = nan: expected double array"),

@@ -7,6 +7,7 @@ from hsv.control.design_file import find_design, read_design
 from hsv.control.kothare_law import SOLVE_STEPS, KothareLaw
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.design.nominal import nominal_gain
 from hsv.design.nominal_problem import NominalProblem
 from hsv.vehicle.parameters import vehicle_parameters
@@ -15,12 +16,13 @@ from hsv.vehicle.trim import trim
 DESIGN = read_design(find_design("baseline"))
 DATA = nominal_data(DESIGN)
 START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
+TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period)
 STEP = START.state - REFERENCE.state
 
 
 def fly(steps, pause=0.0):
     """Results of a nominal flight, the nominal state measured."""
-    trajectory = NominalTrajectory(DESIGN, REFERENCE, KothareLaw(DESIGN, DATA))
+    trajectory = NominalTrajectory(DESIGN, TRAJECTORY, KothareLaw(DESIGN, DATA))
     results, measured = [], START.state
     for _ in range(steps):
         results.append(trajectory.step(measured))

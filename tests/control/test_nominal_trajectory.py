@@ -13,7 +13,7 @@ from hsv.vehicle.trim import trim
 VALUES = read_parameters(find_design("baseline"))
 DESIGN = read_design(find_design("baseline"))
 START = trim(vehicle_parameters(), 26060.4, 2407.92)
-TARGET = {"reference.altitude": 26243.28, "reference.velocity": 2484.12}
+TARGET = {"reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
 
 
 def nominal(**changes):
@@ -49,7 +49,7 @@ def test_obeys_the_nominal_system_scheduled_by_the_measured_state():
         measured = START.state + np.array([k + 1, 0.3 * (k + 1), *rng.normal(size=7)])
         result = law.step(measured)
         assert_allclose(result.deviation, expected, rtol=1e-11, atol=1e-13)
-        assert_array_equal(result.reference, law.reference.state)
+        assert_array_equal(result.reference, law.reference.final_state)
 
 
 def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
@@ -71,9 +71,9 @@ def test_never_leaves_an_ellipsoid_outwards():
 
 
 def test_at_the_reference_it_rests():
-    law = nominal(**{"reference.altitude": 26060.4, "reference.velocity": 2407.92})
+    law = nominal(**{"reference.altitudes": [26060.4], "reference.velocities": [2407.92]})
     for _ in range(3):
-        result = law.step(law.reference.state)
+        result = law.step(law.reference.final_state)
         assert_array_equal(result.deviation, 0.0)
         assert_array_equal(result.input, 0.0)
 
@@ -130,8 +130,9 @@ def test_results_do_not_change_afterwards():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("reference.altitude", 30000.0), ("reference.velocity", 2484), ("reference.altitude", math.nan)]
+    ("name", "value"),
+    [("reference.altitudes", 30000.0), ("reference.velocities", 2484), ("reference.altitudes", math.nan)],
 )
 def test_a_wrong_reference_is_named(name, value):
-    with pytest.raises(ParameterError, match=rf"parameter {name} = {value}: expected double from"):
-        nominal(**{name: value})
+    with pytest.raises(ParameterError, match=rf"parameter {name}\[0\] = {value}: expected double array from"):
+        nominal(**{name: [value]})

@@ -12,6 +12,7 @@ from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.qp_law import BLOCKS, NEAR_BLOCKS, QpLaw
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import DesignError, ParameterError
 from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
@@ -20,6 +21,7 @@ PATH = find_design("baseline")
 VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
 DATA = nominal_data(DESIGN)
 START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
+TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period)
 STEP = START.state - REFERENCE.state
 BOUNDS = DESIGN.plan_bounds
 MINIMUM, MAXIMUM = BOUNDS.lower, BOUNDS.upper
@@ -28,7 +30,7 @@ FAR = 100.0 * STEP
 
 @pytest.fixture
 def law():
-    return QpLaw(DESIGN, DATA, REFERENCE)
+    return QpLaw(DESIGN, DATA, TRAJECTORY)
 
 
 def rigid():
@@ -102,11 +104,11 @@ def test_input_depends_on_the_deviation_alone(law):
     for scale in (0.9, 0.3, 100.0, 0.7):
         law.step(scale * STEP)
     assert np.array_equal(law.step(STEP).input, first)
-    assert np.array_equal(QpLaw(DESIGN, DATA, REFERENCE).step(STEP).input, first)
+    assert np.array_equal(QpLaw(DESIGN, DATA, TRAJECTORY).step(STEP).input, first)
 
 
 def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
-    values = {**VALUES, "reference.altitude": 26243.28, "reference.velocity": 2484.12}
+    values = {**VALUES, "reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
     settled, times = {}, []
     for name in ("qp", "family"):
         trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
@@ -160,7 +162,7 @@ def test_without_a_plan_a_failure_flies_the_family(law):
 def test_bounds_are_needed_and_must_hold_the_reference():
     with pytest.raises(DesignError, match="expected inside the plan bounds"):
         moved = dataclasses.replace(BOUNDS, input_minimum=REFERENCE.input + 0.01)
-        QpLaw(dataclasses.replace(DESIGN, plan_bounds=moved), DATA, REFERENCE)
+        QpLaw(dataclasses.replace(DESIGN, plan_bounds=moved), DATA, TRAJECTORY)
     prefixes = ("nominal.input_m", "nominal.region")
     without = {name: value for name, value in VALUES.items() if not name.startswith(prefixes)}
     with pytest.raises(DesignError, match=r"nominal.input_minimum: empty, expected U minus F Z"):

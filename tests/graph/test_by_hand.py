@@ -114,7 +114,7 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
             ["design 'baseline': claim fails: tube.centre[0]"],
         ),
         ("hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]),
-        ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocity:=1.0"], ["reference.velocity = 1.0"]),
+        ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]),
         ("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),
         ("hsv_bringup", "recorder", ["-p", "bag.attachments:=[nowhere.txt]"], ["bag.attachments = 'nowhere.txt'"]),
     ],

@@ -106,7 +106,7 @@ def test_derived_coupling_without_notch_diverges(flown):
 def test_the_single_gain_leaves_the_velocity_far_off_at_the_fault(flown):
     # design.md, 7.7: 40 ft/s at 100 s.
     flight, m = flown("case1_single_k")
-    error = flight.history.state[:, 1] - flight.reference[1]
+    error = flight.history.state[:, 1] - flight.reference[:, 1]
     assert abs(error[5000]) == pytest.approx(40 * FOOT, abs=5 * FOOT)
     assert "velocity_settling_time" not in m
 

@@ -92,7 +92,7 @@ def test_perturbing_the_plant_changes_neither_start_nor_reference():
 
 def test_initial_condition_of_the_nominal_trajectory():
     flight = fly(components(**SHORT))
-    assert_array_equal(flight.history.deviation[0], flight.history.state[0] - flight.reference)
+    assert_array_equal(flight.history.deviation[0], flight.history.state[0] - flight.reference[0])
     assert flight.history.filtered_pitch_rate[0] == pytest.approx(0.0, abs=1e-15)
 
 

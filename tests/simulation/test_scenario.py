@@ -29,8 +29,8 @@ def test_case1_is_the_flight_of_the_paper():
     foot = 0.3048
     assert values["initial.altitude"] == pytest.approx(85500 * foot)
     assert values["initial.velocity"] == pytest.approx(7900 * foot)
-    assert values["reference.altitude"] == pytest.approx(86100 * foot)
-    assert values["reference.velocity"] == pytest.approx(8150 * foot)
+    assert values["reference.altitudes"] == pytest.approx([86100 * foot])
+    assert values["reference.velocities"] == pytest.approx([8150 * foot])
     assert values["duration"] == 200.0
     assert values["fault.channels"] == ["elevator_deflection"]
     assert values["fault.values"] == [0.9]
@@ -65,12 +65,16 @@ def test_metres_serve_as_well_as_feet():
         ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
         ("value = 0.9", "value = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of channel, type"),
-        ('"600 ft"', '"600 s"', "command.altitude_step = '600 s': wrong unit, expected a finite quantity such as"),
-        ('"600 ft"', "600", "command.altitude_step = 600: the unit is missing"),
-        ('"600 ft"', '"nan ft"', "command.altitude_step = 'nan ft': "),
-        ('"600 ft"', '"6e999 ft"', "command.altitude_step = '6e999 ft': expected a finite quantity"),
-        ('"600 ft"', '"6000 ft"', "command.altitude_step leads to 91500 ft: expected 85000 ft to 86500 ft"),
-        ('"250 ft/s"', '"2500 ft/s"', "command.velocity_step leads to 10400 ft/s: expected 7700 ft/s to 8300 ft/s"),
+        ('"600 ft"', '"600 s"', "command[0].altitude_change = '600 s': wrong unit, expected a finite quantity such as"),
+        ('"600 ft"', "600", "command[0].altitude_change = 600: the unit is missing"),
+        ('"600 ft"', '"nan ft"', "command[0].altitude_change = 'nan ft': "),
+        ('"600 ft"', '"6e999 ft"', "command[0].altitude_change = '6e999 ft': expected a finite quantity"),
+        ('"600 ft"', '"6000 ft"', "command[0].altitude_change leads to 91500 ft at 0 s: expected 85000 ft to 86500 ft"),
+        (
+            '"250 ft/s"',
+            '"2500 ft/s"',
+            "command[0].velocity_change leads to 10400 ft/s at 0 s: expected 7700 ft/s to 8300 ft/s",
+        ),
         ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft, the flight env"),
         ('"7900 ft/s"', '"7900 ft"', "initial.velocity = '7900 ft': wrong unit"),
         ('duration = "200 s"', 'duration = "-1 s"', "duration = '-1 s': expected a time from 0 s to 100000 s"),
@@ -162,3 +166,43 @@ def test_a_flight_may_have_another_notch_filter_than_its_design():
         ParameterError, match=r"parameter notch.zero_damping: 1 values, expected as many as notch.flown"
     ):
         assemble(flight_parameters(parse_scenario(CASE1 + table, "two")))
+
+
+def test_commands_add_up_to_breakpoints():
+    def scenario(*commands):
+        text = scenario_text("case1").split("[[command]]")[0]
+        return parse_scenario(text + "".join(f"[[command]]\n{c}\n" for c in commands), "x").parameters()
+
+    def shown(values):
+        columns = (values[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
+        return [(t, round(h / 0.3048, 6), round(v / 0.3048, 6)) for t, h, v in zip(*columns, strict=True)]
+
+    assert shown(scenario()) == [(0.0, 85500.0, 7900.0)]
+    ramp = 'altitude_change = "600 ft"\nvelocity_change = "250 ft/s"\nstart = "20 s"\nend = "80 s"'
+    assert shown(scenario(ramp)) == [(20.0, 85500.0, 7900.0), (80.0, 86100.0, 8150.0)]
+    step = 'altitude_change = "-100 ft"\nstart = "50 s"'
+    assert shown(scenario(ramp, step)) == [
+        (20.0, 85500.0, 7900.0),
+        (50.0, 85800.0, 8025.0),
+        (50.0, 85700.0, 8025.0),
+        (80.0, 86000.0, 8150.0),
+    ]
+    at_once = 'velocity_change = "10 ft/s"'
+    assert shown(scenario(at_once, ramp))[0] == (0.0, 85500.0, 7910.0)
+    assert scenario(ramp)["reference.trim"] == "climbing"
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ('start = "20 s"\nend = "10 s"', "command[0].end = 10 s: expected no time before start, 20 s"),
+        ('start = "20"', "command[0].start = '20': "),
+        ('altitude_change = "-600 ft"\nend = "60 s"', "command[0].altitude_change leads to 84900 ft at 60 s: expected"),
+        ('altitude_step = "600 ft"', "command[0].altitude_step: unknown key, expected one of altitude_change, vel"),
+    ],
+)
+def test_a_wrong_command_is_named(command, message):
+    text = scenario_text("case1").split("[[command]]")[0] + f"[[command]]\n{command}\n"
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text, "x")
+    assert message in str(caught.value)

@@ -39,7 +39,7 @@ def test_robust_mpc_loses_altitude_after_the_fault_and_the_tube_does_not(scenari
     changes = {"vehicle.model": "DM", "robust_mpc.gain_index": index}
     robust = fly(components(scenario, controller="robust_mpc", **changes))
     tube = fly(components(scenario, **changes))
-    errors = [abs(flight.history.state[-1, 0] - flight.reference[0]) / FOOT for flight in (robust, tube)]
+    errors = [abs(flight.history.state[-1, 0] - flight.reference[-1, 0]) / FOOT for flight in (robust, tube)]
     assert robust.status is FlightStatus.FINISHED
     assert least < errors[0] < most
     assert errors[1] < 10.0
@@ -50,6 +50,6 @@ def test_integral_action_removes_the_offset_of_a_wrong_mass(mass):
     changes = {"vehicle.perturbation.mass": mass}
     with_integral = fly(components("case1", **changes, **{"integral.rate": 0.1}))
     without = fly(components("case1", **changes))
-    error, offset = (abs(f.history.state[-1, 0] - f.reference[0]) / FOOT for f in (with_integral, without))
+    error, offset = (abs(f.history.state[-1, 0] - f.reference[-1, 0]) / FOOT for f in (with_integral, without))
     assert error < 0.5 < 1.5 < offset
-    assert abs(with_integral.history.state[-1, 1] - with_integral.reference[1]) / FOOT < 0.1
+    assert abs(with_integral.history.state[-1, 1] - with_integral.reference[-1, 1]) / FOOT < 0.1

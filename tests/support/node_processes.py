@@ -19,9 +19,9 @@ coupling = "{coupling}"
 altitude = "85500 ft"
 velocity = "7900 ft/s"
 
-[command]
-altitude_step = "600 ft"
-velocity_step = "250 ft/s"
+[[command]]
+altitude_change = "600 ft"
+velocity_change = "250 ft/s"
 
 [notch]
 enabled = {notch}

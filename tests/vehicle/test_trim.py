@@ -64,10 +64,10 @@ def test_more_mass_takes_more_angle_of_attack_fuel_and_elevator():
     [
         (60000.0, 2400.0, r"altitude = 60000 m, velocity = 2400 m/s: trim needs fuel_equivalence_ratio = -0\.\d+"),
         (40000.0, 2400.0, r"altitude = 40000 m, .*trim needs elevator_deflection = 1\.\d+, expected -0\.523599"),
-        (25908.0, 500.0, r"velocity = 500 m/s: no level equilibrium"),
-        (1e9, 2400.0, r"no level equilibrium"),
-        (-1e6, 2400.0, r"no level equilibrium"),
-        (25908.0, 1e9, r"no level equilibrium"),
+        (25908.0, 500.0, r"velocity = 500 m/s: no equilibrium"),
+        (1e9, 2400.0, r"no equilibrium"),
+        (-1e6, 2400.0, r"no equilibrium"),
+        (25908.0, 1e9, r"no equilibrium"),
         (25908.0, 0.0, r"velocity = 0 m/s: expected a finite altitude and a positive velocity"),
         (25908.0, -2400.0, r"expected a finite altitude and a positive velocity"),
         (math.nan, 2400.0, r"altitude = nan m.*expected a finite altitude"),
@@ -79,3 +79,27 @@ def test_where_there_is_no_trim_the_error_says_why(altitude, velocity, message):
         warnings.simplefilter("error")
         with pytest.raises(TrimError, match=message):
             trim(vehicle_parameters(), altitude, velocity)
+
+
+def test_a_climbing_trim_climbs_and_accelerates_and_nothing_else():
+    vehicle = vehicle_parameters("decoupled")
+    point = trim(vehicle, 26100.0, 2420.0, 3.048, 1.27)
+    np.testing.assert_allclose(rates(point, vehicle), [3.048, 1.27, 0, 0, 0, 0, 0, 0, 0], atol=1e-12)
+    assert point.residual < 1e-12
+    level = trim(vehicle, 26100.0, 2420.0)
+    assert point.state[3] - point.state[2] == pytest.approx(math.asin(3.048 / 2420.0), rel=1e-12)
+    assert point.input[0] > level.input[0]
+
+
+@pytest.mark.parametrize(
+    ("climb_rate", "acceleration", "message"),
+    [
+        (2420.0, 0.0, r"climb rate = 2420 m/s.*expected a climb rate below the velocity"),
+        (math.nan, 0.0, r"climb rate = nan m/s"),
+        (0.0, 30.0, r"acceleration = 30 m/s\^2: trim needs fuel_equivalence_ratio = \d"),
+        (0.0, math.inf, r"acceleration = inf m/s\^2"),
+    ],
+)
+def test_a_climb_that_is_not_flown_is_refused(climb_rate, acceleration, message):
+    with pytest.raises(TrimError, match=message):
+        trim(vehicle_parameters(), 26100.0, 2420.0, climb_rate, acceleration)

@@ -54,6 +54,10 @@ class _Faults(Structure):
     ]
 
 
+class _Reference(Structure):
+    _fields_ = [("first", c_int64), ("rows", c_int64), *((name, _Doubles) for name in ("state", "input", "defect"))]
+
+
 class _History(Structure):
     _fields_ = [("rows", c_int64), *((name, _Doubles) for name in History._fields)]
 
@@ -76,7 +80,7 @@ class CFlight:
         self._kept: list[np.ndarray] = []
         plant, notch, data = components.plant, components.notch_filter.data, nominal.data
         S = data.polytope
-        faults = components.fault_injector.schedule
+        faults, reference = components.fault_injector.schedule, nominal.reference.data
         self._initial = plant.initial.state
         self._rows = plant.steps + 1
         self._arguments: list[Any] = [
@@ -101,8 +105,7 @@ class CFlight:
                     self._doubles(faults.value),
                 )
             ),
-            self._doubles(nominal.reference.state),
-            self._doubles(nominal.reference.input),
+            ctypes.byref(_Reference(reference.first, len(reference.state), *map(self._doubles, reference[1:]))),
         ]
 
     def fly(self) -> History:

@@ -56,6 +56,11 @@ typedef struct {
 } Faults;
 
 typedef struct {
+    int64_t first, rows;
+    const double *state, *input, *defect;
+} Reference;
+
+typedef struct {
     int64_t rows;
     double *state, *filtered_pitch_rate, *deviation, *nominal_input, *gain_index, *u_unsaturated, *command, *actuator;
 } History;
@@ -229,7 +234,7 @@ static void schedule(const Polytope *polytope, double altitude, double velocity,
 }
 
 static void nominal_advance(const Polytope *polytope, double altitude, double velocity, double *deviation,
-                            const double *u_n)
+                            const double *u_n, const double *defect)
 {
     double S[WIDTH], new[N];
     schedule(polytope, altitude, velocity, S);
@@ -240,7 +245,7 @@ static void nominal_advance(const Polytope *polytope, double altitude, double ve
             total += row[j] * deviation[j];
         for (int j = 0; j < M; j++)
             total += row[N + j] * u_n[j];
-        new[i] = total;
+        new[i] = total + defect[i];
     }
     memcpy(deviation, new, sizeof new);
 }
@@ -269,6 +274,12 @@ static void apply_faults(const Faults *faults, int64_t step, const double *comma
             actuator[faults->channel[row]] = faults->value[row] * command[faults->channel[row]];
 }
 
+static int64_t reference_row(const Reference *reference, int64_t step)
+{
+    const int64_t row = step > reference->first ? step - reference->first : 0;
+    return row < reference->rows ? row : reference->rows - 1;
+}
+
 static int in_model_range(const double *x, double angle_limit)
 {
     for (int i = 0; i < N; i++)
@@ -279,16 +290,19 @@ static int in_model_range(const double *x, double angle_limit)
 
 /* Fly as many steps as there are rows, from x; return the number of rows written (fewer: diverged). */
 int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angle_limit, const Notch *notch,
-            const Polytope *polytope, const Family *family, const Tube *tube, const Faults *faults, const double *x_r,
-            const double *u_r, double *x, const History *history)
+            const Polytope *polytope, const Family *family, const Tube *tube, const Faults *faults,
+            const Reference *reference, double *x, const History *history)
 {
     double filter_state[2 * MAX_SECTIONS], x_n[N], u_n[M], total[M], u[M], actuator[M];
     rest(notch, x[PITCH_RATE], filter_state);
+    const double *start = reference->state + reference_row(reference, 0) * N;
     for (int i = 0; i < N; i++)
-        x_n[i] = x[i] - x_r[i];
+        x_n[i] = x[i] - start[i];
     for (int64_t k = 0; k < history->rows; k++) {
         if (k > 0)
             advance(x, actuator, vehicle, period, substeps);
+        const int64_t row = reference_row(reference, k);
+        const double *x_r = reference->state + row * N, *u_r = reference->input + row * M;
         memcpy(history->state + k * N, x, sizeof(double[N]));
         const double q_f = filter_step(notch, filter_state, x[PITCH_RATE]);
         history->filtered_pitch_rate[k] = q_f;
@@ -298,7 +312,7 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
         tube_input(tube, x, q_f, x_r, x_n, u_n, u_r, total, u);
         memcpy(history->u_unsaturated + k * M, total, sizeof total);
         memcpy(history->command + k * M, u, sizeof u);
-        nominal_advance(polytope, x[0], x[1], x_n, u_n);
+        nominal_advance(polytope, x[0], x[1], x_n, u_n, reference->defect + row * N);
         apply_faults(faults, k, u, actuator);
         memcpy(history->actuator + k * M, actuator, sizeof actuator);
         if (!in_model_range(x, angle_limit))

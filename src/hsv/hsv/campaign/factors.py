@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import tomli_w
 
 from hsv.errors import CampaignError
+from hsv.simulation.commands import CommandTable
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario, parse_scenario
 from hsv.units import rounded
@@ -66,13 +67,20 @@ def flown_scenario(base: Scenario, factors: Sequence[Factor], sample: Sequence[f
     initial = {name: values[f"initial_{name}"] for name in ("altitude", "velocity") if f"initial_{name}" in values}
     if initial:
         update["initial"] = base.initial.model_copy(update=initial)
-        goals = dict(zip(("altitude", "velocity"), base.reference, strict=True))
-        steps = {f"{name}_step": rounded(goals[name] - start) for name, start in initial.items()}
-        update["command"] = base.command.model_copy(update=steps)
+        update["command"] = _to_the_same_goals(base, initial)
     fault = {name: values[f"fault_{name}"] for name in ("start", "value") if f"fault_{name}" in values}
     if fault:
         update["fault"] = (base.fault[0].model_copy(update=fault),)
     return base.model_copy(update=update)
+
+
+def _to_the_same_goals(base: Scenario, initial: Mapping[str, float]) -> tuple[CommandTable, ...]:
+    """Return the commands that lead from another start to what ``base`` commands: its step at t = 0 changes."""
+    reference, steps = base.commands, [command for command in base.command if command.end == 0.0]
+    goals = {"altitude": reference.altitudes[0], "velocity": reference.velocities[0]}
+    changes = {f"{axis}_change": sum(getattr(step, f"{axis}_change") for step in steps) for axis in goals}
+    changes |= {f"{axis}_change": rounded(goals[axis] - start) for axis, start in initial.items()}
+    return (CommandTable().model_copy(update=changes), *(c for c in base.command if c.end > 0.0))
 
 
 def scenario_toml(base: Scenario, factors: Sequence[Factor], sample: Sequence[float]) -> str:
@@ -99,8 +107,10 @@ _UNITS = {
     "duration": "s",
     "initial.altitude": "m",
     "initial.velocity": "m/s",
-    "command.altitude_step": "m",
-    "command.velocity_step": "m/s",
+    "command.altitude_change": "m",
+    "command.velocity_change": "m/s",
+    "command.start": "s",
+    "command.end": "s",
     "fault.start": "s",
     "integral.rate": "1/s",
     "notch.zero_frequency": "rad/s",

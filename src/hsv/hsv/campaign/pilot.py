@@ -42,7 +42,7 @@ class Pilot:
         parts = self._parts
         values = {**self.campaign.design, **flown_scenario(self.scenario, self.campaign.factors, sample).parameters()}
         trajectory = parts.nominal_trajectory
-        if any(values[name] != self._nominal[name] for name in ("reference.altitude", "reference.velocity")):
+        if any(values[name] != self._nominal[name] for name in self._nominal if name.startswith("reference.")):
             trajectory = NominalTrajectory.from_parameters(values)
         return fly(
             replace(

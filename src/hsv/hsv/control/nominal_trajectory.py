@@ -11,18 +11,11 @@ from numba import njit
 
 from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import FamilyLaw, NominalData, NominalLaw, NominalStatus
+from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.lpv.polytope import schedule
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
-from hsv.vehicle.parameters import vehicle_parameters
-from hsv.vehicle.trim import Trim, trim
 
 LAWS = ("family", "kothare_online", "qp")
-
-REFERENCE_PARAMETERS = (
-    Parameter("reference.altitude", 26243.28, "commanded altitude, a step at t = 0", "m", *ALTITUDE_RANGE),
-    Parameter("reference.velocity", 2484.12, "commanded velocity, a step at t = 0", "m/s", *VELOCITY_RANGE),
-)
 
 NOMINAL_PARAMETERS = (
     *REFERENCE_PARAMETERS,
@@ -37,12 +30,14 @@ def nominal_advance(
     velocity: float,
     deviation: np.ndarray,
     u_n: np.ndarray,
+    defect: np.ndarray,
     S: np.ndarray,
     new: np.ndarray,
 ) -> bool:
-    """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n (paper eq. 20), p the measured altitude and velocity.
+    """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20), p the measured altitude and velocity.
 
-    ``S`` (n (n + m)) and ``new`` (n) are scratch. Returns whether p lay inside the envelope.
+    ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``S`` (n (n + m)) and ``new``
+    (n) are scratch. Returns whether p lay inside the envelope.
     """
     inside = schedule(polytope, altitude, velocity, S)
     n, m = len(deviation), len(u_n)
@@ -53,7 +48,7 @@ def nominal_advance(
             total += S[row + j] * deviation[j]
         for j in range(m):
             total += S[row + n + j] * u_n[j]
-        new[i] = total
+        new[i] = total + defect[i]
     for i in range(n):
         deviation[i] = new[i]
     return inside
@@ -75,7 +70,7 @@ class NominalResult:
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
-    def __init__(self, design: ControlDesign, reference: Trim, law: NominalLaw | None = None) -> None:
+    def __init__(self, design: ControlDesign, reference: ReferenceTrajectory, law: NominalLaw | None = None) -> None:
         """Fly ``law``, the design's nested family where none is given."""
         self.reference = reference
         self.data = nominal_data(design)
@@ -83,11 +78,11 @@ class NominalTrajectory:
         n, m = design.polytope.B.shape[1:]
         self._deviation = np.zeros(n)
         self._scratch = np.empty(n * (n + m)), np.empty(n)
-        self._started = False
+        self._step = 0
         # Compile now: a cold cache must not stall a flight.
         rest = FamilyLaw(self.data).step(self._deviation).input
         S, new = self._scratch
-        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, S, new)
+        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, reference.data.defect[0], S, new)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
@@ -97,28 +92,33 @@ class NominalTrajectory:
             ParameterError, DesignError, TrimError: A wrong value, named.
         """
         v = check_all(NOMINAL_PARAMETERS, values)
-        reference = trim(vehicle_parameters("decoupled"), v["reference.altitude"], v["reference.velocity"])
         design = ControlDesign.from_parameters(values)
+        reference = ReferenceTrajectory.from_parameters(values, design.period)
         return cls(design, reference, _law(v, design, reference))
 
     def reset(self) -> None:
-        """Forget the past: the next step starts a new nominal trajectory."""
-        self._started = False
+        """Forget the past: the next step is the first of a new nominal trajectory."""
+        self._step = 0
         self.law.reset()
 
     def step(self, state: np.ndarray) -> NominalResult:
         """Return reference and nominal state of this step from the measured ``state`` (9), then advance x_n."""
-        if not self._started:
-            self._deviation[:] = state - self.reference.state
-            self._started = True
+        row = self.reference.row(self._step)
+        _, references, reference_inputs, defects = self.reference.data
+        reference = references[row]
+        if self._step == 0:
+            self._deviation[:] = state - reference
+        self._step += 1
         deviation = self._deviation.copy()
         chosen = self.law.step(deviation)
         S, new = self._scratch
-        in_envelope = nominal_advance(self.data.polytope, state[0], state[1], self._deviation, chosen.input, S, new)
+        in_envelope = nominal_advance(
+            self.data.polytope, state[0], state[1], self._deviation, chosen.input, defects[row], S, new
+        )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
         return NominalResult(
-            self.reference.state,
-            self.reference.input,
+            reference,
+            reference_inputs[row],
             deviation,
             chosen.input,
             chosen.gain,
@@ -132,7 +132,7 @@ def nominal_data(design: ControlDesign) -> NominalData:
     return NominalData(design.polytope.data(), design.nominal_gains, design.nominal_ellipsoids)
 
 
-def _law(values: Mapping[str, Any], design: ControlDesign, reference: Trim) -> NominalLaw | None:
+def _law(values: Mapping[str, Any], design: ControlDesign, reference: ReferenceTrajectory) -> NominalLaw | None:
     # Each law brings a solver that takes time to import and that the others do not need.
     if values["nominal.law"] == "kothare_online":
         from hsv.control.kothare_law import KothareLaw

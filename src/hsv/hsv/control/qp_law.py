@@ -13,8 +13,8 @@ from scipy.linalg import solve_discrete_are
 
 from hsv.control.design_file import N_RIGID, ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import DesignError
-from hsv.vehicle.trim import Trim
 
 PITCH_RATE = 4
 
@@ -42,8 +42,8 @@ class QpLaw:
     depends on x_n alone. Where it fails, the plan before goes on, shifted; where there is none, the family flies.
     """
 
-    def __init__(self, design: ControlDesign, data: NominalData, reference: Trim) -> None:
-        """Prepare the programme for the design's plan bounds.
+    def __init__(self, design: ControlDesign, data: NominalData, reference: ReferenceTrajectory) -> None:
+        """Prepare the programme for the design's plan bounds, less the reference inputs of the whole flight.
 
         Raises:
             DesignError: The design carries none, or the reference input does not lie inside.
@@ -51,16 +51,17 @@ class QpLaw:
         bounds = design.plan_bounds
         if bounds is None:
             raise DesignError("parameter nominal.input_minimum: empty, expected U minus F Z for nominal.law = 'qp'")
-        if np.any(bounds.lower > reference.input) or np.any(bounds.upper < reference.input):
+        inputs = reference.data.input
+        if np.any(bounds.lower > inputs) or np.any(bounds.upper < inputs):
             raise DesignError(
-                f"reference input {reference.input.tolist()}: expected inside the plan bounds, "
-                f"{bounds.lower.tolist()} to {bounds.upper.tolist()}, for nominal.law = 'qp'"
+                f"reference inputs {inputs.min(axis=0).tolist()} to {inputs.max(axis=0).tolist()}: expected inside the "
+                f"plan bounds, {bounds.lower.tolist()} to {bounds.upper.tolist()}, for nominal.law = 'qp'"
             )
         self._family = FamilyLaw(data)
-        self._lower, self._upper = bounds.lower - reference.input, bounds.upper - reference.input
+        self._lower, self._upper = bounds.lower - inputs.min(axis=0), bounds.upper - inputs.max(axis=0)
         self._scale = design.nominal_input_scale
         self._block = round(BLOCK_TIME / design.period)
-        A, B = design.polytope.at(*reference.state[:2])
+        A, B = design.polytope.at(*reference.final_state[:2])
         A, B = A[:N_RIGID, :N_RIGID], B[:N_RIGID]
         Q = design.period * np.diag(1.0 / design.nominal_state_scale**2)
         R = design.period * np.diag(1.0 / self._scale**2)

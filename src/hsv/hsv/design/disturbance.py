@@ -1,8 +1,10 @@
 """Disturbance sets of the error system (paper eq. 13-19): boxes, and the structured set with the one-sided fault.
 
-Delta(k) = x(k+1) - A(p) x(k) - B(p) u(k), with x and u relative to the reference equilibrium and u the commanded input,
-is what the polytopic model does not explain. w = B(p) (P - I) u, the fault, is known exactly: u in it is the *total*
-elevator, trim included. f = Delta - w is the rest: linearisation, interpolation, parameters, flexible coupling.
+Delta(k) = x(k+1) - phi_T(x_r(k), u_r(k)) - A(p) (x(k) - x_r(k)) - B(p) (u(k) - u_r(k)), u the commanded input, is what
+the polytopic model does not explain; the nominal vehicle takes the reference to phi_T = x_r(k+1) + d_r(k), which is x_r
+itself where it is constant (see :mod:`hsv.control.reference_trajectory`). w = B(p) (P - I) u, the fault, is known
+exactly: u in it is the *total* elevator, trim included. f = Delta - w is the rest: linearisation, interpolation,
+parameters, flexible coupling.
 
 The structured set writes the rigid part of Delta as three accelerations held over a period, the lost elevator through
 the column B_e(p), and what remains in altitude and pitch angle; a seventh channel is the part of the feedback that
@@ -60,7 +62,7 @@ def acceleration_channels(vehicle: VehicleParameters, period: float) -> np.ndarr
 
 @dataclass(frozen=True)
 class Record:
-    """What membership needs of a flight, rows k = 0 ... n: x (9), x_n (9), command (2), actuator (2), and x_r, u_r."""
+    """What membership needs of a flight: rows k = 0 ... n of x, x_n (9), command, actuator, x_r, u_r and d_r (9)."""
 
     state: np.ndarray
     deviation: np.ndarray
@@ -68,6 +70,7 @@ class Record:
     actuator: np.ndarray
     reference: np.ndarray
     reference_input: np.ndarray
+    defect: np.ndarray
 
 
 class Signals(NamedTuple):
@@ -107,6 +110,7 @@ class ChannelModel:
             record.actuator,
             record.reference,
             record.reference_input,
+            record.defect,
             *signals,
         )
         return signals
@@ -124,6 +128,7 @@ def _signals(
     actuator: np.ndarray,
     x_r: np.ndarray,
     u_r: np.ndarray,
+    defect: np.ndarray,
     channels: np.ndarray,
     delta: np.ndarray,
     fault: np.ndarray,
@@ -131,17 +136,17 @@ def _signals(
     n, m = state.shape[1], command.shape[1]
     S = np.empty(n * (n + m))
     filter_state = np.zeros(2 * len(notch.D))
-    rest(notch, deviation[0, 4] + x_r[4], filter_state)
+    rest(notch, deviation[0, 4] + x_r[0, 4], filter_state)
     for k in range(len(delta)):
         schedule(polytope, state[k, 0], state[k, 1], S)
         lost = actuator[k, 1] - command[k, 1]
         for i in range(n):
             row = i * (n + m)
-            predicted = x_r[i]
+            predicted = x_r[k + 1, i] + defect[k, i]
             for j in range(n):
-                predicted += S[row + j] * (state[k, j] - x_r[j])
+                predicted += S[row + j] * (state[k, j] - x_r[k, j])
             for j in range(m):
-                predicted += S[row + n + j] * (command[k, j] - u_r[j])
+                predicted += S[row + n + j] * (command[k, j] - u_r[k, j])
             delta[k, i] = state[k + 1, i] - predicted
             fault[k, i] = S[row + n + 1] * lost
         for c in range(3):
@@ -149,7 +154,7 @@ def _signals(
             for j, row in enumerate((1, 2, 4)):
                 channels[k, c] += inverse[c, j] * (delta[k, row] - fault[k, row])
         channels[k, 3] = lost
-        planned = deviation[k, 4] + x_r[4]
+        planned = deviation[k, 4] + x_r[k, 4]
         channels[k, 4] = filter_step(notch, filter_state, planned) - planned
         for c, row in enumerate((0, 3)):
             explained = 0.0

@@ -99,7 +99,7 @@ def tube_errors(state: np.ndarray, deviation: np.ndarray, reference: np.ndarray,
     Args:
         state: (k, 9) x at every step, from the first.
         deviation: (k, 9) x_n.
-        reference: (9) x_r.
+        reference: (k, 9) x_r.
         notch: The discrete filter; it is linear, so its error is the filter's answer to the error of the pitch rate.
     """
     rigid = (state - deviation - reference)[:, :N_RIGID]

@@ -56,8 +56,9 @@ def region_parameters(inputs: DesignInputs) -> dict[str, Any]:
         "vehicle.coupling": region.coupling,
         "initial.altitude": inputs.nominal.start.altitude,
         "initial.velocity": inputs.nominal.start.velocity,
-        "reference.altitude": inputs.nominal.target.altitude,
-        "reference.velocity": inputs.nominal.target.velocity,
+        "reference.times": [0.0],
+        "reference.altitudes": [inputs.nominal.target.altitude],
+        "reference.velocities": [inputs.nominal.target.velocity],
         "fault.channels": ["elevator_deflection"],
         "fault.types": ["loss_of_effectiveness"],
         "fault.values": [region.elevator_effectiveness],
@@ -105,7 +106,7 @@ class Region:
 def record(flight: Flight) -> Record:
     """Return the part of ``flight`` that disturbances are computed from."""
     h = flight.history
-    return Record(h.state, h.deviation, h.command, h.actuator, flight.reference, flight.reference_input)
+    return Record(h.state, h.deviation, h.command, h.actuator, flight.reference, flight.reference_input, flight.defect)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from hsv.control.control_law import ControlLaw
 from hsv.control.nominal_law import FamilyLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
+from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import TubeLaw, tube_input
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.metrics import FlightData
@@ -74,8 +76,7 @@ def _fly(
     nominal: Any,
     tube: Any,
     faults: Any,
-    x_r: np.ndarray,
-    u_r: np.ndarray,
+    reference: Any,
     x: np.ndarray,
     work: np.ndarray,
     history: Any,
@@ -84,7 +85,8 @@ def _fly(
     n, m = len(x), 2
     filter_state = np.zeros(2 * len(notch.D))
     rest(notch, x[4], filter_state)
-    x_n = x - x_r
+    last = len(reference.state) - 1
+    x_n = x - reference.state[min(max(-reference.first, 0), last)]
     S, new = np.empty(n * (n + m)), np.empty(n)
     u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     rows = len(history.filtered_pitch_rate)
@@ -93,6 +95,8 @@ def _fly(
             advance(x, actuator, vehicle, period, substeps, work)
         for i in range(n):
             history.state[k, i] = x[i]
+        row = min(max(k - reference.first, 0), last)
+        x_r, u_r = reference.state[row], reference.input[row]
         q_f = filter_step(notch, filter_state, x[4])
         history.filtered_pitch_rate[k] = q_f
         for i in range(n):
@@ -106,7 +110,7 @@ def _fly(
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
             history.command[k, i] = u[i]
-        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, S, new)
+        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, reference.defect[row], S, new)
         apply_faults(faults, k, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
@@ -117,12 +121,11 @@ def _fly(
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight: ``period`` (s), what happened at each step, reference x_r (9) and u_r (2), time of the first fault."""
+    """A flight: ``period`` (s), what happened at each step, along which reference, time of the first fault."""
 
     period: float
     history: History
-    reference: np.ndarray
-    reference_input: np.ndarray
+    trajectory: ReferenceTrajectory
     fault_start: float | None
     status: FlightStatus
 
@@ -131,13 +134,31 @@ class Flight:
         """Simulated time (n + 1), s."""
         return np.arange(len(self.history.state)) * self.period
 
+    @cached_property
+    def reference(self) -> np.ndarray:
+        """x_r (n + 1, 9)."""
+        return self._along(self.trajectory.data.state)
+
+    @cached_property
+    def reference_input(self) -> np.ndarray:
+        """u_r (n + 1, 2)."""
+        return self._along(self.trajectory.data.input)
+
+    @cached_property
+    def defect(self) -> np.ndarray:
+        """d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`."""
+        return self._along(self.trajectory.data.defect)
+
+    def _along(self, rows: np.ndarray) -> np.ndarray:
+        return np.asarray(rows[self.trajectory.rows(len(self.history.state))])
+
     def data(self) -> FlightData:
         """Return what the metrics are made of."""
         h = self.history
         return FlightData(
             time=self.time,
             state=h.state,
-            reference=np.broadcast_to(self.reference, h.state.shape),
+            reference=self.reference,
             deviation=h.deviation,
             command=h.command,
             saturated=h.command != h.u_unsaturated,
@@ -203,8 +224,7 @@ def _fly_compiled(components: Components, law: TubeLaw) -> History:
         nominal.data,
         law.data,
         components.fault_injector.schedule,
-        nominal.reference.state,
-        nominal.reference.input,
+        nominal.reference.data,
         plant.initial.state.copy(),
         workspace(),
         history,
@@ -213,9 +233,9 @@ def _fly_compiled(components: Components, law: TubeLaw) -> History:
 
 
 def _flight(components: Components, history: History) -> Flight:
-    plant, reference = components.plant, components.nominal_trajectory.reference
+    plant = components.plant
     diverged = not in_model_range(history.state[-1])
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
     starts = components.fault_injector.schedule.start
     fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < len(history.state) else None
-    return Flight(plant.period, history, reference.state, reference.input, fault_start, status)
+    return Flight(plant.period, history, components.nominal_trajectory.reference, fault_start, status)

@@ -8,83 +8,46 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    StrictBool,
-    StrictInt,
-    ValidationError,
-    ValidationInfo,
-)
+from pydantic import Field, StrictBool, StrictInt, ValidationError
 
-from hsv.errors import HsvError, ParameterError, QuantityError, ScenarioError
+from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
+from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
+from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
 from hsv.simulation.metrics import METRICS
-from hsv.units import parse_quantity, rounded
-from hsv.vehicle.envelope import ALTITUDE_RANGE, FOOT, VELOCITY_RANGE
+from hsv.units import parse_quantity
+from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
 from hsv.vehicle.parameters import uncertainty_bounds
 
-
-def _quantity(unit: str, low: float | None = None, high: float | None = None, shown: str = "") -> BeforeValidator:
-    def parse(text: object, info: ValidationInfo) -> float:
-        value = parse_quantity(text, unit, str(info.field_name))
-        if (low is not None and value < low) or (high is not None and value > high):
-            raise QuantityError(f"{info.field_name} = {text!r}: expected {shown}")
-        return value
-
-    return BeforeValidator(parse)
+Altitude = Annotated[float, quantity("m", *ALTITUDE_RANGE, shown=envelope(ALTITUDE_RANGE, "ft"))]
+Velocity = Annotated[float, quantity("m/s", *VELOCITY_RANGE, shown=envelope(VELOCITY_RANGE, "ft/s"))]
+Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]
 
 
-def _range(limits: tuple[float, float], unit: str) -> str:
-    return f"{limits[0] / FOOT:.0f} {unit} to {limits[1] / FOOT:.0f} {unit}, the flight envelope"
-
-
-Altitude = Annotated[float, _quantity("m", *ALTITUDE_RANGE, shown=_range(ALTITUDE_RANGE, "ft"))]
-Velocity = Annotated[float, _quantity("m/s", *VELOCITY_RANGE, shown=_range(VELOCITY_RANGE, "ft/s"))]
-Time = Annotated[float, _quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
-
-
-def _quantities(unit: str) -> BeforeValidator:
-    def parse(given: object, info: ValidationInfo) -> tuple[float, ...]:
-        texts = given if isinstance(given, list | tuple) else [given]
-        return tuple(parse_quantity(text, unit, str(info.field_name)) for text in texts)
-
-    return BeforeValidator(parse)
-
-
-Frequencies = Annotated[tuple[float, ...], _quantities("rad/s")]
-Numbers = Annotated[tuple[float, ...], _quantities("1")]
-
-
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class VehicleTable(_Table):
+class VehicleTable(Table):
     """The simulated vehicle."""
 
     model: Literal["CM", "DM"] = "CM"
     coupling: Literal["paper_like", "derived"] = "paper_like"
-    perturbation: dict[str, Annotated[float, _quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]] = {}
+    perturbation: dict[str, Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]] = Field(
+        default_factory=dict
+    )
 
 
-class InitialTable(_Table):
+class InitialTable(Table):
     """Where the flight starts, in trim."""
 
     altitude: Altitude
     velocity: Velocity
 
 
-class CommandTable(_Table):
-    """Steps of the commands at t = 0."""
+class ReferenceTable(Table):
+    """The equilibrium of a ramp: that of the climb, or static, as if its point stood still."""
 
-    altitude_step: Annotated[float, _quantity("m")] = 0.0
-    velocity_step: Annotated[float, _quantity("m/s")] = 0.0
+    trim: Literal["climbing", "static"] = "climbing"
 
 
-class NotchTable(_Table):
+class NotchTable(Table):
     """The notch filter in flight: the design's, but for what is given here, one value or one a section."""
 
     enabled: StrictBool = True
@@ -94,34 +57,34 @@ class NotchTable(_Table):
     pole_damping: Numbers = ()
 
 
-class NominalTable(_Table):
+class NominalTable(Table):
     """What chooses the nominal input."""
 
     law: Literal["family", "kothare_online", "qp"] = "family"
 
 
-class IntegralTable(_Table):
+class IntegralTable(Table):
     """Integral action on altitude and velocity errors, a named extension of the tube law."""
 
-    rate: Annotated[float, _quantity("1/s", 0.0, 1.0, shown="0 / s to 1 / s")] = 0.0
+    rate: Annotated[float, quantity("1/s", 0.0, 1.0, shown="0 / s to 1 / s")] = 0.0
 
 
-class RobustMpcTable(_Table):
+class RobustMpcTable(Table):
     """The robust MPC controller."""
 
     gain_index: StrictInt = 0
 
 
-class FaultTable(_Table):
+class FaultTable(Table):
     """A scheduled fault."""
 
     channel: str
     type: str
-    value: Annotated[float, _quantity("1")]
+    value: Annotated[float, quantity("1")]
     start: Time
 
 
-class Scenario(_Table):
+class Scenario(Table):
     """A flight: vehicle, initial point, commands, controller design, faults, and what is expected of it."""
 
     name: str
@@ -131,7 +94,8 @@ class Scenario(_Table):
     duration: Time
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
-    command: CommandTable = CommandTable()
+    command: tuple[CommandTable, ...] = ()
+    reference: ReferenceTable = ReferenceTable()
     notch: NotchTable = NotchTable()
     nominal: NominalTable = NominalTable()
     integral: IntegralTable = IntegralTable()
@@ -141,12 +105,9 @@ class Scenario(_Table):
     """Largest magnitude expected of a metric, SI."""
 
     @property
-    def reference(self) -> tuple[float, float]:
-        """Altitude (m) and velocity (m/s) that are commanded from t = 0."""
-        return (
-            rounded(self.initial.altitude + self.command.altitude_step),
-            rounded(self.initial.velocity + self.command.velocity_step),
-        )
+    def commands(self) -> Breakpoints:
+        """Altitudes (m) and velocities (m/s) that are commanded."""
+        return breakpoints(self.initial.altitude, self.initial.velocity, self.command)
 
     def parameters(self) -> dict[str, Any]:
         """Return the flat parameters of this scenario; with those of its design they determine the flight."""
@@ -156,14 +117,14 @@ class Scenario(_Table):
             "vehicle.coupling": self.vehicle.coupling,
             "initial.altitude": self.initial.altitude,
             "initial.velocity": self.initial.velocity,
-            "reference.altitude": self.reference[0],
-            "reference.velocity": self.reference[1],
+            "reference.trim": self.reference.trim,
             "notch.enabled": self.notch.enabled,
             "controller": self.controller,
             "nominal.law": self.nominal.law,
             "integral.rate": self.integral.rate,
             "robust_mpc.gain_index": self.robust_mpc.gain_index,
         }
+        values |= {f"reference.{name}": list(column) for name, column in self.commands._asdict().items()}
         flown = self.notch.model_dump(exclude={"enabled"})
         values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
@@ -251,14 +212,7 @@ def _check(scenario: Scenario) -> None:
             Fault(fault.channel, fault.type, fault.value)
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
-    goals = zip(
-        ("altitude", "velocity"), scenario.reference, (ALTITUDE_RANGE, VELOCITY_RANGE), ("ft", "ft/s"), strict=True
-    )
-    for axis, goal, limits, unit in goals:
-        if not limits[0] <= goal <= limits[1]:
-            raise ScenarioError(
-                f"command.{axis}_step leads to {goal / FOOT:.0f} {unit}: expected {_range(limits, unit)}"
-            )
+    check_envelope(scenario.commands, scenario.command)
 
 
 def _first_problem(error: ValidationError) -> str:

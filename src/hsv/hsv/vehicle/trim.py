@@ -1,78 +1,135 @@
-"""Equilibrium of level flight at a given altitude and velocity (paper eq. 5)."""
+"""Equilibrium of flight at a given altitude and velocity (paper eq. 5): level, or climbing and accelerating."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numba import njit
 
 from hsv.errors import TrimError
-from hsv.vehicle.dynamics import N_STATES, derivative, jacobian
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 from hsv.vehicle.parameters import VehicleParameters
 
-_BALANCED = (1, 2, 4)
-"""The equations to bring to zero: velocity, angle of attack and pitch rate."""
+CONVERGED = 1e-9
+"""Largest remaining imbalance of an equilibrium, SI per second; what Newton's method reaches is rounding, far below."""
+
+INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
+"""Angle of attack (rad), fuel equivalence ratio and elevator deflection (rad): good all over the envelope."""
 
 
 @dataclass(frozen=True)
 class Trim:
-    """An equilibrium: ``state`` (9) and ``input`` (2), SI, and the largest remaining |dx/dt| in SI units per second."""
+    """An equilibrium: ``state`` (9) and ``input`` (2), SI, and the largest remaining imbalance in SI units per second.
+
+    The imbalance is |dx/dt|, less the commanded climb rate and acceleration.
+    """
 
     state: np.ndarray
     input: np.ndarray
     residual: float
 
 
-def trim(vehicle: VehicleParameters, altitude: float, velocity: float) -> Trim:
-    """Return the level, unaccelerated flight at ``altitude`` (m) and ``velocity`` (m/s), to machine precision.
+@njit(cache=True)
+def balance(
+    rigid: Any, path_angle: float, acceleration: float, unknown: np.ndarray, x: np.ndarray, u: np.ndarray
+) -> float:
+    """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the largest remaining imbalance.
 
-    Newton's method in angle of attack, fuel equivalence ratio and elevator deflection with exact derivatives. The
-    elastic coordinates follow: with zero pitching moment they are N_i / omega_i^2, whatever the inertial coupling.
+    Newton's method with exact derivatives in angle of attack, fuel equivalence ratio and elevator deflection, from
+    ``unknown`` (3), which is replaced by the best that was found; the velocity equation, less ``acceleration``
+    (m/s^2), and those of angle of attack and pitch rate go to zero. The pitch angle follows from ``path_angle`` (rad).
+    The elastic coordinates are N_i / omega_i^2: the pitching moment is zero, whatever the inertial coupling.
+
+    Args:
+        rigid: Parameters of the decoupled vehicle.
+        path_angle: Flight-path angle, pitch angle less angle of attack.
+        acceleration: dV/dt.
+        unknown: First guess.
+        x: Altitude and velocity given; the others are written.
+        u: Written.
+    """
+    rates = np.empty(N_STATES)
+    slope, right = np.empty((3, 3)), np.empty(3)
+    trial = unknown.copy()
+    best_size = np.inf
+    x[4:] = 0.0
+    for _ in range(60):
+        x[2], x[3] = trial[0], trial[0] + path_angle
+        u[0], u[1] = trial[1], trial[2]
+        derivative(x, u, rigid, rates)
+        rates[1] -= acceleration
+        size = max(abs(rates[1]), abs(rates[2]), abs(rates[4]))
+        if not np.isfinite(size):
+            break
+        if size >= best_size and best_size < CONVERGED:
+            break  # rounding level: no further step helps
+        if size < best_size:
+            unknown[:] = trial
+            best_size = size
+        A, B = jacobian(x, u, rigid)
+        for i, row in enumerate((1, 2, 4)):
+            # The path angle is given: pitch angle and angle of attack change together.
+            slope[i, 0] = A[row, 2] + A[row, 3]
+            for j in range(N_INPUTS):
+                slope[i, 1 + j] = B[row, j]
+            right[i] = rates[row]
+        if not np.all(np.isfinite(slope)):
+            break
+        trial = trial - np.linalg.solve(slope, right)
+    x[2], x[3] = unknown[0], unknown[0] + path_angle
+    u[0], u[1] = unknown[1], unknown[2]
+    # At zero coordinates the elastic accelerations of the decoupled model are the generalised forces.
+    derivative(x, u, rigid, rates)
+    x[5] = rates[6] / rigid.natural_frequency_1**2
+    x[7] = rates[8] / rigid.natural_frequency_2**2
+    return best_size
+
+
+def trim(
+    vehicle: VehicleParameters, altitude: float, velocity: float, climb_rate: float = 0.0, acceleration: float = 0.0
+) -> Trim:
+    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s), to machine precision.
+
+    Level and unaccelerated, or with V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2);
+    angle of attack and pitch rate do not change, the vehicle does not pitch, and its elastic modes rest.
 
     Raises:
         TrimError: No equilibrium there, or only one outside the input limits.
     """
     where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
+    if climb_rate or acceleration:
+        where += f", climb rate = {climb_rate:.6g} m/s, acceleration = {acceleration:.6g} m/s^2"
     if not (np.isfinite(altitude) and np.isfinite(velocity) and velocity > 0.0):
         raise TrimError(f"{where}: expected a finite altitude and a positive velocity")
-    rigid = vehicle.decoupled()
-    x = np.zeros(N_STATES)
+    if not (abs(climb_rate) < velocity and np.isfinite(acceleration)):
+        raise TrimError(f"{where}: expected a climb rate below the velocity and a finite acceleration")
+    x, u = np.zeros(N_STATES), np.zeros(N_INPUTS)
     x[0], x[1] = altitude, velocity
-    u = np.zeros(2)
-    unknown = np.array([0.03, 0.3, 0.2])
+    try:
+        size = balance(vehicle.decoupled(), math.asin(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
+    except np.linalg.LinAlgError:
+        size = math.inf
+    check_equilibrium(where, size, u)
     rates = np.empty(N_STATES)
-    best, best_size = unknown, np.inf
-    for _ in range(60):
-        x[2] = x[3] = unknown[0]
-        u[:] = unknown[1:]
-        derivative(x, u, rigid, rates)
-        size = float(np.max(np.abs(rates[list(_BALANCED)])))
-        if not np.isfinite(size):
-            break
-        if size >= best_size and best_size < 1e-9:
-            break  # rounding level: no further step helps
-        if size < best_size:
-            best, best_size = unknown.copy(), size
-        A, B = jacobian(x, u, rigid)
-        # Level flight couples pitch angle to angle of attack.
-        slope = np.column_stack((A[:, 2] + A[:, 3], B))[list(_BALANCED)]
-        try:
-            unknown = unknown - np.linalg.solve(slope, rates[list(_BALANCED)])
-        except np.linalg.LinAlgError:
-            break
-    if not best_size < 1e-9:
-        raise TrimError(f"{where}: no level equilibrium there, expected a condition inside the trimmable envelope")
-    x[2] = x[3] = best[0]
-    u = best[1:].copy()
+    derivative(x, u, vehicle, rates)
+    rates[:2] -= climb_rate, acceleration
+    return Trim(x, u, float(np.max(np.abs(rates))))
+
+
+def check_equilibrium(where: str, size: float, u: np.ndarray) -> None:
+    """Refuse what :func:`balance` did not balance, or only with an input ``u`` (2) outside its limits.
+
+    Raises:
+        TrimError: Says ``where`` and why.
+    """
+    if not size < CONVERGED:
+        raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")
     for name, value, low, high in zip(
         ("fuel_equivalence_ratio", "elevator_deflection"), u, INPUT_MINIMUM, INPUT_MAXIMUM, strict=True
     ):
         if not low <= value <= high:
             raise TrimError(f"{where}: trim needs {name} = {value:.6g}, expected {low:.6g} to {high:.6g}")
-    # At zero coordinates the elastic accelerations of the decoupled model are the generalised forces.
-    derivative(x, u, rigid, rates)
-    x[5] = rates[6] / vehicle.natural_frequency_1**2
-    x[7] = rates[8] / vehicle.natural_frequency_2**2
-    derivative(x, u, vehicle, rates)
-    return Trim(x, u, float(np.max(np.abs(rates))))

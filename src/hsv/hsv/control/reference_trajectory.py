@@ -1,0 +1,197 @@
+"""The reference of a flight: piecewise-linear commands and, at each of their points, the equilibrium that flies them.
+
+The reference of a ramp is the climbing, accelerating trim of the nominal decoupled vehicle. It moves, and it does so
+under the vehicle's own dynamics: phi_T(x_r(k), u_r(k)), the nominal vehicle over one period, is x_r(k+1) but for
+
+    d_r(k) = phi_T(x_r(k), u_r(k)) - x_r(k+1),
+
+the defect: the jump of a step or of a ramp's corner, and on a ramp the little by which a sequence of trims is not yet a
+flight. The nominal system is driven by it, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k). To drive it by x_r(k) - x_r(k+1)
+would take the climb itself, some 6 cm a period, for a disturbance: that is right for a static trim alone, which stays
+where it is, phi_T(x_r) = x_r. Where the reference is constant the defect is exactly zero.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numba import njit
+
+from hsv.errors import ParameterError, TrimError
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES
+from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import CONVERGED, INITIAL_GUESS, balance, check_equilibrium
+
+TRIMS = ("climbing", "static")
+
+REFERENCE_PARAMETERS = (
+    Parameter("reference.times", [0.0], "times of the commands, two equal ones: a step", "s", 0.0, 1e5),
+    Parameter("reference.altitudes", [26243.28], "commanded altitudes there, linear between", "m", *ALTITUDE_RANGE),
+    Parameter("reference.velocities", [2484.12], "commanded velocities there, linear between", "m/s", *VELOCITY_RANGE),
+    Parameter("reference.trim", "climbing", "equilibrium of a ramp: climbing, or static as if it stood", choices=TRIMS),
+)
+
+SUBSTEPS = 2
+"""Runge-Kutta steps per period in phi_T, as many as the plant takes unless it is told otherwise."""
+
+
+class ReferenceData(NamedTuple):
+    """Rows for compiled functions: x_r (r, 9), u_r (r, 2), d_r (r, 9); row 0 is that of step ``first``.
+
+    The reference stands still before the first row and after the last.
+    """
+
+    first: int
+    state: np.ndarray
+    input: np.ndarray
+    defect: np.ndarray
+
+
+@njit(cache=True)
+def _trimmed(
+    rigid: Any,
+    command: np.ndarray,
+    rate: np.ndarray,
+    period: float,
+    guess: np.ndarray,
+    state: np.ndarray,
+    inputs: np.ndarray,
+    defect: np.ndarray,
+    size: np.ndarray,
+    work: np.ndarray,
+) -> None:
+    """Fill x_r, u_r, d_r and the imbalance (r) of the equilibria from altitude and velocity (r, 2) and their rates."""
+    rows = len(command)
+    for k in range(rows):
+        if k > 0 and np.all(command[k] == command[k - 1]) and np.all(rate[k] == rate[k - 1]):
+            state[k], inputs[k], size[k] = state[k - 1], inputs[k - 1], size[k - 1]
+            continue
+        state[k, 0], state[k, 1] = command[k, 0], command[k, 1]
+        sine = rate[k, 0] / command[k, 1]
+        if not abs(sine) < 1.0:
+            size[k] = np.inf
+            continue
+        # The trim next to this one is near, but only a fixed start gives the same bits whatever came before.
+        unknown = guess.copy()
+        size[k] = balance(rigid, math.asin(sine), rate[k, 1], unknown, state[k], inputs[k])
+    for k in range(rows):
+        defect[k] = 0.0
+        if k + 1 < rows and not (
+            np.all(command[k] == command[k + 1]) and np.all(rate[k] == 0.0) and np.all(rate[k + 1] == 0.0)
+        ):
+            flown = state[k].copy()
+            advance(flown, inputs[k], rigid, period, SUBSTEPS, work)
+            for i in range(len(flown)):
+                defect[k, i] = flown[i] - state[k + 1, i]
+
+
+class ReferenceTrajectory:
+    """x_r(k), u_r(k) and the defect d_r(k) of every step k, computed once; parts that stand still are stored once."""
+
+    def __init__(
+        self,
+        times: Sequence[float],
+        altitudes: Sequence[float],
+        velocities: Sequence[float],
+        period: float,
+        trim: str = "climbing",
+    ) -> None:
+        """Trim the nominal decoupled vehicle at all points of the commands.
+
+        Args:
+            times: (b) in s, not decreasing; of two equal times the later value holds from there on.
+            altitudes: (b) in m.
+            velocities: (b) in m/s.
+            period: Control period, s.
+            trim: One of :data:`TRIMS`; ``"static"`` takes climb rate and acceleration of a ramp for zero.
+
+        Raises:
+            ParameterError: Arrays of different lengths, or times that decrease.
+            TrimError: No equilibrium, or one outside the input limits; the time is named.
+        """
+        commands = _commands(times, altitudes, velocities)
+        instants = _in_steps(np.asarray(times, float), period)
+        first = max(0, math.ceil(instants[0]) - 2)
+        steps = np.arange(first, max(first, math.ceil(instants[-1])) + 1)
+        command, slope = _evaluate(instants, commands, steps)
+        rate = slope / period if trim == "climbing" else np.zeros_like(slope)
+        rows = len(steps)
+        self.data = ReferenceData(
+            first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
+        )
+        size = np.full(rows, np.inf)
+        rigid = vehicle_parameters("decoupled")
+        _, state, inputs, defect = self.data
+        try:
+            _trimmed(rigid, command, rate, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
+        except np.linalg.LinAlgError as error:
+            raise TrimError("reference: no equilibrium, expected commands inside the trimmable envelope") from error
+        good = (size < CONVERGED) & np.all((inputs >= INPUT_MINIMUM) & (inputs <= INPUT_MAXIMUM), axis=1)
+        for row in np.flatnonzero(~good)[:1]:
+            climb, acceleration = rate[row]
+            where = (
+                f"reference at {steps[row] * period:.6g} s: altitude = {command[row, 0]:.6g} m, "
+                f"velocity = {command[row, 1]:.6g} m/s, climb rate = {climb:.6g} m/s, "
+                f"acceleration = {acceleration:.6g} m/s^2"
+            )
+            check_equilibrium(where, size[row], inputs[row])
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
+        """Build from :data:`REFERENCE_PARAMETERS` for a control ``period`` (s); errors as above."""
+        v = check_all(REFERENCE_PARAMETERS, values)
+        times, altitudes, velocities = (v[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
+        return cls(times, altitudes, velocities, period, v["reference.trim"])
+
+    def row(self, step: int) -> int:
+        """Return the row of :attr:`data` that holds ``step``."""
+        return min(max(step - self.data.first, 0), len(self.data.state) - 1)
+
+    def rows(self, steps: int) -> np.ndarray:
+        """Return the rows of the first ``steps`` steps."""
+        return np.clip(np.arange(steps) - self.data.first, 0, len(self.data.state) - 1)
+
+    @property
+    def final_state(self) -> np.ndarray:
+        """x_r (9) after the last command."""
+        return np.asarray(self.data.state[-1])
+
+
+def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Sequence[float]) -> np.ndarray:
+    if not len(times):
+        raise ParameterError("parameter reference.times: empty, expected at least one time")
+    for name, column in (("altitudes", altitudes), ("velocities", velocities)):
+        if len(column) != len(times):
+            raise ParameterError(
+                f"parameter reference.{name}: {len(column)} values, expected as many as reference.times, {len(times)}"
+            )
+    for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
+        if after < before:
+            raise ParameterError(f"parameter reference.times[{index}] = {after:g}: expected at least {before:g}")
+    return np.column_stack((np.asarray(altitudes, float), np.asarray(velocities, float)))
+
+
+def _in_steps(times: np.ndarray, period: float) -> np.ndarray:
+    """Return ``times`` (s) as step numbers; those that are whole but for the rounding of the division are whole."""
+    steps = times / period
+    whole = np.round(steps)
+    return np.where(np.abs(steps - whole) < 1e-9 * np.maximum(1.0, whole), whole, steps)
+
+
+def _evaluate(instants: np.ndarray, commands: np.ndarray, steps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the commands (r, 2) at whole ``steps`` (r) and their change per step there, from the right."""
+    piece = np.searchsorted(instants, steps, side="right") - 1
+    start, stop = np.clip(piece, 0, None), np.clip(piece + 1, None, len(instants) - 1)
+    length = instants[stop] - instants[start]
+    inside = (piece >= 0) & (length > 0.0)
+    slope = np.zeros((len(steps), commands.shape[1]))
+    slope[inside] = (commands[stop] - commands[start])[inside] / length[inside, None]
+    gone = np.where(inside, steps - instants[start], 0.0)
+    return commands[start] + slope * gone[:, None], slope

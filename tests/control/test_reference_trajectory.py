@@ -1,0 +1,113 @@
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.errors import ParameterError, TrimError
+from hsv.vehicle.dynamics import derivative
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+VEHICLE, PERIOD = vehicle_parameters("decoupled"), 0.02
+LOW, HIGH = (26060.4, 2407.92), (26243.28, 2484.12)
+RAMP = ((20.0, 80.0), (LOW[0], HIGH[0]), (LOW[1], HIGH[1]), PERIOD)
+
+
+def along(trajectory, steps):
+    """States, inputs and defects of every step."""
+    rows = trajectory.rows(steps)
+    return tuple(column[rows] for column in trajectory.data[1:])
+
+
+def test_a_step_at_the_start_is_one_equilibrium_without_defect():
+    trajectory = ReferenceTrajectory([0.0], [HIGH[0]], [HIGH[1]], PERIOD)
+    state, inputs, defect = along(trajectory, 100)
+    expected = trim(VEHICLE, *HIGH)
+    assert len(trajectory.data.state) == 1
+    assert_array_equal(state, np.tile(expected.state, (100, 1)))
+    assert_array_equal(inputs, np.tile(expected.input, (100, 1)))
+    assert_array_equal(defect, 0.0)
+
+
+def test_a_ramp_is_flown_in_the_trim_of_its_climb():
+    state, inputs, _ = along(ReferenceTrajectory(*RAMP), 5000)
+    climb, acceleration = (HIGH[0] - LOW[0]) / 60.0, (HIGH[1] - LOW[1]) / 60.0
+    rates = np.empty(9)
+    for k in range(1000, 4000, 97):
+        derivative(state[k], inputs[k], VEHICLE, rates)
+        assert_allclose(rates, [climb, acceleration, 0, 0, 0, 0, 0, 0, 0], atol=1e-12)
+        assert_allclose(state[k, 0], LOW[0] + climb * (k * PERIOD - 20.0), rtol=1e-14)
+        assert_allclose(state[k, 1], LOW[1] + acceleration * (k * PERIOD - 20.0), rtol=1e-14)
+    for k, point in ((0, LOW), (999, LOW), (4000, HIGH), (4999, HIGH)):
+        assert_array_equal(state[k], trim(VEHICLE, *point).state)
+
+
+@pytest.mark.parametrize("kind", ["climbing", "static"])
+def test_the_defect_is_what_the_nominal_vehicle_does_not_fly_by_itself(kind):
+    state, inputs, defect = along(ReferenceTrajectory(*RAMP, kind), 4200)
+    flown = state.copy()
+    for k in range(len(state) - 1):
+        advance(flown[k], inputs[k], VEHICLE, PERIOD, 2, workspace())
+    moves = np.any(state[1:] != state[:-1], axis=1)
+    assert_array_equal(defect[:-1][moves], (flown[:-1] - state[1:])[moves])
+    assert_array_equal(defect[:-1][~moves], 0.0)
+    if kind == "static":
+        assert_allclose(defect[:-1], state[:-1] - state[1:], atol=1e-12)
+    else:
+        # A sequence of climbing trims is nearly a flight; its corners are jumps of the attitude.
+        assert np.abs(defect[1000:3999, 0]).max() < 1e-6 < 0.05 < np.abs(np.diff(state[1000:3999, 0])).max()
+        assert np.abs(defect[999, 2:4]).min() > 1e-4
+
+
+def test_of_two_equal_times_the_later_value_holds_from_there_on():
+    trajectory = ReferenceTrajectory([5.0, 5.0], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD)
+    state, _, defect = along(trajectory, 300)
+    assert_array_equal(state[249], trim(VEHICLE, *LOW).state)
+    assert_array_equal(state[250], trim(VEHICLE, *HIGH).state)
+    assert np.flatnonzero(np.any(defect, axis=1)).tolist() == [249]
+    assert_allclose(defect[249], state[249] - state[250], atol=1e-12)
+
+
+def test_a_time_that_is_no_step_is_met_by_the_next_one():
+    state, *_ = along(ReferenceTrajectory([0.03, 0.03], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD), 5)
+    assert state[:, 0].tolist() == [LOW[0], LOW[0], HIGH[0], HIGH[0], HIGH[0]]
+    # 0.06 / 0.02 is not 3 in floating point.
+    state, *_ = along(ReferenceTrajectory([0.06, 0.06], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD), 5)
+    assert state[:, 0].tolist() == [LOW[0], LOW[0], LOW[0], HIGH[0], HIGH[0]]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"reference.times": [1.0, 0.5]}, r"reference\.times\[1\] = 0.5: expected at least 1"),
+        ({"reference.times": [-1.0, 0.5]}, r"reference\.times\[0\] = -1.0"),
+        ({"reference.times": []}, r"reference\.times: empty"),
+        ({"reference.times": [0.0]}, r"reference\.altitudes: 2 values, expected as many as reference.times, 1"),
+        ({"reference.velocities": [2407.92]}, r"reference\.velocities: 1 values"),
+        ({"reference.altitudes": [26060.4, math.nan]}, r"reference\.altitudes\[1\] = nan"),
+        (
+            {"reference.altitudes": [26060.4, 30000.0]},
+            r"reference\.altitudes\[1\] = 30000.0: expected .* 25908 to",
+        ),
+        ({"reference.trim": "level"}, r"reference\.trim = 'level': expected one of climbing, static"),
+    ],
+)
+def test_wrong_commands_are_named(changes, message):
+    values = {
+        "reference.times": [0.0, 60.0],
+        "reference.altitudes": [LOW[0], HIGH[0]],
+        "reference.velocities": [LOW[1], HIGH[1]],
+    }
+    with pytest.raises(ParameterError, match=message):
+        ReferenceTrajectory.from_parameters(values | changes, PERIOD)
+
+
+@pytest.mark.parametrize("seconds", [1.0, 0.05])
+def test_a_ramp_that_no_input_flies_is_refused_with_its_time(seconds):
+    times = (20.0, 20.0 + seconds)
+    with pytest.raises(TrimError, match=r"reference at 20 s: .*climb rate = "):
+        ReferenceTrajectory(times, *RAMP[1:])
+    ReferenceTrajectory(times, *RAMP[1:], "static")
