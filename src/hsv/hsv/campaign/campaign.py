@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from hsv.campaign.factors import Factor, factors_of
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_file import find_design, read_design_parameters
 from hsv.errors import CampaignError
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
@@ -125,5 +125,5 @@ def plan(
         raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
     if not 0 <= seed < 2**63:
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
-    design = read_parameters(find_design(scenario.design))
+    design = read_design_parameters(find_design(scenario.design))
     return Campaign(scenario.name, text, design, method, samples, seed, factors, commit)

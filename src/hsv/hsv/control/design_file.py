@@ -236,11 +236,21 @@ def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
 
 def read_design(path: Path) -> ControlDesign:
     """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
+    return _design_in(path, read_parameters(path))
+
+
+def read_design_parameters(path: Path) -> dict[str, Any]:
+    """Return the flat parameters in a parameter file that :func:`read_design` accepts, with its errors."""
+    values = read_parameters(path)
+    _design_in(path, values)
+    return values
+
+
+def _design_in(path: Path, values: Mapping[str, Any]) -> ControlDesign:
     try:
-        return ControlDesign.from_parameters(read_parameters(path))
+        return ControlDesign.from_parameters(values)
     except DesignError as error:
-        message = str(error)
-        raise DesignError(message if message.startswith("design ") else f"{path}: {message}") from error
+        raise DesignError(f"{path}: {error}") from error
 
 
 def find_design(name: str) -> Path:

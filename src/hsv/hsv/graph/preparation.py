@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_file import find_design, read_design_parameters
 from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
@@ -52,7 +52,7 @@ def prepare(
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
     design_file = find_design(scenario.design)
-    design = read_parameters(design_file)
+    design = read_design_parameters(design_file)
     components = assemble({**design, **scenario.parameters()})
     now = datetime.datetime.now(datetime.UTC)
     bag = bag or bags / f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"

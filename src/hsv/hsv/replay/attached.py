@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.control_law import CONTROLLER_PARAMETERS
-from hsv.control.design_file import parse_parameters, read_parameters
+from hsv.control.design_file import parse_parameters, read_design_parameters
 from hsv.errors import RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
 from hsv.graph.description import TOPICS
@@ -45,7 +45,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
     values = attached[DESIGN] | attached[SCENARIO]
     faults = _faults_as_flown(bag, values)
     if design is not None:
-        values = read_parameters(design) | attached[SCENARIO]
+        values = read_design_parameters(design) | attached[SCENARIO]
     return values | faults
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from hsv.control.control_law import control_law
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_file import find_design, read_design_parameters
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.faults.actuator import FaultInjector
@@ -16,8 +16,12 @@ from hsv.vehicle.plant import Plant
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the design's parameters with those of ``scenario`` over them."""
-    return {**read_parameters(find_design(scenario.design)), **scenario.parameters()}
+    """Return the design's parameters with those of ``scenario`` over them.
+
+    Raises:
+        DesignError: Names the design's file and the parameter that is wrong.
+    """
+    return {**read_design_parameters(find_design(scenario.design)), **scenario.parameters()}
 
 
 def assemble(values: Mapping[str, Any]) -> Components:

@@ -1,0 +1,42 @@
+"""A design that cannot be used: the file to blame is named."""
+
+import pytest
+
+from hsv.control.design_file import find_design
+from hsv.simulation.scenario import scenario_text
+
+
+@pytest.fixture
+def wrong(tmp_path):
+    """A design with a wrong value, and a scenario that flies it."""
+    text = find_design("baseline").read_text()
+    (tmp_path / "wrong.yaml").write_text(text.replace("period: 0.02", "period: 1"))
+    (tmp_path / "mine.toml").write_text(scenario_text("case1").replace('"baseline"', '"wrong.yaml"'))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("verify", "wrong.yaml"),
+        ("simulate", "mine.toml"),
+        ("run", "mine.toml"),
+        ("montecarlo", "mine.toml", "--samples", "2", "--seed", "1"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_wrong_value_names_its_file(hsv, wrong, words):
+    ran = hsv(*words)
+    assert ran.code == 2
+    assert ran.error == "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s"
+
+
+def test_a_missing_design_is_named_not_its_certificate(hsv):
+    ran = hsv("verify", "nope.yaml")
+    assert ran.code == 2
+    assert ran.error == "design 'nope.yaml': cannot be read (No such file or directory), expected a parameter file"
+
+
+def test_a_missing_certificate_is_named(hsv, tmp_path):
+    (tmp_path / "alone.yaml").write_text(find_design("baseline").read_text())
+    ran = hsv("verify", "alone.yaml")
+    assert ran.code == 2 and ran.error.startswith("alone.certificate.json: cannot be read")
