@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from hsv_bringup.flow_executor import FlowExecutor
 from hsv_bringup.recorder import RecorderNode
 from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
 from hsv_ctrl.notch_filter import NotchFilterNode
@@ -18,7 +19,10 @@ CONTROLLER_NODES = {"tube_mpc": TubeMpcNode, "robust_mpc": RobustMpcNode}
 
 
 def nodes() -> Iterator[ProcessNode]:
-    """Yield the nodes of the graph; the plant's parameters say which controller flies and whether a recorder writes."""
+    """Yield the nodes of the graph in the order of the data flow.
+
+    The plant's parameters say which controller flies and whether a recorder writes.
+    """
     plant = PlantNode()
     yield plant
     yield NotchFilterNode()
@@ -31,4 +35,4 @@ def nodes() -> Iterator[ProcessNode]:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the graph."""
-    return run_nodes(nodes, "composed", args)
+    return run_nodes(nodes, "composed", args, FlowExecutor)

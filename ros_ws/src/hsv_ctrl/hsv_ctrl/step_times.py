@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 
 import numpy as np
 
+WINDOW = 1000
+"""Steps looked back on: their percentile is taken in flight, once a simulated second."""
+
 
 class StepTimes:
-    """Collects the wall time of a block per step; as text it is their 99th percentile, in ms."""
+    """Collects the wall time of a block per step; as text it is the 99th percentile of the last steps, in ms."""
 
     def __init__(self) -> None:
-        self._seconds: list[float] = []
+        self._seconds: deque[float] = deque(maxlen=WINDOW)
 
     def __enter__(self) -> None:
         self._started = time.perf_counter()

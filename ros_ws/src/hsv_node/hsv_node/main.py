@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor, ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -24,7 +25,12 @@ def run_node(build: Callable[[], ProcessNode], name: str, args: Sequence[str] | 
     return run_nodes(lambda: iter([build()]), name, args)
 
 
-def run_nodes(build: Callable[[], Iterator[ProcessNode]], name: str, args: Sequence[str] | None = None) -> int:
+def run_nodes(
+    build: Callable[[], Iterator[ProcessNode]],
+    name: str,
+    args: Sequence[str] | None = None,
+    executor_class: Callable[[], Executor] = EventsExecutor,
+) -> int:
     """Spin several nodes with one executor, as :func:`run_node` does one, until the first of them finishes."""
     try:
         rclpy.init(args=None if args is None else list(args), signal_handler_options=rclpy.SignalHandlerOptions.NO)
@@ -36,10 +42,13 @@ def run_nodes(build: Callable[[], Iterator[ProcessNode]], name: str, args: Seque
         signal.signal(number, lambda received, _frame: stop.append(received))
     nodes: list[ProcessNode] = []
     try:
-        executor = EventsExecutor()
+        executor = executor_class()
         for node in build():
             nodes.append(node)
             executor.add_node(node)
+        # What was imported and built stays: the collector need not look through it again in flight.
+        gc.collect()
+        gc.freeze()
         while not stop:
             for node in nodes:
                 node.poll()
