@@ -40,7 +40,7 @@ def test_quantities_become_si(text, unit, value):
 @pytest.mark.parametrize(
     ("text", "unit", "problem"),
     [
-        ("85500", "m", "wrong unit"),
+        ("85500", "m", "the unit is missing"),
         (85500, "m", "the unit is missing"),
         (85500.0, "m", "the unit is missing"),
         ("7900 ft", "m/s", "wrong unit"),
@@ -55,7 +55,8 @@ def test_quantities_become_si(text, unit, value):
         (float("nan"), "1", "expected a finite quantity"),
         ("5 degC", "m", "cannot be read"),
         # Angles are no bare numbers, nor bare numbers angles; a frequency is no angular frequency.
-        ("12", "rad", "wrong unit"),
+        ("12", "rad", "the unit is missing"),
+        ("10 %", "m", "wrong unit"),
         ("10 deg", "1", "wrong unit"),
         ("15 Hz", "rad/s", "wrong unit"),
         ("15 1/s", "rad/s", "wrong unit"),

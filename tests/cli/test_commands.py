@@ -161,11 +161,14 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
     [
         (
             ("trim", "--altitude", "85000"),
-            "altitude = '85000': wrong unit, expected a finite quantity such as '85500 ft'",
+            "altitude = '85000': the unit is missing, expected a finite quantity such as '85500 ft'",
         ),
         (("trim", "--altitude", "85000 s"), "altitude = '85000 s': wrong unit"),
         (("trim", "--velocity", "nan ft/s"), "velocity = 'nan ft/s': "),
-        (("trim", "--altitude", "200000 ft"), "altitude = 60960 m, velocity = 2407.92 m/s: trim needs fuel_equiv"),
+        (
+            ("trim", "--altitude", "200000 ft"),
+            "altitude = '200000 ft', velocity = '7900 ft/s': trim needs fuel_equivalence_ratio = -0.114628, expected",
+        ),
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
         (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
         (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_derived"),

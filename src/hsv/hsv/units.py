@@ -76,7 +76,9 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
     try:
         quantity: Any = registry().Quantity(str(text).replace("%", " percent"))
         if quantity.to_root_units().units != _root_units(unit):
-            raise QuantityError(f"{field} = {text!r}: wrong unit, {expected}")
+            raise QuantityError(
+                f"{field} = {text!r}: {'the unit is missing' if _bare(text) else 'wrong unit'}, {expected}"
+            )
         value = rounded(float(quantity.to(unit).magnitude))
     except QuantityError:
         raise
@@ -87,6 +89,14 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
     if not math.isfinite(value):
         raise QuantityError(f"{field} = {text!r}: {expected}")
     return value
+
+
+def _bare(text: object) -> bool:
+    try:
+        float(str(text))
+    except ValueError:
+        return False
+    return True
 
 
 @cache

@@ -39,14 +39,14 @@ def linearise(
     """
     import numpy as np
 
+    from hsv.cli.flight_point import trim_at
     from hsv.control.notch_filter import continuous, default_sections, series
     from hsv.errors import QuantityError
-    from hsv.units import parse_quantity, to_paper
+    from hsv.units import to_paper
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
     from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
     from hsv.vehicle.modes import modes
     from hsv.vehicle.parameters import MODELS, vehicle_parameters
-    from hsv.vehicle.trim import trim
 
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
@@ -55,7 +55,7 @@ def linearise(
     vehicle = vehicle_parameters(coupling)
     if model == "DM":
         vehicle = vehicle.decoupled()
-    point = trim(vehicle, parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity"))
+    point = trim_at(vehicle, altitude, velocity)
     names, state_units = STATE_NAMES, STATE_UNITS
     difference: list[Mode] = []
     if model == "ECM":

@@ -17,13 +17,12 @@ def trim(
 
     Example: hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper
     """
-    from hsv.units import parse_quantity
+    from hsv.cli.flight_point import trim_at
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
     from hsv.vehicle.parameters import vehicle_parameters
-    from hsv.vehicle.trim import trim as solve
 
     vehicle = vehicle_parameters(coupling)
-    result = solve(vehicle, parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity"))
+    result = trim_at(vehicle, altitude, velocity)
     state = zip(STATE_NAMES, zip(result.state.tolist(), STATE_UNITS, strict=True), strict=True)
     inputs = zip(INPUT_NAMES, zip(result.input.tolist(), INPUT_UNITS, strict=True), strict=True)
     force_units = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}

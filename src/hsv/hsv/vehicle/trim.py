@@ -90,19 +90,27 @@ def balance(
 
 
 def trim(
-    vehicle: VehicleParameters, altitude: float, velocity: float, climb_rate: float = 0.0, acceleration: float = 0.0
+    vehicle: VehicleParameters,
+    altitude: float,
+    velocity: float,
+    climb_rate: float = 0.0,
+    acceleration: float = 0.0,
+    where: str = "",
 ) -> Trim:
     """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s), to machine precision.
 
     Level and unaccelerated, or with V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2);
     angle of attack and pitch rate do not change, the vehicle does not pitch, and its elastic modes rest.
 
+    Errors name the condition in SI, or in the words of ``where``.
+
     Raises:
         TrimError: No equilibrium there, or only one outside the input limits.
     """
-    where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
-    if climb_rate or acceleration:
-        where += f", climb rate = {climb_rate:.6g} m/s, acceleration = {acceleration:.6g} m/s^2"
+    if not where:
+        where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
+        if climb_rate or acceleration:
+            where += f", climb rate = {climb_rate:.6g} m/s, acceleration = {acceleration:.6g} m/s^2"
     if not (np.isfinite(altitude) and np.isfinite(velocity) and velocity > 0.0):
         raise TrimError(f"{where}: expected a finite altitude and a positive velocity")
     if not (abs(climb_rate) < velocity and np.isfinite(acceleration)):
@@ -128,8 +136,8 @@ def check_equilibrium(where: str, size: float, u: np.ndarray) -> None:
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")
-    for name, value, low, high in zip(
-        ("fuel_equivalence_ratio", "elevator_deflection"), u, INPUT_MINIMUM, INPUT_MAXIMUM, strict=True
+    for name, unit, value, low, high in zip(
+        ("fuel_equivalence_ratio", "elevator_deflection"), ("", " rad"), u, INPUT_MINIMUM, INPUT_MAXIMUM, strict=True
     ):
         if not low <= value <= high:
-            raise TrimError(f"{where}: trim needs {name} = {value:.6g}, expected {low:.6g} to {high:.6g}")
+            raise TrimError(f"{where}: trim needs {name} = {value:.6g}{unit}, expected {low:.6g} to {high:.6g}{unit}")
