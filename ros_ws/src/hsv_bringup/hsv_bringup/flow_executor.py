@@ -22,7 +22,7 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def __init__(self) -> None:
         super().__init__()
-        self._subscriptions: list[tuple[Callable[..., Any], type, bool, Callable[[Any], None]]] = []
+        self._subscriptions: list[tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]] = []
 
     def add_node(self, node: Node) -> bool:
         """Add a node with the subscriptions that it has now; later ones are left to the base class."""
