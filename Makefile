@@ -44,7 +44,10 @@ lint: setup ## set up, then check style and types
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@source ./env.sh && python3 -m pytest -m "not reference" && python3 tools/references.py
 
+# Without a package index everything else is measured all the same.
 bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--only in_process")
+	-@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
+	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-bench.txt --constraint "$$pins"
 	@$(IN_ENVIRONMENT) hsv bench --out docs/benchmarks.md $(ARGS)
 
 clean: ## remove what set-up and tools made; recorded runs stay
