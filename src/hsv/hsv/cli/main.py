@@ -11,6 +11,7 @@ from hsv.cli.bench import bench
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
+from hsv.cli.figures import figures
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.montecarlo import montecarlo
@@ -58,6 +59,7 @@ for command in (
     recover,
     export,
     bench,
+    figures,
 ):
     app.command()(command)
 app.add_typer(montecarlo, name="montecarlo")

@@ -16,3 +16,4 @@ VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '790
 CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 BagArgument = Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")]
+FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]

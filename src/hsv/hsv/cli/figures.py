@@ -1,0 +1,54 @@
+"""The command ``hsv figures``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import FlightsOption
+from hsv.cli.output import console, errors
+
+
+def figures(
+    only: Annotated[list[int] | None, typer.Option(help="Draw this figure of the paper; may be repeated.")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
+    flights: FlightsOption = Path("bags/study"),
+) -> None:
+    """Draw the paper's figures from this project's designs and flights, to be laid beside the paper's.
+
+    The flights are runs of the graph, recorded to bags that are kept and found again while nothing that they depend on
+    changes. Without the nodes they are flown in this process: the same numbers.
+
+    Example: hsv figures --only 9 --only 11 --out figures
+    """
+    import matplotlib
+
+    from hsv.cli.progress import stages
+    from hsv.errors import QuantityError
+    from hsv.study.figures.catalogue import FIGURES
+    from hsv.study.figures.figure import Material
+    from hsv.study.figures.page import page
+    from hsv.study.figures.style import RC, save
+    from hsv.study.flights import Flights, graph_is_there
+
+    for number in only or ():
+        if number not in FIGURES:
+            raise QuantityError(f"only = {number}: expected one of {', '.join(map(str, FIGURES))}")
+    chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
+    graph = graph_is_there()
+    if not graph and any(figure.scenarios for figure in chosen):
+        errors.print("no built ROS workspace is sourced: flown in this process, the same numbers bit for bit")
+    out.mkdir(parents=True, exist_ok=True)
+    written = []
+    with stages() as progress, matplotlib.rc_context(RC):
+        material = Material(Flights(flights, graph=graph, progress=progress))
+        for done, figure in enumerate(chosen):
+            progress("figures", done, len(chosen))
+            drawing = figure.draw(material)
+            written.append(save(drawing.figure, out / figure.stem))
+            (out / f"{figure.stem}.md").write_text(page(figure, drawing), encoding="utf-8")
+        progress("figures", len(chosen), len(chosen))
+    for figure, paths in zip(chosen, written, strict=True):
+        console.print(f"Figure {figure.number:2}  {', '.join(map(str, paths))}", soft_wrap=True)

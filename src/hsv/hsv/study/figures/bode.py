@@ -1,0 +1,65 @@
+"""Frequency responses that the figures compare, and their panels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from hsv.control.notch_filter import NotchSection
+from hsv.lpv.frequency import bode, frequency_response
+from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.envelope import FOOT
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.trim import trim
+
+START = (85500.0 * FOOT, 7900.0 * FOOT)
+"""Altitude (m) and velocity (m/s) at which Case 1 starts."""
+
+PITCH_RATE, ELEVATOR = 4, 1
+
+
+def notch_response(sections: Iterable[NotchSection], frequencies: np.ndarray) -> np.ndarray:
+    """Return H(j omega) (f) of sections in series (paper eq. 38), ``frequencies`` in rad/s."""
+    s = 1j * np.asarray(frequencies, float)
+    total = np.ones_like(s)
+    for n in sections:
+        zeros = (s / n.zero_frequency) ** 2 + 2.0 * n.zero_damping / n.zero_frequency * s + 1.0
+        poles = (s / n.pole_frequency) ** 2 + 2.0 * n.pole_damping / n.pole_frequency * s + 1.0
+        total = total * zeros / poles
+    return total
+
+
+def pitch_rate_response(vehicle: VehicleParameters, frequencies: np.ndarray) -> np.ndarray:
+    """Return q / delta_e (f), in 1/s, of ``vehicle`` linearised where Case 1 starts; continuous time."""
+    point = trim(vehicle, *START)
+    A, B = jacobian(point.state, point.input, vehicle)
+    return frequency_response(A, B, frequencies)[:, PITCH_RATE, ELEVATOR]
+
+
+def peak(frequencies: np.ndarray, response: np.ndarray, low: float, high: float) -> int:
+    """Return the index of the largest magnitude of a response (f) between two frequencies (rad/s)."""
+    inside = np.flatnonzero((low < frequencies) & (frequencies < high))
+    return int(inside[np.argmax(np.abs(response[inside]))])
+
+
+def bode_lines(
+    magnitude: Axes, phase: Axes, frequencies: np.ndarray, response: np.ndarray, label: str, **style: Any
+) -> None:
+    """Draw a response (f) into a magnitude and a phase panel, phase from -180 deg at the lowest frequency on."""
+    decibel, degree = bode(response)
+    degree = degree - 360.0 * np.round((degree[0] + 90.0) / 360.0)
+    magnitude.semilogx(frequencies, decibel, label=label, **style)
+    phase.semilogx(frequencies, degree, **style)
+
+
+def label_bode(magnitude: Axes, phase: Axes, frequencies: np.ndarray) -> None:
+    """Label the axes of a magnitude and a phase panel."""
+    magnitude.set_ylabel("Magnitude (dB)")
+    phase.set_ylabel("Phase (deg)")
+    phase.set_xlabel("Frequency (rad/s)")
+    for axis in (magnitude, phase):
+        axis.set_xlim(frequencies[0], frequencies[-1])
+        axis.grid(which="minor", linewidth=0.25, alpha=0.25)

@@ -1,0 +1,43 @@
+"""What the outcome of a flight depends on, as one digest: results are kept under it and found again by it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from hsv.control.design_file import find_design
+from hsv.simulation.scenario import load_scenario, scenario_text
+
+_FLOWN = ("control", "faults", "lpv", "simulation", "vehicle")
+"""Packages whose code a flight runs through; the vehicle's table is among them."""
+
+DIGITS = 12
+"""Digits of a digest in the name of a folder: enough that none meets another."""
+
+
+@cache
+def code_digest() -> str:
+    """Return the digest of the code and the vehicle table that a flight runs through."""
+    root = Path(str(files("hsv")))
+    paths = [path for name in _FLOWN for path in root.joinpath(name).glob("*") if path.suffix in (".py", ".toml")]
+    return _digest(path.read_bytes() for path in (*sorted(paths), root / "units.py"))
+
+
+def flight_digest(scenario: str) -> str:
+    """Return the digest of everything that the flight of ``scenario`` (name or path) depends on.
+
+    Raises:
+        ScenarioError, DesignError: No such scenario, or its design is not there.
+    """
+    design = find_design(load_scenario(scenario).design).read_bytes()
+    return _digest((scenario_text(scenario).encode(), design, code_digest().encode()))
+
+
+def _digest(parts: Iterable[bytes]) -> str:
+    total = hashlib.sha256()
+    for part in parts:
+        total.update(hashlib.sha256(part).digest())
+    return total.hexdigest()
