@@ -1,4 +1,5 @@
 import copy
+import dataclasses
 import math
 from pathlib import Path
 
@@ -205,3 +206,36 @@ def test_closed_loop_of_the_shipped_baseline_is_as_fast_as_the_study_says():
     ]
     assert len(rigid) == 20
     assert max(rigid) < 0.994
+
+
+def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_out_where_they_say_nothing():
+    design = read_design(find_design("baseline"))
+    assert not {"feedback.tau", "feedback.tau_minimum", "nominal.filtered"} & design.to_parameters().keys()
+    tau = np.array([0.8, 0.8, 0.9, 0.9, 1.0])
+    adjusted = dataclasses.replace(design, tau=tau, tau_minimum=np.full(5, 0.5), filtered=True)
+    values = adjusted.to_parameters()
+    assert values["feedback.tau_minimum"] == [0.5]
+    again = ControlDesign.from_parameters(values)
+    assert not again.modified and again.filtered
+    assert again.tau.tolist() == tau.tolist() and again.tau_minimum.tolist() == [0.5] * 5
+    # Another certified factor is no modification, another certified range is.
+    assert not ControlDesign.from_parameters(values | {"feedback.tau": [0.6]}).modified
+    assert ControlDesign.from_parameters(values | {"feedback.tau_minimum": [0.7]}).modified
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"feedback.tau": [0.9]}, r"feedback\.tau = 0.9: expected 1"),
+        ({"feedback.tau": [0.6], "feedback.tau_minimum": [0.7]}, r"feedback\.tau = 0.6: expected 0.7 to 1"),
+        ({"feedback.tau_minimum": [0.0]}, r"feedback\.tau_minimum = \[0.0\]: expected values above zero"),
+        ({"feedback.tau_minimum": [0.5, 0.5]}, r"feedback\.tau_minimum: 2 values, expected 1 or 5"),
+        (
+            {"feedback.tau": [0.05], "feedback.tau_minimum": [0.05]},
+            r"feedback\.tau: spectral radius .* expected below 1",
+        ),
+    ],
+)
+def test_a_factor_that_cannot_fly_is_refused(changes, message):
+    with pytest.raises(DesignError, match=message):
+        ControlDesign.from_parameters(read_parameters(find_design("baseline")) | changes)

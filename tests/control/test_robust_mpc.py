@@ -41,7 +41,7 @@ def test_input_that_is_not_a_number_is_told():
 def test_parameters_choose_controller_and_gain():
     law = control_law({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": -1})
     assert isinstance(law, RobustMpc)
-    assert np.array_equal(law.data.gain, DESIGN.nominal_gains[-1])
+    assert np.array_equal(law.data.gains[0], DESIGN.nominal_gains[-1])
     with pytest.raises(ParameterError, match=r"robust_mpc.gain_index = 9: expected -7 to 6"):
         control_law({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": 9})
     with pytest.raises(ParameterError, match=r"controller = 'lucky'"):

@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -5,7 +6,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.control.design_file import find_design, read_design
+from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
+from hsv.errors import ParameterError
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 
 DESIGN = read_design(find_design("baseline"))
@@ -36,14 +39,14 @@ def test_law_is_equation_36(tau):
     rng = np.random.default_rng(1)
     for _ in range(50):
         state, deviation, u_n, rate = REFERENCE + near(rng), near(rng), rng.normal(size=2) * 0.02, rng.normal() * 0.01
-        result = step(TubeLaw(DESIGN, tau), state, rate, deviation, u_n)
+        result = step(TubeLaw(dataclasses.replace(DESIGN, tau=np.full(5, tau))), state, rate, deviation, u_n)
         measured = state.copy()
         measured[4] = rate
         feedback = tau * DESIGN.feedback_gain @ (measured - REFERENCE - deviation)
         assert_allclose(result.u_feedback, feedback, rtol=1e-9, atol=1e-12)
         assert_allclose(result.u_unsaturated, feedback + u_n + REFERENCE_INPUT, rtol=1e-9)
         assert_array_equal(result.input, np.clip(result.u_unsaturated, INPUT_MINIMUM, INPUT_MAXIMUM))
-        assert result.tau == tau
+        assert result.tau.tolist() == [tau]
 
 
 def test_flexible_states_are_not_fed_back():
@@ -100,3 +103,103 @@ def test_law_itself_has_no_memory():
     again = step(law, state, 0.001)
     assert_array_equal(again.input, first.input)
     assert_array_equal(again.u_unsaturated, first.u_unsaturated)
+
+
+def adjustable(minimum=0.5, tau=1.0, **changes):
+    factors = {"tau": np.full(5, tau), "tau_minimum": np.full(5, minimum)}
+    return dataclasses.replace(DESIGN, **factors, **changes)
+
+
+def test_each_rigid_state_has_a_factor_of_its_own():
+    tau = np.array([0.6, 0.7, 0.8, 0.9, 1.0])
+    law = TubeLaw(dataclasses.replace(DESIGN, tau=tau))
+    error = near(np.random.default_rng(2))
+    result = step(law, REFERENCE + error, error[4])
+    assert_allclose(result.u_feedback, DESIGN.feedback_gain[:, :5] @ (tau * error[:5]), rtol=1e-9)
+    assert_array_equal(result.tau, tau)
+
+
+def test_a_change_of_tau_acts_from_the_next_step_on_and_outlives_the_run():
+    law, state = TubeLaw(adjustable()), REFERENCE + near(np.random.default_rng(3))
+    before = [step(law, state).u_feedback for _ in range(3)]
+    assert law.change_tau([0.8]) == 3
+    after = [step(law, state) for _ in range(2)]
+    assert_array_equal(before, np.tile(before[0], (3, 1)))
+    assert [result.tau.tolist() for result in after] == [[0.8], [0.8]]
+    assert_allclose(after[0].u_feedback, 0.8 * before[0], rtol=1e-12)
+    assert law.change_tau([0.7, 0.7, 0.7, 0.7, 1.0]) == 5
+    assert step(law, state).tau.tolist() == [0.7, 0.7, 0.7, 0.7, 1.0]
+    law.reset()
+    assert step(law, state).tau.tolist() == [0.7, 0.7, 0.7, 0.7, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ([0.4], r"feedback\.tau = 0.4: expected 0.5 to 1, the certified range"),
+        ([1.1], r"feedback\.tau = 1.1: expected 0.5 to 1"),
+        ([math.nan], r"feedback\.tau = \[nan\]: expected values above zero"),
+        ([0.8, 0.8], r"feedback\.tau: 2 values, expected 1 or 5"),
+        ([1.0, 0.9, 0.49, 1.0, 1.0], r"feedback\.tau\[2\] = 0.49: expected 0.5 to 1"),
+    ],
+)
+def test_a_factor_that_is_not_certified_is_refused_and_changes_nothing(values, message):
+    law = TubeLaw(adjustable())
+    with pytest.raises(ParameterError, match=message):
+        law.change_tau(values)
+    assert step(law).tau.tolist() == [1.0]
+    with pytest.raises(ParameterError, match=r"= 0\.9: expected 1: no other factor is certified"):
+        TubeLaw(DESIGN).change_tau([0.9])
+
+
+def test_scheduled_changes_come_at_their_times():
+    values = adjustable().to_parameters() | {"tau_change.starts": [0.04, 0.1], "tau_change.values": [0.8, 0.6]}
+    law = TubeLaw.from_parameters(values)
+    assert [step(law).tau[0] for _ in range(7)] == [1.0, 1.0, 0.8, 0.8, 0.8, 0.6, 0.6]
+    law.reset()
+    assert law.change_tau([0.9]) == 0
+    assert [step(law).tau[0] for _ in range(3)] == [0.9, 0.9, 0.8]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"tau_change.starts": [1.0, 2.0], "tau_change.values": [0.8]},
+            r"tau_change\.values: 1 values, expected 2 or 10",
+        ),
+        ({"tau_change.starts": [2.0, 1.0], "tau_change.values": [0.8, 0.7]}, r"tau_change\.starts = \[2.0, 1.0\]"),
+        ({"tau_change.starts": [1.0], "tau_change.values": [0.4]}, r"tau_change\.values = 0.4: expected 0.5 to 1"),
+    ],
+)
+def test_wrong_changes_are_named(changes, message):
+    with pytest.raises(ParameterError, match=message):
+        TubeLaw.from_parameters(adjustable().to_parameters() | changes)
+
+
+def test_filtered_feedback_is_blind_to_what_the_filter_does_to_the_plan():
+    rates = 0.02 * np.sin(np.arange(60))
+    inputs = {}
+    for filtered in (False, True):
+        law, notch = TubeLaw(adjustable(filtered=filtered)), NotchFilter(DESIGN.notch, DESIGN.period)
+        inputs[filtered] = []
+        for rate in rates:
+            x, x_n = REFERENCE.copy(), np.zeros(9)
+            x[4] = x_n[4] = rate
+            measured = notch.step(rate)
+            result = law.step(
+                x, measured.filtered_pitch_rate, measured.filter_state, REFERENCE, REFERENCE_INPUT, x_n, np.zeros(2)
+            )
+            inputs[filtered].append(result.u_feedback)
+    assert np.abs(inputs[True]).max() < 1e-12 < 1e-4 < np.abs(inputs[False]).max()
+
+
+def test_without_the_filter_in_the_loop_filtered_feedback_is_the_plain_one():
+    error = near(np.random.default_rng(4))
+    results = []
+    for filtered in (False, True):
+        law = TubeLaw(adjustable(filtered=filtered))
+        deviation = near(np.random.default_rng(5))
+        x = REFERENCE + error + deviation
+        results.append(law.step(x, x[4], np.empty(0), REFERENCE, REFERENCE_INPUT, deviation, np.zeros(2)).u_feedback)
+    assert_array_equal(*results)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.nominal_law import FamilyLaw
+from hsv.control.notch_filter import NotchData
 from hsv.control.tube_law import TubeLaw
 from hsv.errors import RunError
 from hsv.simulation.closed_loop import Components, History
@@ -43,7 +44,13 @@ class _Family(Structure):
 
 
 class _Tube(Structure):
-    _fields_ = [("tau", c_double), ("gain", _Doubles), ("minimum", _Doubles), ("maximum", _Doubles)]
+    _fields_ = [
+        ("gain_count", c_int64),
+        ("filtered", c_int64),
+        ("starts", _Integers),
+        *((name, _Doubles) for name in ("gains", "minimum", "maximum")),
+        ("notch", _Notch),
+    ]
 
 
 class _Faults(Structure):
@@ -79,7 +86,7 @@ class CFlight:
         self._library.fly.restype = c_int64
         self._kept: list[np.ndarray] = []
         plant, notch, data = components.plant, components.notch_filter.data, nominal.data
-        S = data.polytope
+        S, tube = data.polytope, law.data
         faults, reference = components.fault_injector.schedule, nominal.reference.data
         self._initial = plant.initial.state
         self._rows = plant.steps + 1
@@ -88,7 +95,7 @@ class CFlight:
             c_double(plant.period),
             c_int64(plant.substeps),
             c_double(ANGLE_LIMIT),
-            ctypes.byref(_Notch(len(notch.D), *(self._doubles(getattr(notch, name)) for name in "ABCDG"))),
+            ctypes.byref(self._notch(notch)),
             ctypes.byref(_Polytope(self._doubles(S.S), self._axis(S.altitude), self._axis(S.velocity))),
             ctypes.byref(
                 _Family(
@@ -96,7 +103,13 @@ class CFlight:
                 )
             ),
             ctypes.byref(
-                _Tube(law.data.tau, *(self._doubles(a) for a in (law.data.gain, law.data.minimum, law.data.maximum)))
+                _Tube(
+                    len(tube.gains),
+                    tube.filtered,
+                    self._integers(tube.starts),
+                    *(self._doubles(a) for a in (tube.gains, tube.minimum, tube.maximum)),
+                    self._notch(tube.notch),
+                )
             ),
             ctypes.byref(
                 _Faults(
@@ -126,6 +139,9 @@ class CFlight:
         # The C structures hold addresses only: what they point to must live as long as this object.
         self._kept.append(np.ascontiguousarray(values, kind))
         return self._kept[-1].ctypes.data_as(pointer)
+
+    def _notch(self, notch: NotchData) -> _Notch:
+        return _Notch(len(notch.D), *(self._doubles(getattr(notch, name)) for name in "ABCDG"))
 
     def _axis(self, axis: Any) -> _Axis:
         return _Axis(

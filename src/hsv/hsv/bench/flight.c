@@ -45,8 +45,10 @@ typedef struct {
 } Family;
 
 typedef struct {
-    double tau;
-    const double *gain, *minimum, *maximum;
+    int64_t gain_count, filtered;
+    const int64_t *starts;
+    const double *gains, *minimum, *maximum;
+    Notch notch;
 } Tube;
 
 typedef struct {
@@ -250,16 +252,25 @@ static void nominal_advance(const Polytope *polytope, double altitude, double ve
     memcpy(deviation, new, sizeof new);
 }
 
-static void tube_input(const Tube *tube, const double *x, double filtered_pitch_rate, const double *x_r,
+static int64_t active_gain(const Tube *tube, int64_t step)
+{
+    int64_t index = 0;
+    while (index + 1 < tube->gain_count && tube->starts[index + 1] <= step)
+        index++;
+    return index;
+}
+
+static void tube_input(const Tube *tube, int64_t active, const double *x, double pitch_rate_error, const double *x_r,
                        const double *x_n, const double *u_n, const double *u_r, double *u_total, double *u)
 {
+    const double *gain = tube->gains + active * M * N;
     for (int i = 0; i < M; i++) {
         double feedback = 0.0;
         for (int j = 0; j < N; j++) {
-            const double measured = j == PITCH_RATE ? filtered_pitch_rate : x[j];
-            feedback += tube->gain[i * N + j] * (measured - x_n[j] - x_r[j]);
+            const double error = j == PITCH_RATE ? pitch_rate_error : x[j] - x_n[j] - x_r[j];
+            feedback += gain[i * N + j] * error;
         }
-        u_total[i] = tube->tau * feedback + u_n[i] + u_r[i];
+        u_total[i] = feedback + u_n[i] + u_r[i];
         const double wanted = isfinite(u_total[i]) ? u_total[i] : u_r[i];
         const double above = wanted > tube->minimum[i] ? wanted : tube->minimum[i];
         u[i] = above < tube->maximum[i] ? above : tube->maximum[i];
@@ -293,8 +304,10 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
             const Polytope *polytope, const Family *family, const Tube *tube, const Faults *faults,
             const Reference *reference, double *x, const History *history)
 {
-    double filter_state[2 * MAX_SECTIONS], x_n[N], u_n[M], total[M], u[M], actuator[M];
+    double filter_state[2 * MAX_SECTIONS], planned_state[2 * MAX_SECTIONS], x_n[N], u_n[M], total[M], u[M], actuator[M];
     rest(notch, x[PITCH_RATE], filter_state);
+    memcpy(planned_state, filter_state, 2 * notch->sections * sizeof *planned_state);
+    const int filtered = tube->filtered && notch->sections > 0 && notch->sections == tube->notch.sections;
     const double *start = reference->state + reference_row(reference, 0) * N;
     for (int i = 0; i < N; i++)
         x_n[i] = x[i] - start[i];
@@ -309,7 +322,10 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
         memcpy(history->deviation + k * N, x_n, sizeof x_n);
         history->gain_index[k] = (double)nominal_input(family, x_n, u_n);
         memcpy(history->nominal_input + k * M, u_n, sizeof u_n);
-        tube_input(tube, x, q_f, x_r, x_n, u_n, u_r, total, u);
+        const double pitch_rate_error =
+            filtered ? q_f - filter_step(&tube->notch, planned_state, x_r[PITCH_RATE] + x_n[PITCH_RATE])
+                     : q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE];
+        tube_input(tube, active_gain(tube, k), x, pitch_rate_error, x_r, x_n, u_n, u_r, total, u);
         memcpy(history->u_unsaturated + k * M, total, sizeof total);
         memcpy(history->command + k * M, u, sizeof u);
         nominal_advance(polytope, x[0], x[1], x_n, u_n, reference->defect + row * N);

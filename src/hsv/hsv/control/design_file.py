@@ -6,13 +6,14 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
 
+from hsv.control.adjustable import TAU, TAU_MINIMUM, certified, compact, factors
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS, NotchFilter, NotchSection
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
@@ -32,6 +33,9 @@ DESIGN_PARAMETERS = (
     Parameter("scheduling.velocity.breakpoints", [], "velocities at which weights are given", "m/s"),
     Parameter("scheduling.velocity.weights", [], "weights of the vertices in velocity, a row per breakpoint"),
     Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
+    TAU,
+    TAU_MINIMUM,
+    Parameter("nominal.filtered", False, "feedback on q_f less the filtered rate of the plan (paper eq. 48)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
     Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
@@ -84,8 +88,20 @@ class ControlDesign:
     """The invariant set of the tube error, ``None``: the design carries none."""
     plan_bounds: PlanBounds | None = None
     """What a nominal plan may use, ``None``: the design carries no tightened inputs."""
+    tau: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
+    """Factor (5) of each rigid state's feedback that the design flies with."""
+    tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
+    """Least factor (5) for which the feedback is certified, up to 1."""
+    filtered: bool = False
+    """Whether the feedback acts on the filtered pitch rate less that of the plan through the same filter (eq. 48)."""
     modified: bool = False
     """Whether the parameters differ from those that were written (their digest does not match)."""
+
+    def adjusted_gain(self, tau: np.ndarray) -> np.ndarray:
+        """Return F (2, 9) with the column of each rigid state multiplied by its factor ``tau`` (5)."""
+        gain = self.feedback_gain.copy()
+        gain[:, :N_RIGID] *= tau
+        return gain
 
     def to_parameters(self) -> dict[str, Any]:
         """Return the flat ROS 2 parameters, digest included."""
@@ -112,6 +128,10 @@ class ControlDesign:
             "input.minimum": self.input_minimum,
             "input.maximum": self.input_maximum,
         }
+        adjustable = {"feedback.tau": self.tau, "feedback.tau_minimum": self.tau_minimum}
+        values |= {name: compact(tau) for name, tau in adjustable.items() if np.any(tau != 1.0)}
+        if self.filtered:
+            values["nominal.filtered"] = True
         if self.tube:
             tube = {"centre": self.tube.centre, "shape": self.tube.shape, "half_width": self.tube.half_width}
             values |= {"design.coupling": self.coupling} | {f"tube.{name}": value for name, value in tube.items()}
@@ -133,6 +153,8 @@ class ControlDesign:
         try:
             v = check_all(DESIGN_PARAMETERS, values)
             notch = NotchFilter.from_parameters({**v, "notch.enabled": True})
+            tau_minimum = factors(v["feedback.tau_minimum"], "feedback.tau_minimum")
+            tau = certified(v["feedback.tau"], tau_minimum)
         except ParameterError as error:
             raise DesignError(str(error)) from error
         altitude = _samples(v, "scheduling.altitude")
@@ -164,6 +186,9 @@ class ControlDesign:
             coupling=v["design.coupling"],
             tube=_tube(v, N_RIGID + 2 * len(notch.sections)),
             plan_bounds=_plan_bounds(v),
+            tau=tau,
+            tau_minimum=tau_minimum,
+            filtered=v["nominal.filtered"],
             modified=v["design.hash"] != digest(v),
         )
         if len(design.nominal_gains) != len(design.nominal_ellipsoids):
@@ -174,15 +199,21 @@ class ControlDesign:
         if not np.all(design.input_minimum < design.input_maximum):
             raise DesignError("parameter input.minimum: expected values below input.maximum")
         _check_stable("feedback.gain", A, B, F)
+        _check_stable("feedback.tau", A, B, design.adjusted_gain(tau))
         for gain in design.nominal_gains:
             _check_stable("nominal.gains", A, B, gain)
         return design
 
 
 def digest(values: Mapping[str, Any]) -> str:
-    """Return the SHA-256 of a design's flat parameters, ``design.hash`` and what is empty left out."""
-    known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash"}
-    text = json.dumps({name: values[name] for name in sorted(known & values.keys()) if values[name] not in ([], "")})
+    """Return the SHA-256 of a design's flat parameters.
+
+    Left out are ``design.hash``, ``feedback.tau``, which may be anything certified, and what is empty or as if absent.
+    """
+    known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash", TAU.name}
+    absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False}
+    said = {name: values[name] for name in sorted(known & values.keys()) if values[name] != absent.get(name, "")}
+    text = json.dumps({name: value for name, value in said.items() if value != []})
     return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -6,7 +6,7 @@ know, and is off by default.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Self
 
@@ -33,7 +33,7 @@ class IntegralTubeLaw:
         """Add integral action at ``rate`` k (1/s) to ``law``, sampled at ``period`` (s)."""
         self._law = law
         self._period = period
-        self._gain = rate * law.data.tau * law.data.gain[:, _ALTITUDE_AND_VELOCITY]
+        self._rate = rate
         self._integral = np.zeros(2)
 
     @classmethod
@@ -47,6 +47,10 @@ class IntegralTubeLaw:
         self._integral[:] = 0.0
         self._law.reset()
 
+    def change_tau(self, values: Sequence[float]) -> int:
+        """Change the factor, also of the integral; see :meth:`hsv.control.tube_law.TubeLaw.change_tau`."""
+        return self._law.change_tau(values)
+
     def step(
         self,
         state: np.ndarray,
@@ -58,7 +62,7 @@ class IntegralTubeLaw:
         nominal_input: np.ndarray,
     ) -> TubeResult:
         """Return the input of this step; arguments as in :meth:`hsv.control.tube_law.TubeLaw.step`."""
-        integral_input = self._gain @ self._integral
+        integral_input = (self._rate * self._law.gain[:, _ALTITUDE_AND_VELOCITY]) @ self._integral
         result = self._law.step(
             state,
             filtered_pitch_rate,

@@ -9,7 +9,8 @@ from typing import Any, Self
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.control.tube_law import N_RIGID, TubeData, TubeResult, TubeStatusCode, tube_input
+from hsv.control.notch_filter import discretise
+from hsv.control.tube_law import N_RIGID, PITCH_RATE, TubeData, TubeResult, TubeStatusCode, tube_input
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 
@@ -32,7 +33,10 @@ class RobustMpc:
             raise ParameterError(
                 f"parameter robust_mpc.gain_index = {gain_index}: expected {-len(gains)} to {len(gains) - 1}"
             )
-        self.data = TubeData(gains[gain_index], 1.0, design.input_minimum, design.input_maximum)
+        limits = design.input_minimum, design.input_maximum
+        self.data = TubeData(
+            gains[gain_index][None], np.zeros(1, np.int64), *limits, False, discretise((), design.period)
+        )
         self._none = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
         x, u = self._none
         self.step(x, 0.0, np.empty(0), x, u, x, u)  # compile now: a cold cache must not stall a flight
@@ -63,7 +67,8 @@ class RobustMpc:
         """
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         x_n, u_n = self._none
-        tube_input(self.data, state, filtered_pitch_rate, reference, x_n, u_n, reference_input, u_feedback, total, u)
+        error = filtered_pitch_rate - float(reference[PITCH_RATE])
+        tube_input(self.data, 0, state, error, reference, x_n, u_n, reference_input, u_feedback, total, u)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,
@@ -76,6 +81,6 @@ class RobustMpc:
             u_feedback=u_feedback,
             u_unsaturated=total,
             saturated=u != total,
-            tau=1.0,
+            tau=np.ones(1),
             status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,
         )

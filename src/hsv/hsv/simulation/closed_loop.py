@@ -15,7 +15,7 @@ from hsv.control.nominal_law import FamilyLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.tube_law import TubeLaw, tube_input
+from hsv.control.tube_law import TubeLaw, active_gain, tube_input
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.metrics import FlightData
 from hsv.vehicle.envelope import in_model_range
@@ -85,6 +85,8 @@ def _fly(
     n, m = len(x), 2
     filter_state = np.zeros(2 * len(notch.D))
     rest(notch, x[4], filter_state)
+    planned_state = filter_state.copy()
+    filtered = tube.filtered and 0 < len(notch.D) == len(tube.notch.D)
     last = len(reference.state) - 1
     x_n = x - reference.state[min(max(-reference.first, 0), last)]
     S, new = np.empty(n * (n + m)), np.empty(n)
@@ -105,7 +107,11 @@ def _fly(
         history.gain_index[k] = index
         for i in range(m):
             history.nominal_input[k, i] = u_n[i]
-        tube_input(tube, x, q_f, x_r, x_n, u_n, u_r, u_feedback, total, u)
+        if filtered:
+            pitch_rate_error = q_f - filter_step(tube.notch, planned_state, x_r[4] + x_n[4])
+        else:
+            pitch_rate_error = q_f - x_n[4] - x_r[4]
+        tube_input(tube, active_gain(tube, k), x, pitch_rate_error, x_r, x_n, u_n, u_r, u_feedback, total, u)
         for i in range(m):
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
