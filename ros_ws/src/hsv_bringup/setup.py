@@ -19,6 +19,7 @@ setup(
             "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
             "player = hsv_bringup.player:main",
+            "set_parameter = hsv_bringup.set_parameter:main",
             "stand_in = hsv_bringup.stand_in:main",
         ],
     },

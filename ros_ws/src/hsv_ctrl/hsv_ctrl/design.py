@@ -15,7 +15,7 @@ DEFAULT_DESIGN = "baseline"
 
 
 def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> dict[str, Any]:
-    """Declare the design's parameters on ``node``, the shipped baseline as default, and return their values.
+    """Declare ``extra`` and the design's parameters on ``node``, the shipped baseline as default; return their values.
 
     A design that was changed since it was written is told in a warning: people tune.
     """
@@ -24,7 +24,7 @@ def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> dict[str, A
     except DesignError as error:
         node.get_logger().debug(f"no default design: {error}")
         shipped = {}
-    values = declare(node, (*DESIGN_PARAMETERS, *extra), shipped)
+    values = declare(node, (*extra, *DESIGN_PARAMETERS), shipped)
     if values["design.hash"] != digest(values):
         node.get_logger().warning(f"design {values['design.name']!r}: modified since design")
     return values

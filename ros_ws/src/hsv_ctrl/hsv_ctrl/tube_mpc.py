@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+
+from hsv.control.adjustable import TAU
 from hsv.control.control_law import tube_law
-from hsv.control.integral_action import INTEGRAL_PARAMETERS
-from hsv.control.tube_law import TUBE_PARAMETERS
+from hsv.control.integral_action import INTEGRAL_PARAMETERS, IntegralTubeLaw
+from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
+from hsv.errors import ParameterError
 from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
 from hsv_node.main import run_node
@@ -27,7 +32,21 @@ class TubeMpcNode(ControllerNode):
             self.get_logger().warning(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
-        self.law = tube_law(values)
+        self.law: TubeLaw | IntegralTubeLaw = tube_law(values)
+        self.add_on_set_parameters_callback(self._on_change)
+
+    def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Fly with another ``feedback.tau``, the one parameter that is not read-only, from the next step on."""
+        for parameter in parameters:
+            if parameter.name == TAU.name:
+                try:
+                    step = self.law.change_tau(list(parameter.value))
+                except ParameterError as error:
+                    return SetParametersResult(successful=False, reason=str(error))
+                message = f"{TAU.name} = {list(parameter.value)} from step {step} on"
+                self.get_logger().info(message)
+                return SetParametersResult(successful=True, reason=message)
+        return SetParametersResult(successful=True)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -111,6 +111,7 @@ _UNITS = {
     "command.velocity_change": "m/s",
     "command.start": "s",
     "command.end": "s",
+    "tube.change.start": "s",
     "fault.start": "s",
     "integral.rate": "1/s",
     "notch.zero_frequency": "rad/s",

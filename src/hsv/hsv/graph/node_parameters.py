@@ -46,7 +46,12 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     "plant": (*PLANT_PARAMETERS, *PACE_PARAMETERS),
     "notch_filter": NOTCH_PARAMETERS,
     "nominal_trajectory": (*NOMINAL_PARAMETERS, *DESIGN_PARAMETERS),
-    "tube_mpc": (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS, *DESIGN_PARAMETERS),
+    "tube_mpc": (
+        *INTEGRAL_PARAMETERS,
+        *TUBE_PARAMETERS,
+        *CERTIFICATE_PARAMETERS,
+        *(p for p in DESIGN_PARAMETERS if p.name not in {own.name for own in TUBE_PARAMETERS}),
+    ),
     "robust_mpc": (*ROBUST_MPC_PARAMETERS, *DESIGN_PARAMETERS),
     "fault_injector": FAULT_PARAMETERS,
     "recorder": RECORDER_PARAMETERS,

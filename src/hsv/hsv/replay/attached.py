@@ -1,4 +1,4 @@
-"""What a bag says of how it was made: the parameters attached to it, and what was done to the faults in flight."""
+"""What a bag says of how it was made: the parameters attached to it, and what was changed in flight."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.control_law import CONTROLLER_PARAMETERS
-from hsv.control.design_file import parse_parameters, read_design_parameters
+from hsv.control.design_file import ControlDesign, parse_parameters, read_design_parameters
 from hsv.errors import RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
-from hsv.graph.description import TOPICS
+from hsv.graph.description import TOPICS, TUBE_MPC
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
 from hsv.recording.reader import Bag
@@ -27,7 +28,7 @@ ACTIVE_INPUT = 1e-6
 
 
 def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
-    """Return the flat parameters of a recorded run; faults injected or cleared in flight are part of the schedule.
+    """Return the flat parameters of a recorded run; what was changed in flight, faults and tau, is part of them.
 
     Args:
         bag: A bag of ``hsv run``.
@@ -43,10 +44,10 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
             raise RecordingError(f"{bag.path}: no attachment {name}, expected a bag recorded by hsv run")
         attached[name] = parse_parameters(bag.attachments[name].decode(), f"{bag.path}: {name}")
     values = attached[DESIGN] | attached[SCENARIO]
-    faults = _faults_as_flown(bag, values)
+    changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
     if design is not None:
         values = read_design_parameters(design) | attached[SCENARIO]
-    return values | faults
+    return values | changed
 
 
 def controller_of(values: dict[str, Any]) -> str:
@@ -109,3 +110,21 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
                 injector.inject(fault)
         injector.step(status.step, command)
     return injector.parameters(float(values["period"])) if changed else {}
+
+
+def _tau_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
+    if controller_of(values) != TUBE_MPC.name:
+        return {}
+    design = ControlDesign.from_parameters(values)
+    schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]
+    flown: list[tuple[int, np.ndarray]] = []
+    planned = []
+    for _, status in bag.decode("/hsv/tube_status"):
+        recorded = factors(status.tau, TAU.name)
+        if not flown or np.any(recorded != flown[-1][1]):
+            flown.append((status.step, recorded))
+        planned.append(np.all(recorded == [tau for start, tau in schedule if start <= status.step][-1]))
+    if all(planned):
+        return {}
+    return {TAU.name: flown[0][1].tolist(), **change_parameters(flown[1:], design.period)}

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, ValidationError
 
+from hsv.control.adjustable import factors
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
@@ -63,6 +64,20 @@ class NominalTable(Table):
     law: Literal["family", "kothare_online", "qp"] = "family"
 
 
+class TauChangeTable(Table):
+    """A change of the tube's factor in flight."""
+
+    start: Time
+    tau: Numbers
+
+
+class TubeTable(Table):
+    """The tube's feedback: its factor, the design's where none is given, and its changes; one value, or five."""
+
+    tau: Numbers = ()
+    change: tuple[TauChangeTable, ...] = ()
+
+
 class IntegralTable(Table):
     """Integral action on altitude and velocity errors, a named extension of the tube law."""
 
@@ -98,6 +113,7 @@ class Scenario(Table):
     reference: ReferenceTable = ReferenceTable()
     notch: NotchTable = NotchTable()
     nominal: NominalTable = NominalTable()
+    tube: TubeTable = TubeTable()
     integral: IntegralTable = IntegralTable()
     robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
@@ -128,6 +144,14 @@ class Scenario(Table):
         flown = self.notch.model_dump(exclude={"enabled"})
         values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
+        if self.tube.tau:
+            values["feedback.tau"] = list(self.tube.tau)
+        if self.tube.change:
+            # Flat parameters are of one kind: five factors a change.
+            values["tau_change.starts"] = [change.start for change in self.tube.change]
+            values["tau_change.values"] = [
+                tau for change in self.tube.change for tau in factors(change.tau, "tube.change.tau").tolist()
+            ]
         if self.fault:
             values["fault.channels"] = [fault.channel for fault in self.fault]
             values["fault.types"] = [fault.type for fault in self.fault]
@@ -207,6 +231,11 @@ def _check(scenario: Scenario) -> None:
         if name not in uncertainty_bounds():
             expected = ", ".join(uncertainty_bounds())
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
+    for index, change in enumerate(scenario.tube.change):
+        try:
+            factors(change.tau, f"tube.change[{index}].tau")
+        except ParameterError as error:
+            raise ScenarioError(str(error).removeprefix("parameter ")) from error
     for index, fault in enumerate(scenario.fault):
         try:
             Fault(fault.channel, fault.type, fault.value)

@@ -1,0 +1,53 @@
+"""Sets a parameter of a running node: ``ros2 run hsv_bringup set_parameter tube_mpc feedback.tau "[0.8]"``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Sequence
+
+import rclpy
+import yaml
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+from rclpy.utilities import remove_ros_args
+
+PATIENCE = 10.0
+"""Seconds to wait for the node, and for its answer."""
+
+
+def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
+    """Return what the node says to a new ``value``; not successful as well where no such node answers."""
+    node = rclpy.create_node("set_parameter", enable_rosout=False)
+    try:
+        client = AsyncParameterClient(node, node_name)
+        deadline = time.monotonic() + PATIENCE
+        if client.wait_for_services(PATIENCE):
+            future = client.set_parameters([Parameter(name, value=value)])
+            rclpy.spin_until_future_complete(node, future, timeout_sec=max(0.0, deadline - time.monotonic()))
+            if future.done():
+                return future.result().results[0]
+        return SetParametersResult(successful=False, reason=f"no answer from node {node_name!r} in {PATIENCE:g} s")
+    finally:
+        node.destroy_node()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Set the parameter and print the answer; return 0 only if the node took it."""
+    parser = argparse.ArgumentParser(prog="set_parameter", description=__doc__)
+    parser.add_argument("node", help="name of the node, e.g. tube_mpc")
+    parser.add_argument("parameter", help="e.g. feedback.tau")
+    parser.add_argument("value", help='in YAML, e.g. "[0.8]"')
+    given = list(sys.argv[1:] if args is None else args)
+    asked = parser.parse_args(remove_ros_args(given))
+    rclpy.init(args=given)
+    try:
+        result = set_parameter(asked.node, asked.parameter, yaml.safe_load(asked.value))
+    except (TypeError, yaml.YAMLError) as error:
+        result = SetParametersResult(successful=False, reason=f"value = {asked.value!r}: {error}")
+    finally:
+        rclpy.try_shutdown()
+    print(result.reason or f"{asked.parameter} set", file=sys.stdout if result.successful else sys.stderr)
+    return 0 if result.successful else 1
