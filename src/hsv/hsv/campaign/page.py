@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.campaign.pilot import Pilot
 from hsv.campaign.summary import Results, distributions, limits, shares, worst_flights
 from hsv.errors import CampaignError
 from hsv.recording.report import text
+from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import compressed
 from hsv.simulation.closed_loop import Flight
 
-POINTS = 5000
-"""Flights that scatter plots draw at most: of more, every n-th."""
+POINTS = 2000
+"""Flights that scatter plots draw at most, of more every n-th; not by WebGL, of which browsers give a page but little."""
 
 BINS = 60
 
@@ -56,7 +56,8 @@ def render(results: Results) -> str:
         title=results.campaign.scenario.title,
         result=results.path.name,
         shares=shares(results),
-        distributions=shown,
+        distributions=[d for d in shown if d.minimum < d.maximum],
+        constant=[d for d in shown if d.minimum == d.maximum],
         units={d.name: d.unit for d in shown},
         worst=worst,
         points=POINTS,
@@ -66,8 +67,8 @@ def render(results: Results) -> str:
         style=_shared("style.css"),
         script=Markup(files("hsv.campaign").joinpath("template", "page.js").read_text(encoding="utf-8")),
         charts=_shared("charts.js"),
-        data=_data(results, [d.name for d in shown], worst[0].flight),
-        library=Markup(compressed(get_plotlyjs().encode())),
+        data=_data(results, [d.name for d in shown if d.minimum < d.maximum], worst[0].flight),
+        library=Markup(compressed(LIBRARY.read_bytes())),
     )
 
 
@@ -82,7 +83,7 @@ def _data(results: Results, names: Sequence[str], worst: int) -> dict[str, Any]:
                 "unit": units[name],
                 "limit": stated.get(name),
                 "values": _packed(values[drawn]),
-                **_histogram(values),
+                **histogram(values),
             }
             for name, values in columns.items()
         },
@@ -104,8 +105,17 @@ def _drawn(results: Results) -> np.ndarray:
     return np.arange(0, n, -(-n // POINTS))
 
 
-def _histogram(values: np.ndarray) -> dict[str, list[float]]:
-    counts, edges = np.histogram(values[np.isfinite(values)], BINS)
+def histogram(values: np.ndarray) -> dict[str, list[float]]:
+    """Return counts and edges of at most :data:`BINS` bars over the finite ``values``."""
+    values = values[np.isfinite(values)]
+    distinct = np.unique(values.round(9))
+    bins: int | np.ndarray = min(BINS, max(10, 2 * round(np.sqrt(len(values)))))
+    if 1 < len(distinct) <= BINS:
+        # Times are whole control periods and counts whole numbers: a bar for each, not a comb.
+        spacing = float(np.min(np.diff(distinct)))
+        bars = round((distinct[-1] - distinct[0]) / spacing) + 1
+        bins = distinct[0] + spacing * (np.arange(bars + 1) - 0.5) if bars <= BINS else bins
+    counts, edges = np.histogram(values, bins)
     return {"counts": counts.tolist(), "edges": edges.tolist()}
 
 

@@ -62,7 +62,7 @@ function scatter(data, name) {
   const shapes = limitLines(metric.limit, "y").filter((line) => line.y0 >= low && line.y0 <= high);
   for (const factor of data.factors) {
     draw(`scatter-${factor.name}`, [{
-      type: "scattergl", mode: "markers", x: unpack(factor.values), y, text: [...flights].map((flight) => `flight ${flight}`),
+      type: "scatter", mode: "markers", x: unpack(factor.values), y, text: [...flights].map((flight) => `flight ${flight}`),
       marker: { size: 4, opacity: 0.5, color: css("--run0") }, hovertemplate: "%{text}: %{x:.4g}, %{y:.5g}<extra></extra>",
     }], layout(factor.unit === "1" ? "" : factor.unit, `${name.replaceAll("_", " ")}${metric.unit === "1" ? "" : ` [${metric.unit}]`}`, { shapes }));
   }
@@ -74,14 +74,14 @@ async function start() {
     script.textContent = new TextDecoder().decode(await inflate("library"));
     document.head.append(script);
     const data = JSON.parse(document.getElementById("data").textContent);
-    const form = document.getElementById("toolbar"), all = () => {
+    const form = document.getElementById("metric"), all = () => {
       envelopes(data.envelope);
       histograms(data.metrics);
-      scatter(data, form.elements.metric.value);
+      if (form) scatter(data, form.elements.metric.value);
       document.documentElement.dataset.drawn = "all";
     };
-    form.addEventListener("change", () => scatter(data, form.elements.metric.value));
-    form.addEventListener("submit", (event) => event.preventDefault());
+    form?.addEventListener("change", () => scatter(data, form.elements.metric.value));
+    form?.addEventListener("submit", (event) => event.preventDefault());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", all);
     all();
   } catch (error) {
