@@ -22,7 +22,7 @@ from hsv.recording.report.payload import compressed
 from hsv.simulation.closed_loop import Flight
 
 POINTS = 2000
-"""Flights that scatter plots draw at most, of more every n-th; not by WebGL, of which browsers give a page but little."""
+"""Flights that scatter plots draw at most, of more every n-th; WebGL would draw more, in fewer plots a page."""
 
 BINS = 60
 
