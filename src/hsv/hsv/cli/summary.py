@@ -6,7 +6,7 @@ from typing import Any
 
 from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
 from hsv.errors import RunError
-from hsv.simulation.limits import verdicts
+from hsv.simulation.limits import Verdict, verdicts
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario
 
@@ -28,13 +28,14 @@ def report_flight(
         RunError: The flight diverged; the message says when.
     """
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
+    judged = verdicts(scenario, metrics, ended=diverged_at is None)
     factor = simulated_time / wall_time if wall_time > 0.0 else 0.0
     if json:
         print_json(
             {
                 "scenario": scenario.name,
                 "diverged_at_s": diverged_at,
-                "within_limits": diverged_at is None and all(v.within for v in verdicts(scenario, metrics).values()),
+                "within_limits": diverged_at is None and all(verdict.within for verdict in judged.values()),
                 "metrics": to_json(quantities, units),
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
@@ -42,7 +43,7 @@ def report_flight(
             }
         )
     else:
-        print_table(scenario.title, quantities, units, limit_verdicts(scenario, metrics, units))
+        print_table(scenario.title, quantities, units, limit_verdicts(judged, units))
         console.print(f"flown {simulated_time:.6g} s in {wall_time:.3g} s: {factor:.3g} x real time")
         for name, value in (extra or {}).items():
             console.print(f"{name:5} {value}", soft_wrap=True)
@@ -50,14 +51,11 @@ def report_flight(
         raise RunError(f"flight diverged at t = {diverged_at:.2f} s: the state left the range of the model")
 
 
-def limit_verdicts(scenario: Scenario, metrics: dict[str, float], units: Units) -> dict[str, str]:
+def limit_verdicts(judged: dict[str, Verdict], units: Units) -> dict[str, str]:
     """Return, for each metric with a limit, whether its magnitude stays within it, in words."""
     words = {}
-    for name, verdict in verdicts(scenario, metrics).items():
+    for name, verdict in judged.items():
         value, unit = shown((verdict.limit, METRICS[name].unit), units)
         text = f"{value:.4g}{'' if unit == '1' else ' ' + unit}"
-        if verdict.value is None:
-            words[name] = f"not reached (limit {text})"
-        else:
-            words[name] = f"{'within' if verdict.within else 'over'} {text}"
+        words[name] = f"{verdict.words} {text if verdict.words in ('within', 'over') else f'(limit {text})'}"
     return words

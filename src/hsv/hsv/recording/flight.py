@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+
 import numpy as np
 
+from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
 from hsv.simulation.metrics import FlightData
 
 _RIGID = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")
+
+
+def labels(bags: Sequence[Bag]) -> list[str]:
+    """Return a name for each of ``bags``: its scenario, with the bag's folder where several flew the same."""
+    scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
+    count = Counter(scenarios)
+    return [
+        name if count[name] == 1 else f"{name} ({bag.path.parent.name})"
+        for name, bag in zip(scenarios, bags, strict=True)
+    ]
 
 
 def state_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
@@ -26,11 +40,13 @@ def flight_data(bag: Bag) -> FlightData:
     """Return the flight in ``bag``; of a broken-off run, the steps that are complete.
 
     Raises:
-        RecordingError: A topic is missing.
+        RecordingError: A topic is missing, or no step is complete.
     """
     state, nominal = bag.columns("/hsv/state"), bag.columns("/hsv/nominal")
     command, tube = bag.columns("/hsv/command"), bag.columns("/hsv/tube_status")
     steps = min(len(columns["step"]) for columns in (state, nominal, command, tube))
+    if steps == 0:
+        raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
     acting = [time for time, message in bag.decode("/hsv/fault_status") if message.active]
     return FlightData(
         time=state["header.stamp"][:steps] * 1e-9,

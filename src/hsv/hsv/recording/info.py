@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hsv.recording.reader import Bag
 
 FAULT_STATUS = "/hsv/fault_status"
+STATE = "/hsv/state"
 TUBE_STATUS = "/hsv/tube_status"
 
 
@@ -20,9 +21,9 @@ def describe(bag: Bag) -> dict[str, Any]:
     -------
     dict
         ``path``, ``complete``, ``start_s``, ``duration_s``, ``messages``, ``topics``, ``custom_data``,
-        ``attachments``, ``faults`` (one entry per interval of a channel), ``saturation`` and ``tube``; the last three
-        are None without the topic that tells. Times are simulated, in seconds; ``end_s`` of what lasts until the end
-        of the bag is None.
+        ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
+        channel), ``saturation`` and ``tube``; the last four are None without the topic that tells. Times are
+        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
@@ -38,6 +39,7 @@ def describe(bag: Bag) -> dict[str, Any]:
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
         ],
+        "ending": _ending(bag) if STATE in bag.topics else None,
         "faults": _faults(bag) if FAULT_STATUS in bag.topics else None,
         "saturation": _saturation(bag) if TUBE_STATUS in bag.topics else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.topics else None,
@@ -49,6 +51,12 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
     span = int(times.max() - times.min()) if len(times) else 0
     rate = (len(times) - 1) / (span / 1e9) if span else None
     return {"name": name, "type": topic.type, "messages": topic.count, "rate_hz": rate}
+
+
+def _ending(bag: Bag) -> str:
+    status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
+    endings = {constants["FINISHED"]: "finished", constants["DIVERGED"]: "diverged"}
+    return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
 
 
 def _faults(bag: Bag) -> list[dict[str, Any]]:

@@ -21,6 +21,11 @@ DIAGNOSTICS_PERIOD = 1.0
 LOG_WARNING = 30
 """Level of a warning in rcl_interfaces/msg/Log; errors are above it."""
 
+_FAILURES = {
+    "diverged": "the flight diverged: the state left the range of the model",
+    "broken off": "the recording breaks off: the run did not reach its end",
+}
+
 _DIAGNOSTIC_LEVELS = {1: "warning", 2: "error", 3: "error"}
 
 
@@ -44,7 +49,7 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
         *_excursions(description),
         *_uncertified(description),
         *_saturation(bag),
-        *_ending(bag),
+        *_ending(bag, description),
     ]
     # Nodes say some things both in the log and in their diagnostics.
     said = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
@@ -86,13 +91,10 @@ def _saturation(bag: Bag) -> Iterator[Event]:
         yield from _joined(intervals)
 
 
-def _ending(bag: Bag) -> Iterator[Event]:
-    columns, constants = bag.columns(STATE), bag.constants(STATE)
-    last = float(columns["header.stamp"][-1]) * 1e-9
-    if columns["status"][-1] == constants["DIVERGED"]:
-        yield Event(last, last, "error", "the flight diverged: the state left the range of the model", "plant")
-    elif columns["status"][-1] != constants["FINISHED"]:
-        yield Event(last, last, "error", "the recording breaks off: the run did not reach its end", "plant")
+def _ending(bag: Bag, description: dict[str, Any]) -> Iterator[Event]:
+    if text := _FAILURES.get(description["ending"]):
+        last = float(bag.columns(STATE)["header.stamp"][-1]) * 1e-9
+        yield Event(last, last, "error", text, "plant")
 
 
 def _diagnostics(bag: Bag) -> Iterator[Event]:

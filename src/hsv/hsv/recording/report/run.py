@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 from hsv.control.design_file import parse_parameters
 from hsv.errors import HsvError, RecordingError
 from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
-from hsv.recording.flight import flight_data
+from hsv.recording.flight import flight_data, labels
 from hsv.recording.info import describe
 from hsv.recording.reader import Bag
 from hsv.recording.report.curves import FlightCurves, flight_curves
@@ -78,13 +77,7 @@ def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
     Raises:
         RecordingError: A bag holds no flight.
     """
-    scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
-    count = Counter(scenarios)
-    labels = [
-        name if count[name] == 1 else f"{name} ({bag.path.parent.name})"
-        for name, bag in zip(scenarios, bags, strict=True)
-    ]
-    return [_reported_run(bag, label) for bag, label in zip(bags, labels, strict=True)]
+    return [_reported_run(bag, label) for bag, label in zip(bags, labels(bags), strict=True)]
 
 
 def _reported_run(bag: Bag, label: str) -> ReportedRun:
@@ -101,7 +94,7 @@ def _reported_run(bag: Bag, label: str) -> ReportedRun:
         scenario_text=scenario_text,
         remark=remark,
         metrics=metrics,
-        verdicts=verdicts(scenario, metrics) if scenario else {},
+        verdicts=verdicts(scenario, metrics, ended=description["ending"] == "finished") if scenario else {},
         curves=curves,
         events=flight_events(bag, description),
         parameters={name: parameters(flat, DECLARED) for name, flat in values.items()},
