@@ -48,7 +48,7 @@ def test_csv(bag: Bag, tmp_path: Path) -> None:
         rows = list(csv.DictReader(stream))
     # Of sequences that grow, what is not there is not a number.
     assert rows[2]["error[6] [rad s]"] == "nan" and float(rows[3]["error[6] [rad s]"]) == 6.0
-    assert float(rows[0]["error[1] [m/s]"]) == 1.0 and "tau" in rows[0]
+    assert float(rows[0]["error[1] [m/s]"]) == 1.0 and "tau[0]" in rows[0]
     with files[2].open() as stream:
         rows = list(csv.DictReader(stream))
     assert rows[0]["active"] == "[]" and '"channel": "elevator_deflection"' in rows[10]["active"]

@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 if TYPE_CHECKING:
     from hsv.recording.compare import Comparison, Difference
@@ -34,13 +35,16 @@ def diff(
     if not 0.0 <= tolerance < math.inf:
         raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
     bags = Bag(first), Bag(second)
-    compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in TOPICS]
+    # What both lack is no difference.
+    topics = [topic for topic in TOPICS if any(topic in bag.topics for bag in bags)]
+    compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in topics]
     differences = [c.first for c in compared if c.first]
     earliest = min(differences, key=lambda d: d.time_ns, default=None)
     if json:
         print_json(
             {
                 "equal": earliest is None,
+                "identical": not any(c.different_bytes for c in compared) and earliest is None,
                 "first_difference": earliest
                 and {
                     "topic": earliest.topic,
@@ -56,6 +60,7 @@ def diff(
         )
     else:
         _print(compared, earliest)
+    warn_of_shortcomings(*bags)
     raise typer.Exit(0 if earliest is None else 1)
 
 
@@ -64,10 +69,10 @@ def _print(compared: list[Comparison], earliest: Difference | None) -> None:
 
     if earliest is None:
         count = sum(c.actual_count for c in compared)
-        identical = all(c.identical for c in compared)
-        console.print(
-            f"{count} messages: {'identical in every byte but padding' if identical else 'equal within the tolerance'}"
-        )
+        padding = sum(c.different_padding for c in compared)
+        identical = f"identical{f' in every byte but the padding of {padding}' if padding else ''}"
+        same = identical if all(c.identical for c in compared) else "equal within the tolerance"
+        console.print(f"{count} messages: {same}", soft_wrap=True)
     else:
         console.print(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, header_style="bold")

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import BagArgument
-from hsv.cli.output import console
+from hsv.cli.options import BagArgument, JsonOption
+from hsv.cli.output import print_written
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def export(
@@ -20,6 +21,7 @@ def export(
         list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="What to write; default: beside the bag, named after it.")] = None,
+    json: JsonOption = False,
 ) -> None:
     """Write the topics of a bag as tables with field names and units in the header (SI).
 
@@ -37,5 +39,6 @@ def export(
     if out is None:
         home = opened.path.parent
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
-    for path in tables.export(opened, topic or list(TOPICS), chosen[0], out):
-        console.print(f"written {path}", soft_wrap=True)
+    topics = topic or [name for name in TOPICS if name in opened.topics]
+    print_written(tables.export(opened, topics, chosen[0], out), json)
+    warn_of_shortcomings(opened)

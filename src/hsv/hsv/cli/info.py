@@ -7,6 +7,7 @@ from typing import Any
 
 from hsv.cli.options import BagArgument, JsonOption, UnitsOption
 from hsv.cli.output import Units, console, print_json, print_table, to_json
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
@@ -21,6 +22,7 @@ def info(
 
     Example: hsv info bags/case1_20260101T000000Z
     """
+    from hsv.errors import RecordingError
     from hsv.recording.flight import flight_data
     from hsv.recording.info import describe
     from hsv.recording.reader import Bag
@@ -28,12 +30,22 @@ def info(
 
     opened = Bag(bag)
     description = describe(opened)
-    quantities = {name: (value, METRICS[name].unit) for name, value in flight_metrics(flight_data(opened)).items()}
+    problem = None
+    try:
+        metrics = flight_metrics(flight_data(opened))
+    except RecordingError as error:
+        # What else the bag holds is still worth knowing, to see what is wrong with it.
+        metrics, problem = {}, error
+    quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
     if json:
-        print_json(description | {"metrics": to_json(quantities, units)})
-        return
-    _print(description)
-    print_table("Metrics", quantities, units)
+        print_json(description | {"metrics": None if problem else to_json(quantities, units)})
+    else:
+        _print(description)
+        if not problem:
+            print_table("Metrics", quantities, units)
+    if problem:
+        raise problem
+    warn_of_shortcomings(opened)
 
 
 def _print(description: dict[str, Any]) -> None:
@@ -44,6 +56,7 @@ def _print(description: dict[str, Any]) -> None:
         "duration": f"{description['duration_s']:.6g} s",
         "messages": description["messages"],
         "complete": "yes" if description["complete"] else "no: hsv recover mends it",
+        "ending": description["ending"] or "not recorded",
         **description["custom_data"],
         "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
         or "nothing",

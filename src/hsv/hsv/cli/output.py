@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from hsv.errors import ParameterError
@@ -69,6 +70,20 @@ def to_json(quantities: Mapping[str, Quantity], units: Units) -> dict[str, float
         value, unit = shown(quantity, units)
         values["_".join(filter(None, (name, UNIT_KEYS[unit])))] = value
     return values
+
+
+def warn(text: str) -> None:
+    """Print a warning on one line of standard error."""
+    errors.print(f"[bold yellow]hsv: warning:[/] {escape(text)}", soft_wrap=True)
+
+
+def print_written(paths: Sequence[Path], as_json: bool) -> None:
+    """Print which files were written; as JSON with their sizes."""
+    if as_json:
+        print_json({"written": [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths]})
+        return
+    for path in paths:
+        console.print(f"written {path}", soft_wrap=True, markup=False)
 
 
 def print_json(values: Mapping[str, Any]) -> None:

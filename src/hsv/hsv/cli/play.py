@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import BagArgument
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def play(
@@ -27,7 +28,9 @@ def play(
 
     from hsv.graph.description import PLAYER
     from hsv.graph.launcher import executable
+    from hsv.recording.reader import Bag
 
+    warn_of_shortcomings(Bag(bag))
     path = str(executable(PLAYER))
     words = [path, str(bag), "--rate", str(rate), "--delay", str(delay)]
     if topic:

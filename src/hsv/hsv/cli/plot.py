@@ -7,30 +7,31 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import UnitsOption
-from hsv.cli.output import Units, check_target, console
+from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.output import Units, check_target, print_written
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def plot(
     bags: Annotated[list[Path], typer.Argument(help="Bags to lay over one another.")],
     out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
     units: UnitsOption = Units.si,
+    json: JsonOption = False,
 ) -> None:
     """Plot trajectory, attitude, elastic rates and inputs of recorded flights.
 
     Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
     """
     from hsv.errors import QuantityError
-    from hsv.recording.flight import flight_data
+    from hsv.recording.flight import flight_data, labels
     from hsv.recording.plots import flight_figure, save_figure
     from hsv.recording.reader import Bag
 
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")
     check_target(out, "out")
-    flights = {}
-    for path in bags:
-        bag = Bag(path)
-        flights[bag.custom_data.get("scenario", path.name)] = flight_data(bag)
+    opened = [Bag(path) for path in bags]
+    flights = {name: flight_data(bag) for name, bag in zip(labels(opened), opened, strict=True)}
     save_figure(flight_figure(flights, units is Units.paper), out)
-    console.print(f"written {out}")
+    print_written([out], json)
+    warn_of_shortcomings(*opened)

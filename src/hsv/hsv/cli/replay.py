@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 if TYPE_CHECKING:
     from hsv.replay.engine import ProcessComparison
@@ -71,6 +72,7 @@ def replay(
                 _print(result)
     if json:
         print_json({"bag": str(bag), "passed": not failed, "processes": report})
+    warn_of_shortcomings(opened)
     if failed:
         raise RunError(f"{', '.join(failed)}: not what {bag} recorded")
 

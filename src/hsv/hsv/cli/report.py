@@ -7,14 +7,16 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import UnitsOption
-from hsv.cli.output import Units, check_target, console
+from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.output import Units, check_target, print_written
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def report(
     bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are laid over one another.")],
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
     units: UnitsOption = Units.si,
+    json: JsonOption = False,
 ) -> None:
     """Write a page about recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
 
@@ -29,5 +31,7 @@ def report(
     if out.suffix not in (".html", ".htm"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
     check_target(out, "out")
-    write_report([Bag(bag) for bag in bags], out, paper_units=units is Units.paper)
-    console.print(f"written {out}", soft_wrap=True)
+    opened = [Bag(bag) for bag in bags]
+    write_report(opened, out, paper_units=units is Units.paper)
+    print_written([out], json)
+    warn_of_shortcomings(*opened)

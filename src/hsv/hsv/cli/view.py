@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from hsv.cli.output import console
+from hsv.cli.options import BagArgument, JsonOption
+from hsv.cli.output import console, print_json
+from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 class Program(StrEnum):
@@ -21,10 +22,11 @@ class Program(StrEnum):
 
 
 def view(
-    bag: Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")],
+    bag: BagArgument,
     program: Annotated[
         Program | None, typer.Option("--with", help="Viewer; default: the first that is installed.")
     ] = None,
+    json: JsonOption = False,
 ) -> None:
     """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
 
@@ -33,18 +35,24 @@ def view(
     import subprocess
 
     from hsv.errors import RecordingError
-    from hsv.recording.reader import find_mcap
+    from hsv.recording.reader import Bag
     from hsv.recording.viewers import VIEWERS
 
-    mcap = find_mcap(bag).absolute()
+    opened = Bag(bag)
+    mcap = opened.path.absolute()
     wanted = [VIEWERS[program]] if program else list(VIEWERS.values())
     for viewer in wanted:
         command = viewer.command(mcap)
         if command:
-            console.print(f"opening {mcap} with {viewer.name}", soft_wrap=True)
-            if viewer.layout:
-                console.print(f"layout to import there: {viewer.layout}", soft_wrap=True)
             subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
+            layout = str(viewer.layout) if viewer.layout else None
+            if json:
+                print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
+            else:
+                console.print(f"opening {mcap} with {viewer.name}", soft_wrap=True)
+                if layout:
+                    console.print(f"layout to import there: {layout}", soft_wrap=True)
+            warn_of_shortcomings(opened)
             return
     sources = "; ".join(f"{viewer.name}: {viewer.source}" for viewer in wanted)
     raise RecordingError(

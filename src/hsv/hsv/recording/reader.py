@@ -165,7 +165,7 @@ class Bag:
         for channel in self._channels.values():
             if channel.topic == topic:
                 return self._messages[channel.id]
-        raise RecordingError(f"{self.path}: no topic {topic}, expected one of {', '.join(sorted(self.topics))}")
+        raise RecordingError(f"{self.path}: no topic {topic}, only {', '.join(sorted(self.topics))}")
 
     def _read(self) -> None:
         unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size

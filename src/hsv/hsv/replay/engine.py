@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
@@ -59,7 +61,10 @@ class _Outputs:
             if vars(message).keys() != self._fields[topic]:
                 new = ", ".join(sorted(vars(message).keys() - self._fields[topic]))
                 raise RecordingError(f"topic {topic}: recorded with another definition, expected a field {new}")
-            data = bytes(self._types.serialize_cdr(message, self._kinds[topic]))
+            try:
+                data = bytes(self._types.serialize_cdr(message, self._kinds[topic]))
+            except (struct.error, TypeError, ValueError, SerdeError) as error:
+                raise RecordingError(f"topic {topic}: recorded with another definition, {error}") from None
             track = self.tracks[topic]
             track.data.append(data + bytes(-len(data) % WIRE_ALIGNMENT))
             track.times.append(nanoseconds(message.clock if topic == "/clock" else message.header.stamp))
