@@ -211,16 +211,15 @@ def test_closed_loop_of_the_shipped_baseline_is_as_fast_as_the_study_says():
 def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_out_where_they_say_nothing():
     design = read_design(find_design("baseline"))
     assert not {"feedback.tau", "feedback.tau_minimum", "nominal.filtered"} & design.to_parameters().keys()
-    tau = np.array([0.8, 0.8, 0.9, 0.9, 1.0])
-    adjusted = dataclasses.replace(design, tau=tau, tau_minimum=np.full(5, 0.5), filtered=True)
+    tau, minimum = np.array([0.8, 0.8, 0.9, 0.9, 1.0]), np.array([0.5, 0.5, 0.75, 0.75, 1.0])
+    adjusted = dataclasses.replace(design, tau=tau, tau_minimum=minimum, filtered=True)
     values = adjusted.to_parameters()
-    assert values["feedback.tau_minimum"] == [0.5]
     again = ControlDesign.from_parameters(values)
     assert not again.modified and again.filtered
-    assert again.tau.tolist() == tau.tolist() and again.tau_minimum.tolist() == [0.5] * 5
+    assert again.tau.tolist() == tau.tolist() and again.tau_minimum.tolist() == minimum.tolist()
     # Another certified factor is no modification, another certified range is.
-    assert not ControlDesign.from_parameters(values | {"feedback.tau": [0.6]}).modified
-    assert ControlDesign.from_parameters(values | {"feedback.tau_minimum": [0.7]}).modified
+    assert not ControlDesign.from_parameters(values | {"feedback.tau": minimum.tolist()}).modified
+    assert ControlDesign.from_parameters(values | {"feedback.tau_minimum": tau.tolist()}).modified
 
 
 @pytest.mark.parametrize(

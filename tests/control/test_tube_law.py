@@ -106,7 +106,7 @@ def test_law_itself_has_no_memory():
 
 
 def adjustable(minimum=0.5, tau=1.0, **changes):
-    factors = {"tau": np.full(5, tau), "tau_minimum": np.full(5, minimum)}
+    factors = {"tau": np.full(5, tau), "tau_minimum": np.broadcast_to(minimum, 5)}
     return dataclasses.replace(DESIGN, **factors, **changes)
 
 
@@ -120,17 +120,19 @@ def test_each_rigid_state_has_a_factor_of_its_own():
 
 
 def test_a_change_of_tau_acts_from_the_next_step_on_and_outlives_the_run():
-    law, state = TubeLaw(adjustable()), REFERENCE + near(np.random.default_rng(3))
+    law, state = TubeLaw(adjustable([0.5, 0.5, 0.75, 0.75, 1.0])), REFERENCE + near(np.random.default_rng(3))
     before = [step(law, state).u_feedback for _ in range(3)]
-    assert law.change_tau([0.8]) == 3
+    assert law.change_tau([0.8, 0.8, 0.9, 0.9, 1.0]) == 3
     after = [step(law, state) for _ in range(2)]
     assert_array_equal(before, np.tile(before[0], (3, 1)))
-    assert [result.tau.tolist() for result in after] == [[0.8], [0.8]]
-    assert_allclose(after[0].u_feedback, 0.8 * before[0], rtol=1e-12)
-    assert law.change_tau([0.7, 0.7, 0.7, 0.7, 1.0]) == 5
-    assert step(law, state).tau.tolist() == [0.7, 0.7, 0.7, 0.7, 1.0]
+    assert [result.tau.tolist() for result in after] == [[0.8, 0.8, 0.9, 0.9, 1.0]] * 2
+    lost = DESIGN.feedback_gain[:, :5] @ ([0.2, 0.2, 0.1, 0.1, 0.0] * (state - REFERENCE)[:5])
+    assert_allclose(after[0].u_feedback, before[0] - lost, rtol=1e-9)
+    assert law.change_tau([1.0]) == 5
+    assert_array_equal(step(law, state).u_feedback, before[0])
+    law.change_tau([0.5, 0.5, 0.75, 0.75, 1.0])
     law.reset()
-    assert step(law, state).tau.tolist() == [0.7, 0.7, 0.7, 0.7, 1.0]
+    assert step(law, state).tau.tolist() == [0.5, 0.5, 0.75, 0.75, 1.0]
 
 
 @pytest.mark.parametrize(
@@ -141,6 +143,7 @@ def test_a_change_of_tau_acts_from_the_next_step_on_and_outlives_the_run():
         ([math.nan], r"feedback\.tau = \[nan\]: expected values above zero"),
         ([0.8, 0.8], r"feedback\.tau: 2 values, expected 1 or 5"),
         ([1.0, 0.9, 0.49, 1.0, 1.0], r"feedback\.tau\[2\] = 0.49: expected 0.5 to 1"),
+        ([0.5, 0.9, 0.9, 0.9, 0.9], r"feedback\.tau = .* the same share of the way from 1 to \[0.5\]"),
     ],
 )
 def test_a_factor_that_is_not_certified_is_refused_and_changes_nothing(values, message):

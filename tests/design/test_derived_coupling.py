@@ -5,7 +5,7 @@ import pytest
 
 from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import discretise
-from hsv.design.error_system import notch_matrices
+from hsv.control.notch_filter import series
 from hsv.design.region import corners
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import jacobian
@@ -24,7 +24,7 @@ def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
     point = trim(vehicle, 86100.0 * FOOT, 8150.0 * FOOT)
     A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), design.period)
     B = B * [1.0, effectiveness]
-    A_s, B_s, C_s, D_s = notch_matrices(discretise(design.notch, design.period))
+    A_s, B_s, C_s, D_s = series(discretise(design.notch, design.period))
     F, n = design.feedback_gain.copy(), len(A_s)
     rate = F[:, 4].copy()
     F[:, 4] *= D_s

@@ -16,7 +16,7 @@ def flight(subject):
     inputs = subject.inputs
     short = inputs.disturbance.model_copy(update={"duration": 104.0})
     worst = dict(uncertainty_bounds())
-    return Region(subject.design, inputs.model_copy(update={"disturbance": short})).fly(worst)
+    return Region(subject.design, inputs.model_copy(update={"disturbance": short}), 1.0).fly(worst)
 
 
 def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):

@@ -81,5 +81,5 @@ def test_polynomial_functions_are_exact_where_the_model_is_a_polynomial():
     for _, weights in (product.altitude_samples, product.velocity_samples):
         assert weights.min() >= 0.0
         assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-12)
-    with pytest.raises(DesignError, match="tensor_product.functions = 'splines': expected one of"):
+    with pytest.raises(DesignError, match=r"tensor_product\.functions = 'splines': expected one of"):
         tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10, "splines")

@@ -23,47 +23,113 @@ def design(
     compare_sets: Annotated[
         bool, typer.Option("--compare-sets", help="Also compute the set in the other ways, and print a table.")
     ] = False,
+    tau: Annotated[
+        str, typer.Option(help="Adjustable factor in place of the input's: one number, or five with commas between.")
+    ] = "",
     json: JsonOption = False,
 ) -> None:
     """Compute a controller offline, with its tube; write its parameter file and, beside it, its certificate.
 
-    Example: hsv design baseline
+    Example: hsv design baseline; hsv design adjustable --tau 0.8
     """
     from hsv.cli.progress import stages
     from hsv.control.design_file import write_design
+    from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
     from hsv.design.certificate import certificate_path, write_certificate
-    from hsv.design.inputs import find_inputs, read_inputs
+    from hsv.design.inputs import find_inputs, read_inputs, with_tau
 
     if out:
         check_target(out, "out")
     source = find_inputs(name)
     inputs = read_inputs(source)
+    if tau:
+        inputs = with_tau(inputs, _factors(tau))
     with stages() as progress:
-        result = design_baseline(inputs, progress)
+        result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
     target = out or source.with_suffix(".yaml")
-    write_design(target, result.design, f"Written by: hsv design {name}. SI units; see offline_design/README.md.")
+    command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
+    write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
     write_certificate(certificate_path(target), result.report)
     rows = _compared(result.design, result.report, inputs) if compare_sets else []
     if json:
         compared = {"compared_sets": [row.as_dict() for row in rows]} if compare_sets else {}
         print_json(result.report | compared | {"file": str(target)})
         return
-    feedback, tube = result.report["feedback"], result.report["tube"]
-    console.print(f"vertices             {result.report['vertices']}")
-    console.print(f"spectral radius A+BF {max(feedback['spectral_radii']):.6f} (rigid states, worst vertex)")
-    console.print(f"(24) eigenvalue      {min(feedback['lmi_smallest_eigenvalues']):.3g} (least over the vertices)")
-    console.print(f"nominal gains        {len(result.report['nominal'])}")
-    console.print(f"invariant set        {tube['invariant_set']['kind']}, certified at every vertex")
-    level = tube["flights"]["worst_level"]
-    if level is not None:
-        console.print(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
+    if inputs.adjustable:
+        console.print(_steps(result.report))
+    else:
+        _summary(result.report)
     console.print(f"written              {target}, {certificate_path(target).name}")
     if rows:
         console.print(_table(rows))
         for row in rows:
             if row.note:
                 console.print(f"{row.name}: {row.note}", markup=False)
+
+
+def _factors(text: str) -> list[float]:
+    from hsv.errors import DesignError
+
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError as error:
+        raise DesignError(f"tau = {text!r}: expected one number, or five with commas between") from error
+
+
+def _summary(report: dict[str, Any]) -> None:
+    feedback, tube = report["feedback"], report["tube"]
+    console.print(f"vertices             {report['vertices']}")
+    console.print(f"spectral radius A+BF {max(feedback['spectral_radii']):.6f} (rigid states, worst vertex)")
+    console.print(f"(24) eigenvalue      {min(feedback['lmi_smallest_eigenvalues']):.3g} (least over the vertices)")
+    console.print(f"nominal gains        {len(report['nominal'])}")
+    console.print(f"invariant set        {tube['invariant_set']['kind']}, certified at every vertex")
+    level = tube["flights"]["worst_level"]
+    if level is not None:
+        console.print(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
+
+
+def _steps(report: dict[str, Any]) -> Table:
+    """Return the seven steps of Algorithm 1 with what came of each."""
+    from hsv.units import to_paper
+
+    feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
+    accuracy, model = report["model"]["accuracy"], report["model"]
+    sections = ", ".join(f"{section['zero_frequency']:g} rad/s" for section in report["inputs"]["notch"])
+    units = ("m", "m/s", "rad", "rad", "rad/s")
+    named = ("ft", "ft/s", "deg", "deg", "deg/s")
+    sizes = [
+        f"{to_paper(value, unit)[0]:.1f} {name}"
+        for value, unit, name in zip(tube["invariant_set"]["half_width"], units, named, strict=False)
+    ]
+    fuel, elevator = adjustable["input_bound"]
+    bounds = f"{fuel:.3f}, {to_paper(elevator, 'rad')[0]:.1f} deg"
+    beyond = adjustable["complete_fault"]
+    parts = adjustable["full_state"]["largest_real_part"] if adjustable["full_state"] else {}
+    tau = ", ".join(f"{value:g}" for value in dict.fromkeys(adjustable["tau"]))
+    rows = {
+        "notch filter": f"centre {sections}",
+        "extended control model (ECM)": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",
+        "co-designed polytopic model": f"{' x '.join(str(n) for n in model['vertices'])} vertices, Bode within "
+        f"{accuracy['bode_magnitude_error_db']:.2f} dB, {accuracy['bode_phase_error_deg']:.2f} deg",
+        "feedback gain F'": f"spectral radius {max(feedback['spectral_radii']):.5f}; one Lyapunov function for tau "
+        f"{tau} to 1, whole fault",
+        "adjustable factor tau, set Z'": f"tau {tau}; {', '.join(sizes)}",
+        "nominal gain K'": f"{len(report['nominal'])} gains, |u_n| at most {bounds}",
+        "control law u'": f"worst level {tube['flights']['worst_level']:.3f} of 1 in W', "
+        f"{beyond['worst_level']:.3f} with the whole fault, {beyond['flights']} flights each",
+    }
+    table = Table(title="Algorithm 1", title_justify="left", box=None, pad_edge=False, show_header=False)
+    for number, (name, value) in enumerate(rows.items(), 1):
+        table.add_row(f"({number})", name, value)
+        if number == 4 and parts:
+            table.add_row(
+                "",
+                "",
+                f"full-state F' would cancel the notch: rightmost pole {parts['full_state']['derived']:+.2f} / s "
+                f"with derived coupling, {parts['structured']['derived']:+.2f} / s as designed",
+            )
+    return table
 
 
 def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:

@@ -56,7 +56,8 @@ def linearise(
     if model == "DM":
         vehicle = vehicle.decoupled()
     point = trim_at(vehicle, altitude, velocity)
-    names, state_units = STATE_NAMES, STATE_UNITS
+    names: tuple[str, ...] = STATE_NAMES
+    state_units: tuple[str, ...] = STATE_UNITS
     difference: list[Mode] = []
     if model == "ECM":
         notch = Filter(*series(continuous(default_sections())))

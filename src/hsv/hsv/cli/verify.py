@@ -62,6 +62,8 @@ def _table(claims: dict[str, list[Claim]]) -> Table:
     for name in ("", "claim", "came out", "expected"):
         table.add_column(name, overflow="fold")
     for part, made in claims.items():
+        if not made:
+            continue
         table.add_row("", f"[bold]{escape(part)}[/]", "", "")
         for claim in made:
             cells = (escape(text) for text in (f"  {claim.name}", claim.shown, claim.expected))

@@ -17,6 +17,9 @@ FACTORS = "one value, or one for each rigid state"
 TAU = Parameter("feedback.tau", [1.0], f"adjustable factor of the feedback gain: {FACTORS}", "", 0.0, 1.0)
 TAU_MINIMUM = Parameter("feedback.tau_minimum", [1.0], f"least certified factor, up to 1: {FACTORS}", "", 0.0, 1.0)
 
+_SAME_SHARE = 1e-9
+"""Difference of two shares that is rounding."""
+
 TAU_CHANGE_PARAMETERS = (
     Parameter("tau_change.starts", [], "simulated times at which feedback.tau changes, in order", "s", 0.0),
     Parameter("tau_change.values", [], f"factor from then on: {FACTORS}, a change after the other", "", 0.0, 1.0),
@@ -38,7 +41,10 @@ def factors(values: Sequence[float], name: str) -> np.ndarray:
 
 
 def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name) -> np.ndarray:
-    """Return the factors (5) in ``values`` if they lie between their certified ``minimum`` (5) and 1.
+    """Return the factors (5) in ``values`` if they lie on the way from their certified ``minimum`` (5) to 1.
+
+    Between the two closed loops everything is certified, by one Lyapunov function; a factor that is small in one
+    dimension and large in another is not between them.
 
     Raises:
         ParameterError: Names the value that does not, and the range.
@@ -49,6 +55,13 @@ def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name
         low = float(minimum[index])
         expected = f"{low:g} to 1, the certified range" if low < 1.0 else "1: no other factor is certified"
         raise ParameterError(f"parameter {name}{place} = {tau[index]:g}: expected {expected} (feedback.tau_minimum)")
+    lessened = minimum < 1.0
+    share = (1.0 - tau[lessened]) / (1.0 - minimum[lessened])
+    if share.size and np.ptp(share) > _SAME_SHARE:
+        raise ParameterError(
+            f"parameter {name} = {tau.tolist()}: expected factors that are all the same share of the way from 1 to "
+            f"{compact(minimum).tolist()} (feedback.tau_minimum), no others are certified"
+        )
     return tau
 
 

@@ -23,6 +23,7 @@ from hsv.design.tube import design_tube
 from hsv.errors import DesignError
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
+from hsv.lpv.polytope import Polytope
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
@@ -34,9 +35,10 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class DesignResult:
-    """What flies, and the report behind it (ready for JSON, SI)."""
+    """What flies, the model it stands on, and the report behind it (ready for JSON, SI)."""
 
     design: ControlDesign
+    model: DesignModel
     report: dict[str, Any]
 
 
@@ -68,11 +70,16 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
     design = replace(gains.design, coupling=inputs.disturbance.coupling, tube=tube.flown(), plan_bounds=tube.plan)
     report = {
         **gains.report,
-        "versions": {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")},
+        "versions": versions(),
         "tube": tube.report,
         "parameters_sha256": design.to_parameters()["design.hash"],
     }
-    return DesignResult(design, report)
+    return DesignResult(design, gains.model, report)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what computes a design."""
+    return {package: version(package) for package in ("numpy", "scipy", "cvxpy", "clarabel")}
 
 
 def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
@@ -102,20 +109,8 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
     )
     tell("feedback gain", 1, 1)
 
-    problem = NominalProblem(
-        A,
-        B,
-        inputs.model.period,
-        inputs.nominal.state_scale.array(),
-        inputs.nominal.input_scale.array(),
-        inputs.nominal.input_bound.array(),
-    )
-    nominal = nested_gains(
-        problem,
-        initial_deviation(inputs, vehicle),
-        inputs.nominal.scales,
-        lambda done, total: tell("nominal gains", done, total),
-    )
+    problem = nominal_problem(inputs, polytope, inputs.nominal.input_bound.array())
+    nominal = nominal_family(inputs, problem, tell)
 
     design = ControlDesign(
         name=inputs.name,
@@ -134,7 +129,37 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         input_maximum=INPUT_MAXIMUM.copy(),
         notch=notch,
     )
-    return DesignResult(design, _report(inputs, design, model, feedback, nominal))
+    return DesignResult(design, model, _report(inputs, design, model, feedback, nominal))
+
+
+def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.ndarray) -> NominalProblem:
+    """Return the problem (31)-(35) of the rigid states of ``polytope``, |u_n| at most ``input_bound`` (2)."""
+    return NominalProblem(
+        polytope.A[:, :N_RIGID, :N_RIGID],
+        polytope.B[:, :N_RIGID],
+        inputs.model.period,
+        inputs.nominal.state_scale.array(),
+        inputs.nominal.input_scale.array(),
+        input_bound,
+    )
+
+
+def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
+    """Return the nested nominal gains along the design's step; errors as for :func:`nested_gains`."""
+    deviation = initial_deviation(inputs, vehicle_parameters("decoupled"))
+    return nested_gains(
+        problem, deviation, inputs.nominal.scales, lambda done, total: progress("nominal gains", done, total)
+    )
+
+
+def with_family(design: ControlDesign, problem: NominalProblem, gains: list[NominalGain]) -> ControlDesign:
+    """Return ``design`` with other nominal gains."""
+    return replace(
+        design,
+        nominal_gains=np.stack([_all_states(gain.K) for gain in gains]),
+        nominal_ellipsoids=np.stack([_inverse(gain.Q) for gain in gains]),
+        nominal_input_bound=problem.input_bound,
+    )
 
 
 def initial_deviation(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
@@ -188,18 +213,25 @@ def _report(
     nominal: list[NominalGain],
 ) -> dict[str, Any]:
     A, B = design.polytope.A, design.polytope.B
-    closed = [A + B @ gain for gain in (design.feedback_gain, *design.nominal_gains)]
-    radii = [float(spectral_radii(matrices).max()) for matrices in closed]
     return {
         "name": inputs.name,
         "units": "SI",
-        "inputs": inputs.model_dump(),
-        "inputs_sha256": hashlib.sha256(inputs.model_dump_json().encode()).hexdigest(),
+        "inputs": inputs.model_dump(exclude_none=True),
+        "inputs_sha256": hashlib.sha256(inputs.model_dump_json(exclude_none=True).encode()).hexdigest(),
         "vertices": len(A),
         "model": model.report,
-        "feedback": {**feedback.report(), "spectral_radius_all_states": radii[0]},
-        "nominal": [
-            {"scale": scale, **gain.report(), "spectral_radius_all_states": radius}
-            for scale, gain, radius in zip(inputs.nominal.scales, nominal, radii[1:], strict=True)
-        ],
+        "feedback": {
+            **feedback.report(),
+            "spectral_radius_all_states": float(spectral_radii(A + B @ design.feedback_gain).max()),
+        },
+        "nominal": nominal_report(inputs, design, nominal),
     }
+
+
+def nominal_report(inputs: DesignInputs, design: ControlDesign, nominal: list[NominalGain]) -> list[dict[str, Any]]:
+    """Return the nominal gains of ``design`` with their evidence, for JSON."""
+    A, B = design.polytope.A, design.polytope.B
+    return [
+        {"scale": scale, **gain.report(), "spectral_radius_all_states": float(spectral_radii(A + B @ K).max())}
+        for scale, gain, K in zip(inputs.nominal.scales, nominal, design.nominal_gains, strict=True)
+    ]

@@ -48,6 +48,7 @@ CHANNELS = (
 )
 """Order of the columns of G in :class:`hsv.design.error_system.ErrorSystem`."""
 
+_FILTERED_NOMINAL = 4
 _ACCELERATED = (1, 2, 4)
 _REMAINING = (0, 3)
 
@@ -88,11 +89,15 @@ class Signals(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """How Delta is split into channels: the model it is measured against, filter, acceleration columns (5, 3)."""
+    """How Delta is split into channels: the model it is measured against, filter, acceleration columns (5, 3).
+
+    ``filtered``: the nominal pitch rate is filtered as the measured one is, and its channel is nothing.
+    """
 
     polytope: Polytope
     notch: NotchData
     columns: np.ndarray
+    filtered: bool = False
 
     def signals(self, record: Record) -> Signals:
         """Return the disturbances that acted in a flight."""
@@ -113,6 +118,8 @@ class ChannelModel:
             record.defect,
             *signals,
         )
+        if self.filtered:
+            signals.channels[:, _FILTERED_NOMINAL] = 0.0
         return signals
 
 

@@ -8,13 +8,13 @@ signal of the plan alone. The pitch rate in e is the true one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numba import njit
 
-from hsv.control.notch_filter import NotchData, filter_step, rest
+from hsv.control.notch_filter import NotchData, filter_step, rest, series
 from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
 
 PITCH_RATE = 4
@@ -35,21 +35,6 @@ class ErrorSystem:
     names: tuple[str, ...]
 
 
-def notch_matrices(notch: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Return A (2 s, 2 s), B (2 s), C (2 s), D of all s discrete sections in series, states in the order of flight."""
-    size = 2 * len(notch.D)
-    A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
-    for i in range(len(notch.D)):
-        rows = slice(2 * i, 2 * i + 2)
-        A[rows] = np.outer(notch.B[i], C)
-        A[rows, rows] = notch.A[i]
-        B[rows] = notch.B[i] * D
-        C = notch.D[i] * C
-        C[rows] = notch.C[i]
-        D = notch.D[i] * D
-    return A, B, C, D
-
-
 def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, channels: np.ndarray) -> ErrorSystem:
     """Return the error system of the rigid states and the notch filter.
 
@@ -64,7 +49,7 @@ def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, 
     """
     r = len(A)
     A_x, B_x, F_x = A[:, :N_RIGID, :N_RIGID], B[:, :N_RIGID], F[:, :N_RIGID]
-    A_s, B_s, C_s, D_s = notch_matrices(notch)
+    A_s, B_s, C_s, D_s = series(notch)
     n = N_RIGID + len(A_s)
     gain = np.zeros((2, n))
     gain[:, :N_RIGID] = F_x
@@ -84,6 +69,12 @@ def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, 
     feedthrough = np.zeros((2, columns.shape[2]))
     feedthrough[:, 4] = F_x[:, PITCH_RATE]
     return ErrorSystem(closed, columns, gain, feedthrough, names)
+
+
+def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
+    """Return the system that may switch between the vertices of all; its feedback F is that of the ``first``."""
+    systems = (first, *others)
+    return replace(first, A=np.concatenate([s.A for s in systems]), G=np.concatenate([s.G for s in systems]))
 
 
 def paper_system(A: np.ndarray, B: np.ndarray, F: np.ndarray) -> ErrorSystem:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from hsv.control.design_file import find_file
 from hsv.errors import DesignError
 from hsv.units import parse_quantity
+from hsv.vehicle.dynamics import N_RIGID
 
 _SI = "SI"
 """Validation context of tables that hold plain numbers in SI, as a certificate does."""
@@ -127,8 +128,7 @@ class TensorProductInputs(_Table):
 
 
 class ModelInputs(_Table):
-    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 10-12), or of the decoupled vehicle
-    with its notch filter (eq. 44-45)."""
+    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 10-12), or with its filter (44-45)."""
 
     system: Literal["DM", "ECM"] = "DM"
     period: Duration = Positive
@@ -182,11 +182,13 @@ class RampInputs(_Table):
     start: Duration = Field(ge=0.0)
     end: Duration = Positive
 
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.end <= self.start:
-            raise ValueError(f"end = {self.end} s: expected later than start = {self.start} s")
-        return self
+    @field_validator("end")
+    @classmethod
+    def _later(cls, end: float, info: ValidationInfo) -> float:
+        start = info.data.get("start", 0.0)
+        if end <= start:
+            raise ValueError(f"end = {end:g} s: expected later than start = {start:g} s")
+        return end
 
 
 class DisturbanceInputs(_Table):
@@ -224,17 +226,18 @@ class TighteningInputs(_Table):
 class AdjustableInputs(_Table):
     """The adjustable factor (paper section 4.3): one value, or one for each of the five rigid states."""
 
-    tau: Annotated[list[Number], BeforeValidator(_listed)] = Field(min_length=1, max_length=5)
+    tau: Annotated[list[Number], BeforeValidator(_listed)] = Field(min_length=1)
 
-    @model_validator(mode="after")
-    def _shares(self) -> Self:
-        if len(self.tau) not in (1, 5) or not all(0.0 < value <= 1.0 for value in self.tau):
-            raise ValueError(f"tau = {self.tau}: expected one value, or five, above 0 and at most 1")
-        return self
+    @field_validator("tau")
+    @classmethod
+    def _shares(cls, tau: list[float]) -> list[float]:
+        if len(tau) not in (1, N_RIGID) or not all(0.0 < value <= 1.0 for value in tau):
+            raise ValueError(f"tau = {tau}: expected one value, or five, above 0 and at most 1")
+        return tau
 
     def array(self) -> np.ndarray:
         """Return the factors (5)."""
-        return np.full(5, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
+        return np.full(N_RIGID, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
 
 
 class DesignInputs(_Table):
@@ -294,6 +297,20 @@ def read_inputs(path: Path) -> DesignInputs:
         raise DesignError(f"{path}: {error}") from error
 
 
+def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
+    """Return ``inputs`` with another adjustable factor: one value, or one for each rigid state.
+
+    Raises:
+        DesignError: The design has no adjustable factor, or the value is wrong.
+    """
+    if inputs.adjustable is None:
+        raise DesignError(f"design {inputs.name!r}: tau = {tau} given, expected a design with an [adjustable] table")
+    try:
+        return inputs.model_copy(update={"adjustable": AdjustableInputs(tau=tau)})
+    except ValidationError as error:
+        raise DesignError(_first_line(error, {"tau": tau})) from error
+
+
 def find_inputs(name: str) -> Path:
     """Return the design TOML given by path, or by name in ``HSV_DESIGN_PATH`` or the source checkout.
 
@@ -308,7 +325,7 @@ def _first_line(error: ValidationError, table: dict[str, Any]) -> str:
     *parents, leaf = (str(part) for part in first["loc"])
     cause = first.get("ctx", {}).get("error")
     if isinstance(cause, ValueError):  # parse_quantity has named the field, not the tables it is in
-        return ".".join((*parents, str(cause)))
+        return ".".join((*(parents[:-1] if leaf.isdigit() else parents), str(cause)))
     field = ".".join((*parents, leaf))
     if first["type"] == "missing":
         return f"{field}: missing, expected a value"

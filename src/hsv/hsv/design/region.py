@@ -28,49 +28,75 @@ Corner = Mapping[str, float]
 Result = TypeVar("Result")
 
 
-def corners() -> list[dict[str, float]]:
-    """Return the nominal vehicle (no change) and every corner of the parameter bounds, in a fixed order."""
+def corners(share: float = 1.0) -> list[dict[str, float]]:
+    """Return the nominal vehicle (no change) and all corners of ``share`` of the parameter bounds, in a fixed order."""
     bounds = uncertainty_bounds()
     signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
-    return [{}, *({name: s * bound for s, (name, bound) in zip(row, bounds.items(), strict=True)} for row in signs)]
+    return [
+        {},
+        *({name: s * share * bound for s, (name, bound) in zip(row, bounds.items(), strict=True)} for row in signs),
+    ]
 
 
-def fraction() -> list[dict[str, float]]:
+def fraction(share: float = 1.0) -> list[dict[str, float]]:
     """Return the nominal vehicle and a quarter of the corners, in a fixed order.
 
     A regular fraction of resolution VI: two of ten signs are products of five others, so that every three parameters
     still meet in all their combinations.
     """
     names = list(uncertainty_bounds())
-    nominal, *rows = corners()
+    nominal, *rows = corners(share)
     signs = np.array([[np.sign(row[name]) for name in names] for row in rows])
     kept = (signs[:, 8] == signs[:, :5].prod(axis=1)) & (signs[:, 9] == signs[:, [0, 1, 5, 6, 7]].prod(axis=1))
     return [nominal, *(row for row, keep in zip(rows, kept, strict=True) if keep)]
 
 
-def region_parameters(inputs: DesignInputs) -> dict[str, Any]:
-    """Return the flat flight parameters of the declared region, the design's own and the perturbation left out."""
-    region = inputs.disturbance
+def incomplete_share(inputs: DesignInputs) -> float:
+    """Return the share of fault and parameter bounds that W' stands for (paper eq. 47): tau, 1 where there is none.
+
+    Of a diagonal tau it is the largest factor, which gives the largest set.
+    """
+    return float(max(inputs.adjustable.tau)) if inputs.adjustable else 1.0
+
+
+def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any]:
+    """Return the flat flight parameters of the declared region, the design's own and the perturbation left out.
+
+    ``share``: of the lost elevator effectiveness.
+    """
+    region, start, target = inputs.disturbance, inputs.nominal.start, inputs.nominal.target
+    times, points = [0.0], [target]
+    if region.ramp:
+        times, points = [region.ramp.start, region.ramp.end], [start, target]
     return {
         "duration": region.duration,
         "vehicle.coupling": region.coupling,
-        "initial.altitude": inputs.nominal.start.altitude,
-        "initial.velocity": inputs.nominal.start.velocity,
-        "reference.times": [0.0],
-        "reference.altitudes": [inputs.nominal.target.altitude],
-        "reference.velocities": [inputs.nominal.target.velocity],
+        "initial.altitude": start.altitude,
+        "initial.velocity": start.velocity,
+        "reference.times": times,
+        "reference.altitudes": [point.altitude for point in points],
+        "reference.velocities": [point.velocity for point in points],
         "fault.channels": ["elevator_deflection"],
         "fault.types": ["loss_of_effectiveness"],
-        "fault.values": [region.elevator_effectiveness],
+        "fault.values": [1.0 - share * (1.0 - region.elevator_effectiveness)],
         "fault.starts": [region.fault_start],
     }
 
 
 class Region:
-    """The flights of a design over its declared region."""
+    """The flights of a design over ``share`` of its declared region: of the fault, and of the parameter bounds."""
 
-    def __init__(self, design: ControlDesign, inputs: DesignInputs) -> None:
-        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs)})
+    def __init__(self, design: ControlDesign, inputs: DesignInputs, share: float) -> None:
+        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share)})
+        self.share = share
+
+    def corners(self) -> list[dict[str, float]]:
+        """Return the nominal vehicle and every corner of the region."""
+        return corners(self.share)
+
+    def fraction(self) -> list[dict[str, float]]:
+        """Return the nominal vehicle and a quarter of the corners."""
+        return fraction(self.share)
 
     def fly(self, corner: Corner) -> Flight:
         """Fly one corner.

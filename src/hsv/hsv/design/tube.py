@@ -14,7 +14,7 @@ from hsv.control.tube_set import TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership
 from hsv.design.error_system import PITCH_RATE, tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
-from hsv.design.region import Region, RegionResult, corners, fraction, measure, record
+from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
 from hsv.design.sets.box import box
 from hsv.design.sets.ellipsoid import ellipsoid
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
@@ -69,25 +69,55 @@ def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> Invariant
     return {"zonotope": zonotope, "modal": modal_box, "box": box}[inputs.method](problem)
 
 
-def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
-    """Return the tube of ``design`` over the declared region, certified.
+@dataclass(frozen=True)
+class MeasuredSet:
+    """The invariant set of the disturbances measured over a region, certified, and what it leaves of the inputs."""
 
-    Disturbances are measured at the nominal vehicle and a regular quarter of the corners; the finished tube is then
-    flown at all corners, most of which it has not seen.
+    measured: RegionResult
+    disturbance: DisturbanceSet
+    found: InvariantSet
+    certified: dict[str, Any]
+    bounds: TightenedInputs
+
+    def report(self) -> dict[str, Any]:
+        """Return disturbances, set and tightened inputs, for JSON."""
+        return {
+            "disturbance": _disturbance_report(self.measured, self.disturbance),
+            "invariant_set": {**_set_report(self.found), "certificate": self.certified},
+            "tightening": {"lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
+        }
+
+
+def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, progress: Progress) -> MeasuredSet:
+    """Return the invariant set of ``design`` over ``region``.
+
+    Disturbances are measured at the nominal vehicle and a regular quarter of the corners.
 
     Raises:
-        DesignError: No invariant set, a set that fails when recomputed, or a nominal plan that does not fit.
+        DesignError: No invariant set, or one that fails when recomputed, or leaves nothing of an input.
     """
-    region, model = Region(design, inputs), channel_model(design)
-    seen = fraction()
-    measured = measure(region, model, seen, lambda done: progress("disturbances", done, len(seen)))
+    seen = region.fraction()
+    measured = measure(region, channel_model(design), seen, lambda done: progress("disturbances", done, len(seen)))
     disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
-
     progress("invariant set", 0, 1)
     found = invariant_set(tube_problem(design, disturbance), inputs.invariant_set)
     certified = found.certify()
     progress("invariant set", 1, 1)
     bounds = tighten(found, design.input_minimum, design.input_maximum)
+    return MeasuredSet(measured, disturbance, found, certified, bounds)
+
+
+def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
+    """Return the tube of ``design`` over the declared region, certified, and flown at all corners of it.
+
+    The disturbances were measured at a quarter of them, so most corners have not been seen before.
+
+    Raises:
+        DesignError: No invariant set, a set that fails when recomputed, or a nominal plan that does not fit.
+    """
+    region = Region(design, inputs, incomplete_share(inputs))
+    tube = measured_set(design, region, inputs, progress)
+    found, bounds = tube.found, tube.bounds
 
     sampling = None
     if isinstance(found, EllipsoidSet):
@@ -95,23 +125,28 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
         sampling = sample(found, SEQUENCES, STEPS, SEED)
         progress("random sequences", 1, 1)
 
-    everyone = corners()
-    flown = region.map(
-        lambda flight: flight_evidence(flight, found, disturbance, model),
-        everyone,
-        lambda done: progress("flights in the tube", done, len(everyone)),
-    )
+    flown = flights_in_tube(design, region, found, progress)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
     plan = check_plan(bounds, lowest[:2], highest[:2])
     allowed = plan_bounds(bounds, lowest, highest)
     plan["pitch_acceleration"] = [float(lowest[2]), float(highest[2])]
-    report = {
-        "disturbance": _disturbance_report(measured, disturbance),
-        "invariant_set": {**_set_report(found), "certificate": certified, "sampling": sampling},
-        "tightening": {"lower": bounds.lower.tolist(), "upper": bounds.upper.tolist(), "plan": plan},
-        "flights": _flights_report(flown),
-    }
-    return Tube(disturbance, found, bounds, allowed, report)
+    report = tube.report()
+    report["invariant_set"]["sampling"] = sampling
+    report["tightening"]["plan"] = plan
+    report["flights"] = flights_report(flown)
+    return Tube(tube.disturbance, found, bounds, allowed, report)
+
+
+def flights_in_tube(
+    design: ControlDesign, region: Region, found: InvariantSet, progress: Progress
+) -> list[FlightEvidence]:
+    """Fly ``design`` at all corners of ``region`` and return what each flight shows of the set."""
+    everyone, model = region.corners(), channel_model(design)
+    return region.map(
+        lambda flight: flight_evidence(flight, found, found.problem.disturbance, model),
+        everyone,
+        lambda done: progress("flights in the tube", done, len(everyone)),
+    )
 
 
 @dataclass(frozen=True)
@@ -182,7 +217,8 @@ def _set_report(found: InvariantSet) -> dict[str, Any]:
     return report
 
 
-def _flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
+def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
+    """Return the worst of all flights, for JSON."""
     worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
     levels = [f.level for f in flown if f.level is not None]
     return {

@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
-from hsv.design.error_system import error_system
+from hsv.design.error_system import error_system, union
 from hsv.design.sets.invariant_set import TubeProblem
+from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.parameters import vehicle_parameters
 
 
 def channel_model(design: ControlDesign) -> ChannelModel:
     """Return how disturbances are measured against the model of ``design``."""
     columns = acceleration_channels(vehicle_parameters("decoupled"), design.period)
-    return ChannelModel(design.polytope, discretise(design.notch, design.period), columns)
+    return ChannelModel(design.polytope, discretise(design.notch, design.period), columns, design.filtered)
+
+
+def factors(design: ControlDesign) -> list[np.ndarray]:
+    """Return the adjustable factors (5 each) that bound all that may fly: the least, for which the set is found, and 1.
+
+    A closed loop under a factor between the two is between theirs, so a set that is invariant under both is invariant
+    whatever the factor does in between.
+    """
+    one = np.ones(N_RIGID)
+    return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
 
 
 def tube_problem(design: ControlDesign, disturbance: DisturbanceSet) -> TubeProblem:
-    """Return the error system of ``design`` under ``disturbance``."""
-    model = channel_model(design)
-    polytope = design.polytope
-    return TubeProblem(
-        error_system(polytope.A, polytope.B, design.feedback_gain, model.notch, model.columns), disturbance
-    )
+    """Return the error system of ``design``, for all its factors, under ``disturbance``."""
+    model, polytope = channel_model(design), design.polytope
+    gain = design.feedback_gain[:, :N_RIGID]
+    systems = [
+        error_system(polytope.A, polytope.B, gain * factor, model.notch, model.columns) for factor in factors(design)
+    ]
+    return TubeProblem(union(*systems), disturbance)

@@ -10,7 +10,6 @@ from hsv.errors import DesignError
 from hsv.lpv.hull import hull_weights
 from hsv.lpv.polytope import Polytope, axis_weights
 
-
 FUNCTIONS = ("singular", "polynomial")
 
 

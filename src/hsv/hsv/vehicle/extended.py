@@ -76,7 +76,7 @@ def extended_jacobian(
 
 
 def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:
-    """Return x' (9 + k) of the vehicle state ``x`` (9) with the filter at rest: its equilibrium if x is one (eq. 41)."""
+    """Return x' (9 + k) of a vehicle state ``x`` (9), the filter at rest: an equilibrium if x is one (eq. 41)."""
     rest = np.linalg.solve(-notch.A, notch.B * x[PITCH_RATE])
     extended = np.concatenate((x, rest))
     extended[PITCH_RATE] = notch.C @ rest + notch.D * x[PITCH_RATE]

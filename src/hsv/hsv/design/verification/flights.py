@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.design.region import Region, corners, fraction, measure
+from hsv.design.region import Region, incomplete_share, measure
 from hsv.design.sets.sampling import sample
 from hsv.design.tube import flight_evidence
 from hsv.design.tube_problem import channel_model
@@ -21,9 +21,9 @@ _FLIGHTS, _FLIGHT_SEED = 48, 7
 def flight_claims(subject: Subject) -> Iterable[Claim]:
     """Fly the corners that set a bound, and a sample of all, again."""
     stored, design = subject.certificate["tube"], subject.design
-    region, model = Region(design, subject.inputs), channel_model(design)
+    region, model = Region(design, subject.inputs, incomplete_share(subject.inputs)), channel_model(design)
     measured = stored["disturbance"]["measured"]
-    seen, everyone = fraction(), corners()
+    seen, everyone = region.fraction(), region.corners()
     setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
     again = measure(region, model, [seen[i] for i in setters]).channels
     for side, value in (("lower", again.lower), ("upper", again.upper)):

@@ -40,7 +40,7 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         design.period,
         _sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]),
         _sizes(inputs["input_scale"], INPUT_NAMES),
-        _sizes(inputs["input_bound"], INPUT_NAMES),
+        input_bound(subject),
     )
     yield same("nominal.state_scale", design.nominal_state_scale, problem.state_scale)
     yield same("nominal.input_scale", design.nominal_input_scale, problem.input_scale)
@@ -69,6 +69,14 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         factor = np.linalg.inv(np.linalg.cholesky(outer))
         room = float(smallest_eigenvalues(np.eye(len(outer)) - factor @ inner @ factor.T))
         yield above(f"ellipsoid {i + 1} inside the one before", room, -1e-12)
+
+
+def input_bound(subject: Subject) -> np.ndarray:
+    """Return the bounds (2) of |u_n| that the nominal gains were sought with: the inputs', or relaxed (52)."""
+    adjustable = subject.certificate.get("adjustable")
+    if adjustable:
+        return np.array(adjustable["input_bound"])
+    return _sizes(subject.certificate["inputs"]["nominal"]["input_bound"], INPUT_NAMES)
 
 
 def _sizes(table: dict[str, float], names: tuple[str, ...]) -> np.ndarray:

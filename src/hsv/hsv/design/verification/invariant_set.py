@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
+from hsv.control.design_file import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, Extremes
 from hsv.design.lmi import SolverReport
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape, vertex_residuals
@@ -16,11 +18,15 @@ from hsv.design.verification.claims import Claim, Subject, above, at_most, inver
 
 def certified_set(subject: Subject) -> EllipsoidSet:
     """Return the ellipsoid that the certificate describes, for the design as it flies."""
-    stored = subject.certificate["tube"]
+    return stored_set(subject.design, subject.certificate["tube"])
+
+
+def stored_set(design: ControlDesign, stored: dict[str, Any]) -> EllipsoidSet:
+    """Return the ellipsoid that ``stored``, a tube in a certificate, describes for ``design``."""
     s = stored["invariant_set"]
     disturbance = DisturbanceSet.from_report(stored["disturbance"]["channels"])
     return from_shape(
-        tube_problem(subject.design, disturbance),
+        tube_problem(design, disturbance),
         np.array(s["centre"]),
         np.array(s["Q"]),
         s["contraction"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
+from hsv.design.verification.adjustable import factor_claims
 from hsv.design.verification.claims import Claim, Subject
 from hsv.design.verification.gains import feedback_claims, nominal_claims
 from hsv.design.verification.invariant_set import set_claims
@@ -16,5 +17,6 @@ QUICK: dict[str, Part] = {
     "feedback gain": feedback_claims,
     "nominal gains": nominal_claims,
     "invariant set": set_claims,
+    "adjustable factor": factor_claims,
 }
 """By part; tens of milliseconds."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from hsv.design.region import Corner, fraction
+from hsv.design.region import Corner, fraction, incomplete_share
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
@@ -21,7 +21,7 @@ from hsv.simulation.scenario import Scenario
 def bounding_corners(subject: Subject) -> list[Corner]:
     """Return the nominal vehicle and the corners of the parameters that set a bound of the disturbances."""
     measured = subject.certificate["tube"]["disturbance"]["measured"]
-    seen = fraction()
+    seen = fraction(incomplete_share(subject.inputs))
     return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from hsv.control.design_file import read_design
 from hsv.design.certificate import certificate_path, read_certificate
 from hsv.design.model import polytopic_model
+from hsv.design.verification.adjustable import adjustable_claims
 from hsv.design.verification.claims import Claim, Subject, gathered
 from hsv.design.verification.flights import flight_claims, sequence_claims
 from hsv.design.verification.model import model_claims
@@ -26,6 +27,7 @@ def _recomputed_model(subject: Subject) -> Iterable[Claim]:
 
 SLOW: dict[str, Part] = {
     "polytopic model": _recomputed_model,
+    "adjustable design": adjustable_claims,
     "flights": flight_claims,
     "random sequences": sequence_claims,
 }

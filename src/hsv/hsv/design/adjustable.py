@@ -1,0 +1,133 @@
+"""The adjustable design (paper section 4, Algorithm 1): notch filter in the model, factor tau on the feedback."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.baseline import (
+    DesignResult,
+    Progress,
+    design_gains,
+    disturbance_columns,
+    initial_deviation,
+    nominal_family,
+    nominal_problem,
+    nominal_report,
+    versions,
+    with_family,
+)
+from hsv.design.common_lyapunov import CommonLyapunov, common_lyapunov
+from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
+from hsv.design.full_state import full_state_report
+from hsv.design.inputs import DesignInputs
+from hsv.design.nominal import nominal_gain
+from hsv.design.region import Region, incomplete_share
+from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
+from hsv.errors import DesignError
+from hsv.vehicle.dynamics import N_RIGID
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+
+@dataclass(frozen=True)
+class AdjustableSets:
+    """Z for W at tau = 1, and Z' for W' at the factor in use: what the relaxed bounds of K' follow from."""
+
+    complete: MeasuredSet
+    incomplete: MeasuredSet
+
+
+def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) -> DesignResult:
+    """Return the adjustable design: co-designed model, F', the set Z' for tau F', the nominal gains K'.
+
+    W' is W with the fault and the parameter bounds scaled by tau (paper eq. 47). Z' is invariant under tau F' and under
+    F', so that tau may change in flight between its value here and 1; the paper's Z' = tau Z, which holds only if W'
+    were tau W under F' itself, is reported beside it. The input bounds of K' grow as U minus F' Z' does (eq. 52-53).
+
+    Arguments and errors as for :func:`hsv.design.baseline.design_baseline`; a DesignError, too, where ``inputs`` has no
+    adjustable factor or where a nominal plan has no room at a certified factor.
+    """
+    if inputs.adjustable is None:
+        raise DesignError("adjustable: missing, expected a table with the factor tau")
+    tell = progress or (lambda stage, done, total: None)
+    tau = inputs.adjustable.array()
+    gains = design_gains(inputs, tell)
+    design = replace(gains.design, tau=tau, tau_minimum=tau, filtered=inputs.model.system == "ECM")
+
+    tell("common Lyapunov function", 0, 2)
+    loops = certified_loops(design, inputs.disturbance.elevator_effectiveness)
+    lyapunov = common_lyapunov(loops, _error_scale(inputs), "F', common Lyapunov function")
+    tell("common Lyapunov function", 1, 2)
+    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    full = full_state_report(inputs, design, gains.model.whole, columns) if design.filtered else None
+    tell("common Lyapunov function", 2, 2)
+
+    sets = _sets(design, inputs, tell)
+    target = inputs.nominal.target
+    trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
+    bound = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, sets.complete.bounds, sets.incomplete.bounds)
+    problem = nominal_problem(inputs, design.polytope, bound)
+    family = nominal_family(inputs, problem, tell)
+    single = nominal_gain(problem, initial_deviation(inputs, vehicle_parameters("decoupled")))
+    design = with_family(design, problem, family)
+
+    tube = design_tube(design, inputs, tell)
+    room = room_at_one(design, tube.report)
+    if room.min() < 0.0:
+        raise DesignError(
+            f"nominal plan at tau = 1: {room.tolist()} of room to U minus F' Z', expected none below zero"
+        )
+    flown = replace(design, coupling=inputs.disturbance.coupling, tube=tube.flown(), plan_bounds=tube.plan)
+    report = {
+        **gains.report,
+        "nominal": nominal_report(inputs, design, family),
+        "versions": versions(),
+        "tube": tube.report,
+        "adjustable": {
+            **_report(design, inputs, lyapunov, sets, tube),
+            "full_state": full,
+            "input_bound": bound.tolist(),
+            "single_gain": single.report(),
+            "room_at_one": room.tolist(),
+        },
+        "parameters_sha256": flown.to_parameters()["design.hash"],
+    }
+    return DesignResult(flown, gains.model, report)
+
+
+def _sets(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> AdjustableSets:
+    one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
+    share = incomplete_share(inputs)
+    return AdjustableSets(
+        measured_set(one, Region(one, inputs, 1.0), inputs, lambda stage, *done: progress(f"{stage}, tau = 1", *done)),
+        measured_set(design, Region(design, inputs, share), inputs, progress),
+    )
+
+
+def _error_scale(inputs: DesignInputs) -> np.ndarray:
+    rigid = inputs.feedback.state_scale.array()
+    filters = [rigid[-1] / section.pole_frequency**power for section in inputs.notch for power in (1, 2)]
+    return np.concatenate((rigid, filters))
+
+
+def _report(
+    design: ControlDesign, inputs: DesignInputs, lyapunov: CommonLyapunov, sets: AdjustableSets, tube: Tube
+) -> dict[str, Any]:
+    full = Region(design, inputs, 1.0)
+    beyond = flights_in_tube(design, full, tube.found, lambda stage, done, total: None)
+    tau = np.append(design.tau, [design.tau[-1]] * (len(tube.found.half_width) - N_RIGID))
+    complete = sets.complete.report()
+    return {
+        "tau": design.tau.tolist(),
+        "tau_minimum": design.tau_minimum.tolist(),
+        "share": incomplete_share(inputs),
+        "lyapunov": lyapunov.report(),
+        "complete": complete,
+        "incomplete_bounds": sets.incomplete.report()["tightening"],
+        "scaled_half_width": (tau * np.array(complete["invariant_set"]["half_width"])).tolist(),
+        "complete_fault": flights_report(beyond),
+    }

@@ -1,0 +1,61 @@
+"""One quadratic Lyapunov function for many closed loops: whatever switches between them, the error decays (eq. 24)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+from cvxpy.atoms.affine.bmat import bmat
+from scipy.linalg import cholesky, solve_discrete_lyapunov
+
+from hsv.design.lmi import SolverReport
+from hsv.design.lyapunov import lyapunov_residuals
+from hsv.design.solver import solve
+
+_CONDITION = 1e3
+"""Bound on the condition number of N, whitened, without which the largest margin is not attained."""
+
+
+@dataclass(frozen=True)
+class CommonLyapunov:
+    """e' N^-1 e decreases in every loop: ``N`` (n, n) SI, ``residuals`` (r) as in :func:`lyapunov_residuals`."""
+
+    N: np.ndarray
+    residuals: np.ndarray
+    solver: SolverReport
+
+    def report(self) -> dict[str, Any]:
+        """Return the matrix and its evidence, for JSON."""
+        return {
+            "N": self.N.tolist(),
+            "lmi_smallest_eigenvalues": self.residuals.tolist(),
+            "solver": self.solver.as_dict(),
+        }
+
+
+def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> CommonLyapunov:
+    """Return the function with the largest margin, verified after solving.
+
+    Args:
+        closed_loop: (r, n, n) discrete-time state matrices.
+        scale: (n) sizes of the states that count as equal, SI.
+        name: What is being certified, for the error message.
+
+    Raises:
+        DesignError: No solution, or one that fails (24) when recomputed.
+    """
+    mean = closed_loop.mean(axis=0)
+    L = cholesky(solve_discrete_lyapunov(mean, np.diag(scale**2)), lower=True)
+    white = np.linalg.solve(L, closed_loop @ L)
+    n = len(mean)
+    N, margin = cp.Variable((n, n), symmetric=True), cp.Variable()
+    constraints = [N >> np.eye(n), N << _CONDITION * np.eye(n)]
+    for A in white:
+        AN = A @ N
+        constraints.append(bmat([[N, AN.T], [AN, N]]) >> margin * np.eye(2 * n))
+    solver = solve(cp.Problem(cp.Maximize(margin), constraints), name)
+    found = L @ np.asarray(N.value) @ L.T
+    found = 0.5 * (found + found.T)
+    return CommonLyapunov(found, lyapunov_residuals(closed_loop, found, name), solver)

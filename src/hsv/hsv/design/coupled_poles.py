@@ -1,0 +1,42 @@
+"""What a feedback designed on the decoupled model does to the flexible modes of the coupled vehicle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import continuous, series
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.vehicle.dynamics import N_RIGID, N_STATES
+from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
+from hsv.vehicle.parameters import COUPLING_SETS, vehicle_parameters
+from hsv.vehicle.trim import trim
+
+
+def largest_real_parts(
+    design: ControlDesign, full: np.ndarray, point: tuple[float, float]
+) -> dict[str, dict[str, float]]:
+    """Return the rightmost pole (1/s) of the sampled loop around the coupled ECM at a trim.
+
+    Args:
+        design: With the structured gain F', flown at its adjustable factor 1.
+        full: (2, 5 + k) the full-state gain on rigid states and filter.
+        point: Altitude (m) and velocity (m/s) of the trim.
+
+    Returns:
+        By gain, ``"structured"`` and ``"full_state"``, and set of inertial coupling.
+    """
+    notch = Filter(*series(continuous(design.notch)))
+    found: dict[str, dict[str, float]] = {"structured": {}, "full_state": {}}
+    for coupling in COUPLING_SETS:
+        vehicle = vehicle_parameters(coupling)
+        level = trim(vehicle, *point)
+        A, B = extended_jacobian(extended_state(level.state, notch), level.input, vehicle, notch, False)
+        A, B = zero_order_hold(A, B, design.period)
+        structured, whole = np.zeros((2, len(A))), np.zeros((2, len(A)))
+        structured[:, :N_RIGID] = design.feedback_gain[:, :N_RIGID]
+        whole[:, :N_RIGID], whole[:, N_STATES:] = full[:, :N_RIGID], full[:, N_RIGID:]
+        for name, gain in (("structured", structured), ("full_state", whole)):
+            radius = float(np.abs(np.linalg.eigvals(A + B @ gain)).max())
+            found[name][coupling] = float(np.log(radius) / design.period)
+    return found

@@ -1,0 +1,59 @@
+"""What the adjustable factor (paper section 4.3) may be: certified loops, bounds of K', room of the plan.
+
+Nothing here needs a solver: a node recomputes it before it flies.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.error_system import ErrorSystem, error_system
+from hsv.design.tightening import TightenedInputs
+from hsv.design.tube_problem import channel_model, factors
+from hsv.errors import DesignError
+from hsv.vehicle.dynamics import N_RIGID
+
+
+def certified_loops(design: ControlDesign, effectiveness: float) -> np.ndarray:
+    """Return the closed loops (r, n, n) of error and filter that are to share a Lyapunov function.
+
+    Vertices x adjustable factors (the least, 1) x elevator effectiveness (1, ``effectiveness``).
+    """
+    return np.concatenate(
+        [_system(design, factor, share).A for factor in factors(design) for share in (1.0, effectiveness)]
+    )
+
+
+def relaxed_bound(
+    bound: np.ndarray, trim_input: np.ndarray, complete: TightenedInputs, incomplete: TightenedInputs
+) -> np.ndarray:
+    """Return the bounds (2) of |u_n| in (52): ``bound``, grown as U minus F' Z' is wider than U minus F Z.
+
+    Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53).
+
+    Raises:
+        DesignError: No room at all at tau = 1.
+    """
+    before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
+    if not before.min() > 0.0:
+        raise DesignError(f"U minus F Z at tau = 1: {before.tolist()} about the trim, expected room above zero")
+    return np.asarray(bound * after / before)
+
+
+def room_at_one(design: ControlDesign, tube: dict[str, Any]) -> np.ndarray:
+    """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1."""
+    stored, plan = tube["invariant_set"], tube["tightening"]["plan"]
+    F = _system(design, np.ones(N_RIGID), 1.0).F
+    middle, half = F @ np.array(stored["centre"]), np.sqrt(np.einsum("ij,jk,ik->i", F, np.array(stored["Q"]), F))
+    to_lower = np.array(plan["lowest"]) - (design.input_minimum - middle + half)
+    to_upper = (design.input_maximum - middle - half) - np.array(plan["highest"])
+    return np.minimum(to_lower, to_upper)
+
+
+def _system(design: ControlDesign, factor: np.ndarray, effectiveness: float) -> ErrorSystem:
+    polytope, model = design.polytope, channel_model(design)
+    gain = design.feedback_gain[:, :N_RIGID] * factor
+    return error_system(polytope.A, polytope.B * np.array([1.0, effectiveness]), gain, model.notch, model.columns)

@@ -1,0 +1,62 @@
+"""The full-state feedback F' of the paper's section 4.3, and why it does not fly: it cancels the notch filter.
+
+In the decoupled ECM the pitch rate is a combination of q' and the filter's states, q = (q' - C s) / D, and nothing in
+the model speaks against feeding it back. So the best full-state gain rebuilds it: its action on (q, s) is that of the
+gain on q, with next to nothing left on s, and the flexible modes, which the filter was there for, are excited again.
+With the filter's columns of F' at zero the feedback sees q' alone.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import continuous, series
+from hsv.design.coupled_poles import largest_real_parts
+from hsv.design.feedback import feedback_gain
+from hsv.design.inputs import DesignInputs
+from hsv.lpv.polytope import Polytope
+from hsv.vehicle.dynamics import N_RIGID, N_STATES
+from hsv.vehicle.extended import PITCH_RATE, Filter, from_true_rate
+
+
+def full_state_report(
+    inputs: DesignInputs, design: ControlDesign, whole: Polytope, columns: np.ndarray
+) -> dict[str, Any]:
+    """Return the full-state gain beside the structured one, and what either does to the coupled vehicle, for JSON.
+
+    Args:
+        inputs: Scales and target of the design.
+        design: With the structured gain.
+        whole: The co-designed polytopic model, filter states after the nine.
+        columns: (5, d) disturbances that the feedback is to reject, as for the structured gain.
+
+    Raises:
+        DesignError: No full-state gain.
+    """
+    notch = Filter(*series(continuous(design.notch)))
+    kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
+    disturbance = np.zeros((len(kept), columns.shape[1]))
+    disturbance[:N_RIGID] = columns
+    disturbance[PITCH_RATE] *= notch.D
+    rate = inputs.feedback.state_scale.pitch_rate
+    # A state of the filter counts as much as the pitch rate that excites it at the notch.
+    filter_scale = [rate / section.pole_frequency**power for section in design.notch for power in (1, 2)]
+    found = feedback_gain(
+        whole.A[:, kept][:, :, kept],
+        whole.B[:, kept],
+        disturbance,
+        np.concatenate((inputs.feedback.state_scale.array(), filter_scale)),
+        inputs.feedback.input_scale.array(),
+    )
+    target = inputs.nominal.target
+    on_true_rate = found.F @ from_true_rate(notch)[np.ix_(kept, kept)]
+    return {
+        "gain": found.F.tolist(),
+        "spectral_radii": found.radii.tolist(),
+        "elevator_on_pitch_rate": float(on_true_rate[1, PITCH_RATE]),
+        "structured_elevator_on_pitch_rate": float(design.feedback_gain[1, PITCH_RATE]),
+        "largest_real_part": largest_real_parts(design, found.F, (target.altitude, target.velocity)),
+    }

@@ -1,0 +1,32 @@
+import numpy as np
+import pytest
+
+from hsv.control.adjustable import certified
+from hsv.errors import ParameterError
+
+SCALAR, DIAGONAL = np.full(5, 0.8), np.array([0.8, 0.6, 1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("values", [[0.8], [0.93], [1.0], [0.9] * 5])
+def test_everything_between_the_minimum_and_one_is_certified(values):
+    np.testing.assert_array_equal(certified(values, SCALAR), np.full(5, values[0]))
+
+
+def test_a_diagonal_factor_moves_all_dimensions_together():
+    half_way = [0.9, 0.8, 1.0, 1.0, 1.0]
+    np.testing.assert_array_equal(certified(half_way, DIAGONAL), half_way)
+
+
+@pytest.mark.parametrize(
+    ("values", "minimum", "message"),
+    [
+        ([0.79], SCALAR, r"feedback\.tau = 0\.79: expected 0\.8 to 1"),
+        ([1.0, 0.7, 1.0, 1.0, 1.0], SCALAR, r"feedback\.tau\[1\] = 0\.7: expected 0\.8 to 1"),
+        ([0.9, 1.0, 1.0, 1.0, 1.0], SCALAR, "all the same share of the way from 1"),
+        ([0.8, 1.0, 1.0, 1.0, 1.0], DIAGONAL, "all the same share of the way from 1"),
+        ([0.9], np.ones(5), "expected 1: no other factor is certified"),
+    ],
+)
+def test_what_is_not_certified_is_refused(values, minimum, message):
+    with pytest.raises(ParameterError, match=message):
+        certified(values, minimum)
