@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.utilities import remove_ros_args
 
-PATIENCE = 10.0
+PATIENCE = 30.0
 """Seconds to wait for the node, and for its answer."""
 
 
@@ -49,5 +49,8 @@ def main(args: Sequence[str] | None = None) -> int:
         result = SetParametersResult(successful=False, reason=f"value = {asked.value!r}: {error}")
     finally:
         rclpy.try_shutdown()
-    print(result.reason or f"{asked.parameter} set", file=sys.stdout if result.successful else sys.stderr)
+    print(
+        result.reason or f"{asked.parameter} = {asked.value} is set",
+        file=sys.stdout if result.successful else sys.stderr,
+    )
     return 0 if result.successful else 1

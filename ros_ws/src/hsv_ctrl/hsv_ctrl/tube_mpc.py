@@ -39,13 +39,13 @@ class TubeMpcNode(ControllerNode):
         """Fly with another ``feedback.tau``, the one parameter that is not read-only, from the next step on."""
         for parameter in parameters:
             if parameter.name == TAU.name:
+                values = list(parameter.value)
                 try:
-                    step = self.law.change_tau(list(parameter.value))
+                    step = self.law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                message = f"{TAU.name} = {list(parameter.value)} from step {step} on"
-                self.get_logger().info(message)
-                return SetParametersResult(successful=True, reason=message)
+                # Logged, and so recorded: what a parameter service answers has no room for the step.
+                self.get_logger().info(f"{TAU.name} = {values} from step {step} on")
         return SetParametersResult(successful=True)
 
 
