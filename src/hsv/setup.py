@@ -29,7 +29,6 @@ setup(
         "numpy",
         "pint",
         "piqp",
-        "plotly",
         "pyarrow",
         "pydantic",
         "pyyaml",
