@@ -21,6 +21,14 @@ def test_the_c_build_flies_the_same_flight(scenario):
 
 
 @needs_compiler
+def test_the_c_build_flies_ramps_filtered_plans_and_changes_of_tau():
+    changes = {"nominal.filtered": True, "feedback.tau_minimum": [0.5], "feedback.tau": [0.8]}
+    change = {"tau_change.starts": [10.0, 30.0], "tau_change.values": [0.6, 0.9]}
+    parts = components("case2_baseline", duration=110.0, **changes, **change)
+    assert largest_difference(fly(parts).history, CFlight(parts).fly()) <= TOLERANCE
+
+
+@needs_compiler
 def test_a_flight_that_diverges_ends_at_the_same_step():
     parts = components("case1_derived_no_notch")
     flown, other = fly(parts).history, CFlight(parts).fly()

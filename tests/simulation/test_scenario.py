@@ -206,3 +206,14 @@ def test_a_wrong_command_is_named(command, message):
     with pytest.raises(ScenarioError) as caught:
         parse_scenario(text, "x")
     assert message in str(caught.value)
+
+
+def test_tau_and_its_changes_become_parameters():
+    tube = '[tube]\ntau = 0.8\n[[tube.change]]\nstart = "5 s"\ntau = [0.6, 0.6, 0.7, 0.8, 1.0]\n'
+    text = CASE1 + tube + '[[tube.change]]\nstart = "9 s"\ntau = 0.9\n'
+    values = parse_scenario(text, "x").parameters()
+    assert values["feedback.tau"] == [0.8]
+    assert values["tau_change.starts"] == [5.0, 9.0]
+    assert values["tau_change.values"] == [0.6, 0.6, 0.7, 0.8, 1.0, 0.9, 0.9, 0.9, 0.9, 0.9]
+    assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
+    assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))

@@ -29,11 +29,13 @@ METRICS = {
     "altitude_settling_time": Metric("s", "last time before the fault that altitude is more than 2 % of the step off"),
     "altitude_overshoot": Metric("1", "largest excess over the altitude step before the fault, share of the step"),
     "altitude_integral_absolute_error": Metric("m s", "integral of |h - h_r|"),
+    "altitude_error_maximum": Metric("m", "largest |h - h_r|"),
     "altitude_end_error": Metric("m", "h - h_r at the end"),
     "velocity_rise_time": Metric("s", "10 % to 90 % of the velocity step"),
     "velocity_settling_time": Metric("s", "last time before the fault that velocity is more than 2 % of the step off"),
     "velocity_overshoot": Metric("1", "largest excess over the velocity step before the fault, share of the step"),
     "velocity_integral_absolute_error": Metric("m", "integral of |V - V_r|"),
+    "velocity_error_maximum": Metric("m/s", "largest |V - V_r|"),
     "velocity_end_error": Metric("m/s", "V - V_r at the end"),
     "post_fault_attitude_deviation": Metric(
         "rad", "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before"
@@ -77,6 +79,7 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
         error = flight.state[:, column] - flight.reference[:, column]
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
         values[f"{axis}_integral_absolute_error"] = float(np.trapezoid(np.abs(error), time))
+        values[f"{axis}_error_maximum"] = float(np.max(np.abs(error)))
         values[f"{axis}_end_error"] = float(error[-1])
     tube_error = np.abs(flight.state - flight.reference - flight.deviation)[:, 2:4]
     values["attitude_from_nominal"] = float(np.max(tube_error))
