@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from hsv.recording.flight import flight_data, input_columns, state_columns
 from hsv.recording.reader import Bag
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.simulation.scenario import load_scenario, scenario_text
 
 pytestmark = pytest.mark.graph
 
@@ -26,10 +27,30 @@ def _fly(processes: Processes, scenario: Path, name: str) -> Bag:
     return Bag(processes.folder / name)
 
 
-def test_graph_equals_in_process_bit_for_bit(processes: Processes) -> None:
-    scenario = short_scenario(processes.folder)
+def _short_case2(folder: Path) -> Path:
+    """Case 2 in five seconds, a twentieth of its ramp in a twentieth of its time, tau back to 1 in between."""
+    text = scenario_text("case2") + '[[tube.change]]\nstart = "2 s"\ntau = 1.0\n'
+    for long, short in {
+        '"200 s"': '"5 s"',
+        '"20 s"\nend': '"1 s"\nend',
+        '"80 s"': '"4 s"',
+        '"100 s"': '"3 s"',
+        '"600 ft"': '"30 ft"',
+        '"250 ft/s"': '"12.5 ft/s"',
+    }.items():
+        assert long in text
+        text = text.replace(long, short)
+    path = folder / "ramp.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("shortened", [short_scenario, _short_case2], ids=["case1", "case2"])
+def test_graph_equals_in_process_bit_for_bit(processes: Processes, shortened: Callable[[Path], Path]) -> None:
+    scenario = shortened(processes.folder)
     bag = _fly(processes, scenario, "flown")
-    history = fly(assemble(flight_parameters(load_scenario(str(scenario))))).history
+    flight = fly(assemble(flight_parameters(load_scenario(str(scenario)))))
+    history = flight.history
     nominal, filtered = bag.columns("/hsv/nominal"), bag.columns("/hsv/filtered_state")
     recorded = {
         "state": state_columns(bag.columns("/hsv/state")),
@@ -41,6 +62,7 @@ def test_graph_equals_in_process_bit_for_bit(processes: Processes) -> None:
         "command": input_columns(bag.columns("/hsv/command")),
         "actuator": input_columns(bag.columns("/hsv/actuator")),
     }
+    assert np.array_equal(state_columns(nominal, "reference."), flight.reference)
     for name, column in recorded.items():
         assert np.array_equal(column, getattr(history, name)), name
     assert flight_data(bag).fault_start == 3.0
