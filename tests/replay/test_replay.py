@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from flown_bags import flown_bag, parameters, write_bag
+from flown_bags import flown_bag, parameters, types, write_bag
 
 from hsv.errors import RecordingError
 from hsv.faults.actuator import Fault
@@ -16,7 +16,7 @@ from hsv.graph.preparation import parameter_yaml
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track
 from hsv.replay.attached import flown_parameters, refuse_vacuous
-from hsv.replay.engine import ProcessComparison, chosen, replay, rerun
+from hsv.replay.engine import ProcessComparison, chosen, fly, replay, rerun
 from hsv.replay.processes import PROCESSES
 
 CONTROLLER = "tube_mpc"
@@ -145,3 +145,19 @@ def test_bags_that_cannot_be_replayed_say_why(bag: Bag, tmp_path: Path) -> None:
     del bare.attachments["design.yaml"]
     with pytest.raises(RecordingError, match=r"no attachment design\.yaml, expected a bag recorded by hsv run"):
         flown_parameters(bare)
+
+
+def test_tau_changed_in_flight_is_repeated_from_what_was_recorded(tmp_path: Path) -> None:
+    design, scenario = parameters(12.0, 6.0)
+    design |= {"feedback.tau_minimum": [0.5]}
+    changes = {"tau_change.starts": [3.0, 7.02], "tau_change.values": [0.7, 1.0]}
+    tracks = fly(types(), CONTROLLER, design | scenario | {"feedback.tau": [0.9]} | changes, quiet)
+    bag = Bag(write_bag(tmp_path / "changed", tracks, design, scenario))
+    values = flown_parameters(bag)
+    assert values["feedback.tau"] == [0.9] * 5
+    assert values["tau_change.starts"] == pytest.approx([3.0, 7.02])
+    results = [replay(bag, process, values, quiet) for process in chosen(CONTROLLER).values()]
+    assert all(result.identical for result in [*results, *rerun(bag, CONTROLLER, values, quiet)])
+    # What was scheduled is no change in flight.
+    again = Bag(write_bag(tmp_path / "scheduled", tracks, design, scenario | {"feedback.tau": [0.9]} | changes))
+    assert flown_parameters(again)["feedback.tau"] == [0.9]
