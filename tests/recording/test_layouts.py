@@ -13,6 +13,12 @@ from hsv.recording.fields import fields_of
 from hsv.recording.viewers import LAYOUTS
 
 RECORDED = TOPICS | {"/rosout": "rcl_interfaces/msg/Log", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+PATH = re.compile(r"(/[A-Za-z_]\w*)+(\.[A-Za-z_]\w*(\[\d+\])?)+")
+"""Message paths of Foxglove without quotes, filters and slices."""
+PANELS = {"Plot", "Tab", "RosOut", "DiagnosticSummary", "RawMessages"}
+"""Types of panels in Foxglove and in Lichtblick."""
+PLOTJUGGLER_TYPE = re.compile(r"[a-zA-Z]\w*(/[a-zA-Z]\w*)?(\[\d*\])?")
+"""Types that PlotJuggler's parser reads: it takes a bounded sequence for one number, and what follows for garbage."""
 UNIT = re.compile(r"\[(-|s|m|m/s|rad|rad/s|kg\^0\.5 m|kg\^0\.5 m/s|N|N m|Pa)\]$")
 
 
@@ -56,6 +62,34 @@ def test_curves_are_numbers_of_recorded_messages(types, curves):
                 assert int(index.rstrip("]")) < field.length
             assert bool(field.format) == (depth == len(path) - 1), f"{topic}.{'.'.join(path)}"
             kind = field.type
+
+
+@pytest.mark.parametrize("topic", RECORDED)
+def test_plotjuggler_can_read_every_recorded_definition(types, topic):
+    definition, _ = types.generate_msgdef(RECORDED[topic], ros_version=2)
+    fields = [line for line in definition.splitlines() if line and not line.startswith(("=", "MSG:"))]
+    assert fields
+    for field in fields:
+        assert PLOTJUGGLER_TYPE.fullmatch(field.split()[0]), field
+
+
+def test_names_of_plotjuggler_are_those_that_its_parser_makes(types):
+    def series(kind, prefix):
+        for field in fields_of(types.fielddefs, kind):
+            lengths = {"one": None, "array": field.length}.get(field.count, 13)
+            for path in [f"{prefix}/{field.name}{'' if lengths is None else f'[{i}]'}" for i in range(lengths or 1)]:
+                yield from series(field.type, path) if field.is_message else [path]
+
+    made = {name for topic, kind in TOPICS.items() for name in series(kind, topic)}
+    root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
+    assert {curve.attrib["name"] for curve in root.iter("curve")} <= made
+
+
+def test_paths_and_panels_of_foxglove_are_in_its_grammar():
+    for name, panel in foxglove()["configById"].items():
+        assert name.partition("!")[0] in PANELS
+        for path in panel.get("paths", ()):
+            assert PATH.fullmatch(path["value"]), path["value"]
 
 
 @pytest.mark.parametrize("curves", [curves_of_foxglove, curves_of_plotjuggler])
