@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.control.design_file import find_design, read_design
-from hsv.control.notch_filter import discretise
-from hsv.control.notch_filter import series
+from hsv.control.notch_filter import discretise, series
 from hsv.design.region import corners
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import jacobian

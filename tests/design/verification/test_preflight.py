@@ -22,7 +22,7 @@ def with_entry(values, name, index, factor):
     return values | {name: [v * factor if i == index else v for i, v in enumerate(values[name])]}
 
 
-@pytest.mark.parametrize("name", ["baseline", "baseline_single_k", "baseline_derived"])
+@pytest.mark.parametrize("name", ["baseline", "baseline_single_k", "baseline_derived", "adjustable"])
 def test_shipped_designs_fly_without_a_word(name):
     assert preflight(read_parameters(find_design(name))) == ""
 

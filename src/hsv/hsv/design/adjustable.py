@@ -127,7 +127,7 @@ def _report(
         "share": incomplete_share(inputs),
         "lyapunov": lyapunov.report(),
         "complete": complete,
-        "incomplete_bounds": sets.incomplete.report()["tightening"],
+        "incomplete": sets.incomplete.report(),
         "scaled_half_width": (tau * np.array(complete["invariant_set"]["half_width"])).tolist(),
         "complete_fault": flights_report(beyond),
     }

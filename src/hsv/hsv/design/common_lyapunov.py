@@ -10,9 +10,10 @@ import numpy as np
 from cvxpy.atoms.affine.bmat import bmat
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
-from hsv.design.lmi import SolverReport
+from hsv.design.lmi import SolverReport, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.solver import solve
+from hsv.errors import DesignError
 
 _CONDITION = 1e3
 """Bound on the condition number of N, whitened, without which the largest margin is not attained."""
@@ -47,6 +48,9 @@ def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> Co
         DesignError: No solution, or one that fails (24) when recomputed.
     """
     mean = closed_loop.mean(axis=0)
+    radius = float(spectral_radii(mean[None])[0])
+    if not radius < 1.0:
+        raise DesignError(f"{name}: spectral radius {radius:.6g} of the mean of the loops, expected below 1")
     L = cholesky(solve_discrete_lyapunov(mean, np.diag(scale**2)), lower=True)
     white = np.linalg.solve(L, closed_loop @ L)
     n = len(mean)

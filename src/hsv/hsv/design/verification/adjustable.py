@@ -1,40 +1,25 @@
-"""Claims of the adjustable factor: one Lyapunov function for all certified loops, Z and the bounds that follow."""
+"""Claims of the adjustable design: Z at tau = 1, what the relaxed bounds follow from, the coupled vehicle's poles."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Generator, Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
+from hsv.control.design_file import ControlDesign
+from hsv.design.baseline import nominal_problem
 from hsv.design.coupled_poles import largest_real_parts
-from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
-from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.sets.ellipsoid_set import vertex_residuals
+from hsv.design.factor import relaxed_bound
+from hsv.design.nominal_problem import certified_cost
+from hsv.design.sets.ellipsoid_set import EllipsoidSet, vertex_residuals
 from hsv.design.tightening import tighten
-from hsv.design.verification.claims import Claim, Subject, above, at_most, required, same
+from hsv.design.verification.claims import Claim, Subject, above, at_most, same
 from hsv.design.verification.invariant_set import stored_set
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
-
-
-def factor_claims(subject: Subject) -> Iterable[Claim]:
-    """Recompute what the range of the factor rests on; that of a design without one is 1 alone."""
-    design, stored = subject.design, subject.certificate.get("adjustable")
-    if stored is None:
-        yield required(same("feedback.tau_minimum", design.tau_minimum, np.ones(N_RIGID)))
-        return
-    yield required(same("feedback.tau_minimum", design.tau_minimum, stored["tau_minimum"]))
-    effectiveness = subject.certificate["inputs"]["disturbance"]["elevator_effectiveness"]
-    residuals = lyapunov_residuals(
-        certified_loops(design, effectiveness), np.array(stored["lyapunov"]["N"]), "common Lyapunov function"
-    )
-    yield required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0))
-    yield same("its eigenvalues as certified", residuals, stored["lyapunov"]["lmi_smallest_eigenvalues"], 1e-6, 1e-9)
-    room = room_at_one(design, subject.certificate["tube"])
-    yield same("room of the nominal plan at tau = 1", stored["room_at_one"], room, 1e-6, 1e-9)
-    yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))
 
 
 def adjustable_claims(subject: Subject) -> Iterable[Claim]:
@@ -43,23 +28,21 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     if stored is None:
         return
     one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
-    complete = stored_set(one, stored["complete"])
-    residuals = vertex_residuals(
-        complete.problem, complete.centre, complete.Q, complete.contraction, complete.multipliers
-    )
-    yield above("Z at tau = 1, invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0)
-    half_width = stored["complete"]["invariant_set"]["half_width"]
-    yield same("Z at tau = 1, half-widths from Q", half_width, complete.half_width)
-    tau = np.append(design.tau_minimum, np.full(len(half_width) - N_RIGID, design.tau_minimum[-1]))
+    complete = yield from _set_claims("Z at tau = 1", one, stored["complete"])
+    incomplete = yield from _set_claims("Z' of the unrelaxed plan", design, stored["incomplete"])
+    tau = np.append(design.tau_minimum, np.full(len(complete.half_width) - N_RIGID, design.tau_minimum[-1]))
     yield same("tau Z, half-widths", stored["scaled_half_width"], tau * complete.half_width)
-    bounds, kept = tighten(complete, design.input_minimum, design.input_maximum), stored["complete"]["tightening"]
-    yield same("U minus F Z at tau = 1, lower", kept["lower"], bounds.lower)
-    yield same("U minus F Z at tau = 1, upper", kept["upper"], bounds.upper)
-    wider = {side: np.array(stored["incomplete_bounds"][side]) for side in ("lower", "upper")}
-    target = subject.inputs.nominal.target
+    inputs = subject.inputs
+    target = inputs.nominal.target
     trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
-    relaxed = relaxed_bound(subject.inputs.nominal.input_bound.array(), trimmed, bounds, replace(bounds, **wider))
+    bounds = (tighten(found, design.input_minimum, design.input_maximum) for found in (complete, incomplete))
+    relaxed = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, *bounds)
     yield same("(52) bounds of |u_n|", stored["input_bound"], relaxed)
+    single = stored["single_gain"]
+    Q = np.array(single["Q"])
+    K = np.linalg.solve(Q, np.array(single["Y"]).T).T
+    gamma, _ = certified_cost(nominal_problem(inputs, design.polytope, relaxed), K, Q, "single nominal gain K'")
+    yield same("certified cost of the single K'", gamma, single["certified_gamma"], 1e-6)
     full = stored.get("full_state")
     if full:
         parts = largest_real_parts(design, np.array(full["gain"]), (target.altitude, target.velocity))
@@ -68,3 +51,14 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
         derived = parts["full_state"]["derived"]
         yield above("the same with the full-state F', derived coupling", derived, 0.0)
         yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], 1e-6)
+
+
+def _set_claims(name: str, design: ControlDesign, stored: dict[str, Any]) -> Generator[Claim, None, EllipsoidSet]:
+    found = stored_set(design, stored)
+    residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
+    yield above(f"{name}, invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0)
+    yield same(f"{name}, half-widths from Q", stored["invariant_set"]["half_width"], found.half_width)
+    bounds, kept = tighten(found, design.input_minimum, design.input_maximum), stored["tightening"]
+    yield same(f"{name}, what it leaves of the inputs, lower", kept["lower"], bounds.lower)
+    yield same(f"{name}, what it leaves of the inputs, upper", kept["upper"], bounds.upper)
+    return found

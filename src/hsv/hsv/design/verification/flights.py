@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from hsv.design.disturbance import ChannelModel
 from hsv.design.region import Region, incomplete_share, measure
+from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.sampling import sample
-from hsv.design.tube import flight_evidence
+from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most, same
 from hsv.design.verification.invariant_set import certified_set
@@ -20,31 +23,44 @@ _FLIGHTS, _FLIGHT_SEED = 48, 7
 
 def flight_claims(subject: Subject) -> Iterable[Claim]:
     """Fly the corners that set a bound, and a sample of all, again."""
-    stored, design = subject.certificate["tube"], subject.design
-    region, model = Region(design, subject.inputs, incomplete_share(subject.inputs)), channel_model(design)
+    stored, share = subject.certificate["tube"], incomplete_share(subject.inputs)
+    # As certified: in flight the factor may be another one.
+    design = replace(subject.design, tau=subject.design.tau_minimum)
+    region, model = Region(design, subject.inputs, share), channel_model(design)
     measured = stored["disturbance"]["measured"]
-    seen, everyone = region.fraction(), region.corners()
+    seen = region.fraction()
     setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
     again = measure(region, model, [seen[i] for i in setters]).channels
     for side, value in (("lower", again.lower), ("upper", again.upper)):
         yield same(f"measured disturbances, {side}", value, measured[side], 1e-6, 1e-12)
     found = certified_set(subject)
-    disturbance = found.problem.disturbance
-    drawn = np.random.default_rng(_FLIGHT_SEED).choice(len(everyone), _FLIGHTS, replace=False)
-    flown = region.map(
-        lambda flight: flight_evidence(flight, found, disturbance, model), [everyone[i] for i in (0, *drawn)]
-    )
-    kept = stored["flights"]
-    level = max(f.level or 0.0 for f in flown)
-    yield at_most("level of flown corners", level, min(1.0, kept["worst_level"] * (1.0 + 1e-6)))
-    ratio = max(f.membership.ratio for f in flown)
-    yield at_most("disturbances of flown corners", ratio, kept["disturbance_membership"]["worst_ratio"] * (1.0 + 1e-6))
+    flown = _sample(region, found, model)
+    yield from _worst("flown corners", flown, stored["flights"])
     plan = stored["tightening"]["plan"]
     low, high = plan["pitch_acceleration"]
     least, most = np.append(plan["lowest"], low), np.append(plan["highest"], high)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
     yield above("nominal plan of flown corners, lowest", float(np.min(lowest - least)), -1e-9)
     yield above("nominal plan of flown corners, highest", float(np.min(most - highest)), -1e-9)
+    if "adjustable" in subject.certificate:
+        flown = _sample(Region(design, subject.inputs, 1.0), found, model)
+        yield from _worst("flown corners, whole fault", flown, subject.certificate["adjustable"]["complete_fault"])
+
+
+def _sample(region: Region, found: EllipsoidSet, model: ChannelModel) -> list[FlightEvidence]:
+    everyone = region.corners()
+    drawn = np.random.default_rng(_FLIGHT_SEED).choice(len(everyone), _FLIGHTS, replace=False)
+    disturbance = found.problem.disturbance
+    return region.map(
+        lambda flight: flight_evidence(flight, found, disturbance, model), [everyone[i] for i in (0, *drawn)]
+    )
+
+
+def _worst(name: str, flown: list[FlightEvidence], kept: dict[str, Any]) -> Iterable[Claim]:
+    level = max(f.level or 0.0 for f in flown)
+    yield at_most(f"level of {name}", level, min(1.0, kept["worst_level"] * (1.0 + 1e-6)))
+    ratio = max(f.membership.ratio for f in flown)
+    yield at_most(f"disturbances of {name}", ratio, kept["disturbance_membership"]["worst_ratio"] * (1.0 + 1e-6))
 
 
 def sequence_claims(subject: Subject) -> Iterable[Claim]:

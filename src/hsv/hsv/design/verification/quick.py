@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from hsv.design.verification.adjustable import factor_claims
 from hsv.design.verification.claims import Claim, Subject
+from hsv.design.verification.factor import factor_claims
 from hsv.design.verification.gains import feedback_claims, nominal_claims
 from hsv.design.verification.invariant_set import set_claims
 from hsv.design.verification.model import input_claims

@@ -1,0 +1,30 @@
+"""Claims of the adjustable factor that a flight rests on: one Lyapunov function for every factor that is certified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from hsv.design.factor import certified_loops, room_at_one
+from hsv.design.lyapunov import lyapunov_residuals
+from hsv.design.verification.claims import Claim, Subject, above, required, same
+from hsv.vehicle.dynamics import N_RIGID
+
+
+def factor_claims(subject: Subject) -> Iterable[Claim]:
+    """Recompute what the range of the factor rests on; that of a design without one is 1 alone."""
+    design, stored = subject.design, subject.certificate.get("adjustable")
+    if stored is None:
+        yield required(same("feedback.tau_minimum", design.tau_minimum, np.ones(N_RIGID)))
+        return
+    yield required(same("feedback.tau_minimum", design.tau_minimum, stored["tau_minimum"]))
+    effectiveness = subject.certificate["inputs"]["disturbance"]["elevator_effectiveness"]
+    residuals = lyapunov_residuals(
+        certified_loops(design, effectiveness), np.array(stored["lyapunov"]["N"]), "common Lyapunov function"
+    )
+    yield required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0))
+    yield same("its eigenvalues as certified", residuals, stored["lyapunov"]["lmi_smallest_eigenvalues"], 1e-6, 1e-9)
+    room = room_at_one(design, subject.certificate["tube"])
+    yield same("room of the nominal plan at tau = 1", stored["room_at_one"], room, 1e-6, 1e-9)
+    yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))

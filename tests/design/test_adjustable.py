@@ -1,0 +1,164 @@
+"""The adjustable design: what is certified for every factor, and what the paper's rules would give instead."""
+
+import copy
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.common_lyapunov import common_lyapunov
+from hsv.design.error_system import error_system, union
+from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
+from hsv.design.inputs import read_inputs, with_tau
+from hsv.design.region import corners, incomplete_share, region_parameters
+from hsv.design.tightening import TightenedInputs
+from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.verification.adjustable import adjustable_claims
+from hsv.design.verification.claims import gathered
+from hsv.design.verification.factor import factor_claims
+from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.verifier import load_subject, verify
+from hsv.errors import DesignError
+from hsv.vehicle.parameters import uncertainty_bounds
+
+OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
+
+
+@pytest.fixture(scope="module")
+def subject():
+    return load_subject(OFFLINE_DESIGN / "adjustable.yaml")
+
+
+@pytest.fixture(scope="module")
+def stored(subject):
+    return subject.certificate["adjustable"]
+
+
+def failures(claims):
+    return [claim.name for made in claims.values() for claim in made if not claim.ok]
+
+
+def test_every_claim_holds(subject):
+    assert failures(verify(subject)) == []
+
+
+def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
+    assert incomplete_share(subject.inputs) == 0.8
+    assert_allclose(region_parameters(subject.inputs, 0.8)["fault.values"], [0.92])
+    bounds = uncertainty_bounds()
+    assert_allclose([abs(change) for change in corners(0.8)[1].values()], [0.8 * b for b in bounds.values()])
+    assert incomplete_share(with_tau(subject.inputs, [0.8, 0.7, 1.0, 1.0, 0.9])) == 1.0
+
+
+def test_set_is_invariant_under_every_factor_that_is_certified(subject):
+    found = certified_set(subject)
+    design, model = subject.design, channel_model(subject.design)
+    for tau in (0.8, 0.87, 1.0):
+        gain = tau * design.feedback_gain[:, :5]
+        system = error_system(design.polytope.A, design.polytope.B, gain, model.notch, model.columns)
+        columns = dataclasses.replace(found.problem, system=system).columns(found.centre)
+        # The worst next level from any point of the boundary, by the S-procedure with the certified contraction.
+        factor = np.linalg.cholesky(found.Q)
+        A = np.linalg.solve(factor, system.A @ factor)
+        assert np.linalg.norm(A, 2, axis=(1, 2)).max() < 1.0
+        reach = np.abs(np.linalg.solve(factor, columns)).sum(axis=2)
+        assert np.linalg.norm(reach, axis=1).max() < 1.0
+    assert len(found.problem.system.A) == 12
+    assert_allclose(found.problem.system.F[:, :4], 0.8 * subject.design.feedback_gain[:, :4])
+
+
+def test_tau_z_is_too_small_for_the_gain_that_flies(stored, subject):
+    # The velocity is held by the feedback alone: with less of it the set grows, tau Z shrinks.
+    flown = subject.design.tube.half_width
+    assert flown[1] > 1.2 * stored["scaled_half_width"][1]
+    assert flown[0] > stored["scaled_half_width"][0]
+
+
+def test_full_state_feedback_rebuilds_the_pitch_rate_and_cancels_the_notch(stored):
+    full = stored["full_state"]
+    assert_allclose(full["elevator_on_pitch_rate"], full["structured_elevator_on_pitch_rate"], rtol=0.02)
+    parts = full["largest_real_part"]
+    assert max(full["spectral_radii"]) < 1.0  # fine on the model that it was found on
+    assert parts["full_state"]["derived"] > 0.5 and parts["structured"]["derived"] < -0.1
+    assert parts["full_state"]["paper_like"] > parts["structured"]["paper_like"] + 0.2
+
+
+def test_nominal_bounds_grow_with_the_room(stored, subject):
+    design = subject.design
+    assert np.all(np.array(stored["input_bound"]) > subject.inputs.nominal.input_bound.array())
+    wide = TightenedInputs(np.array([0.1, -0.5]), np.array([1.4, 0.5]))
+    narrow = TightenedInputs(np.array([0.2, -0.5]), np.array([1.3, 0.4]))
+    trim_input = np.array([0.3, 0.2])
+    grown = relaxed_bound(np.array([0.25, 0.19]), trim_input, narrow, wide)
+    assert_allclose(grown, [0.25 * 0.2 / 0.1, 0.19 * 0.3 / 0.2])
+    with pytest.raises(DesignError, match="expected room above zero"):
+        relaxed_bound(np.array([0.25, 0.19]), np.array([0.05, 0.2]), narrow, wide)
+    assert np.all(room_at_one(design, subject.certificate["tube"]) > 0.0)
+
+
+def test_one_lyapunov_function_for_all_certified_loops(subject):
+    loops = certified_loops(subject.design, 0.9)
+    assert len(loops) == 6 * 2 * 2
+    N = np.array(subject.certificate["adjustable"]["lyapunov"]["N"])
+    factor = np.linalg.cholesky(N)
+    assert np.linalg.norm(np.linalg.solve(factor, loops @ factor), 2, axis=(1, 2)).max() < 1.0
+
+
+def test_stable_loops_without_a_common_function_are_refused():
+    # Each nilpotent, their product expands, and so does their mean; with a third, in part, the mean does not.
+    loops = np.array([[[0.0, 2.0], [0.0, 0.0]], [[0.0, 0.0], [2.0, 0.0]]])
+    with pytest.raises(DesignError, match="two loops: spectral radius 1 of the mean"):
+        common_lyapunov(loops, np.ones(2), "two loops")
+    with pytest.raises(DesignError, match="three loops: smallest eigenvalue"):
+        common_lyapunov(np.array([*loops, np.zeros((2, 2))]), np.ones(2), "three loops")
+    found = common_lyapunov(0.3 * loops, np.ones(2), "two loops")
+    assert found.residuals.min() > 0.0
+
+
+def test_union_keeps_the_first_feedback(subject):
+    problem = tube_problem(subject.design, certified_set(subject).problem.disturbance)
+    both = union(problem.system, problem.system)
+    assert len(both.A) == 2 * len(problem.system.A)
+    assert both.F is problem.system.F
+
+
+@pytest.mark.parametrize(
+    ("path", "factor", "claim"),
+    [
+        (("lyapunov", "N"), None, "common Lyapunov"),
+        (("room_at_one",), 1.01, "room of the nominal plan"),
+        (("scaled_half_width",), 1.01, "tau Z"),
+        (("input_bound",), 1.01, "(52)"),
+        (("complete", "invariant_set", "half_width"), 0.99, "Z at tau = 1"),
+        (("full_state", "gain"), 1.01, "rightmost pole"),
+    ],
+)
+def test_a_changed_certificate_is_noticed(subject, path, factor, claim):
+    certificate = copy.deepcopy(subject.certificate)
+    *parents, last = ("adjustable", *path)
+    table = certificate
+    for name in parents:
+        table = table[name]
+    value = np.array(table[last])
+    table[last] = (np.eye(len(value)) if factor is None else factor * value).tolist()
+    altered = dataclasses.replace(subject, certificate=certificate)
+    made = gathered("factor", lambda: factor_claims(altered)) + gathered("rest", lambda: adjustable_claims(altered))
+    assert any(not one.ok for one in made), claim
+
+
+def test_a_wider_range_than_certified_is_refused(subject):
+    values = subject.design.to_parameters() | {"feedback.tau_minimum": [0.7]}
+    wider = dataclasses.replace(subject, design=ControlDesign.from_parameters(values))
+    failing = [c for c in verify(wider, quick=True)["adjustable factor"] if not c.ok]
+    assert failing[0].name.startswith("feedback.tau_minimum") and failing[0].required
+
+
+def test_wrong_factors_are_named():
+    inputs = read_inputs(OFFLINE_DESIGN / "adjustable.toml")
+    with pytest.raises(DesignError, match=r"tau = \[1\.2\]: expected one value, or five, above 0 and at most 1"):
+        with_tau(inputs, [1.2])
+    with pytest.raises(DesignError, match=r"expected a design with an \[adjustable\] table"):
+        with_tau(read_inputs(OFFLINE_DESIGN / "baseline.toml"), [0.8])
