@@ -114,13 +114,18 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 def _tau_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
+    recorded_status = [status for _, status in bag.decode("/hsv/tube_status")]
+    if recorded_status and not np.shape(recorded_status[0].tau):
+        raise RecordingError(
+            f"{bag.path}: topic /hsv/tube_status: recorded with another definition, one number for tau"
+        )
     if controller_of(values) != TUBE_MPC.name:
         return {}
     design = ControlDesign.from_parameters(values)
     schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]
     flown: list[tuple[int, np.ndarray]] = []
     planned = []
-    for _, status in bag.decode("/hsv/tube_status"):
+    for status in recorded_status:
         recorded = factors(status.tau, TAU.name)
         if not flown or np.any(recorded != flown[-1][1]):
             flown.append((status.step, recorded))
