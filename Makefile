@@ -45,7 +45,7 @@ references: lint ## run all tests, then fly the reference bags of bags/reference
 	@source ./env.sh && python3 -m pytest -m "not reference" && python3 tools/references.py
 
 # Without a package index everything else is measured all the same.
-bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--only in_process")
+bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")
 	-@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
 	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-bench.txt --constraint "$$pins"
 	@$(IN_ENVIRONMENT) hsv bench --out docs/benchmarks.md $(ARGS)

@@ -11,3 +11,9 @@ def test_bench_names_an_unknown_group(hsv):
     ran = hsv("bench", "--only", "everything")
     assert ran.code == 2
     assert "only = 'everything'" in ran.error
+
+
+def test_a_part_does_not_replace_the_table_of_a_whole_run(hsv, tmp_path):
+    ran = hsv("bench", "--only", "mcap", "--out", tmp_path / "page.md")
+    assert ran.code == 2
+    assert "expected no --only" in ran.error

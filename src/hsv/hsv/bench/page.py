@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import os
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hsv.bench.figure import Figure
@@ -37,26 +37,36 @@ def table(figures: Sequence[Figure]) -> str:
 
 
 def machine() -> str:
-    """Return processor, cores, system and Python, in one line."""
+    """Return processor, cores, system, Python and how busy it is just now, in one line."""
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
         models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
         name = models[0].split(":", 1)[1].strip() if models else name
-    load = f", load average {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
+    load = f", load average before {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
     return f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}{load}"
 
 
-def replace_table(page: Path, figures: Sequence[Figure]) -> None:
-    """Put the table of ``figures`` between the marks of ``page``.
+class Page:
+    """A page of the documentation with marks, between which the table of a whole run is kept."""
 
-    Raises:
-        QuantityError: The page has no marks.
-    """
-    text = page.read_text(encoding="utf-8") if page.exists() else ""
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not (begin and end):
-        raise QuantityError(f"out = {str(page)!r}: expected a page with the marks {BEGIN!r} and {END!r}")
-    day = datetime.datetime.now(datetime.UTC).date().isoformat()
-    page.write_text(f"{before}{BEGIN}\n{day}, {machine()}.\n\n{table(figures)}\n{END}{after}", encoding="utf-8")
+    def __init__(self, path: Path) -> None:
+        """Read ``path``.
+
+        Raises:
+            QuantityError: The page has no marks.
+        """
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
+        self._path = path
+        self._before, begin, rest = text.partition(BEGIN)
+        _, end, self._after = rest.partition(END)
+        if not (begin and end):
+            raise QuantityError(f"out = {str(path)!r}: expected a page with the marks {BEGIN!r} and {END!r}")
+
+    def write(self, measured_on: str, figures: Sequence[Figure], skipped: Mapping[str, str]) -> None:
+        """Put the table of ``figures`` there, the machine above, what was not measured and why below."""
+        day = datetime.datetime.now(datetime.UTC).date().isoformat()
+        lines = [f"{day}, {measured_on}.", "", table(figures), ""]
+        lines += [f"Not measured: {name}, {reason}." for name, reason in skipped.items()]
+        text = "\n".join(lines).rstrip()
+        self._path.write_text(f"{self._before}{BEGIN}\n{text}\n{END}{self._after}", encoding="utf-8")

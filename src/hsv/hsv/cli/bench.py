@@ -24,20 +24,25 @@ def bench(
 
     Example: hsv bench --only in_process --only mcap
     """
-    from hsv.bench.page import replace_table
+    from hsv.bench.page import Page, machine
     from hsv.bench.suite import groups
     from hsv.cli.progress import stages
     from hsv.errors import QuantityError, RunError
 
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
+    if out and only:
+        raise QuantityError(f"out = {str(out)!r}: expected no --only with it, the page keeps the table of a whole run")
+    page = None
     if out:
         check_target(out, "out")
+        page = Page(out)
     available = groups(scale)
     for name in only or ():
         if name not in available:
             raise QuantityError(f"only = {name!r}: expected one of {', '.join(available)}")
     chosen = [name for name in available if not only or name in only]
+    measured_on = machine()
     figures: list[Figure] = []
     skipped: dict[str, str] = {}
     with stages() as progress:
@@ -58,8 +63,8 @@ def bench(
         _print(figures)
         for name, reason in skipped.items():
             errors.print(f"{name}: not measured: {reason}", markup=False, soft_wrap=True)
-    if out:
-        replace_table(out, figures)
+    if page:
+        page.write(measured_on, figures, skipped)
 
 
 def _as_json(figure: Figure) -> dict[str, Any]:
