@@ -8,6 +8,7 @@ from typing import Any
 import typer
 
 from hsv.cli.bench import bench
+from hsv.cli.claims import claims
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
@@ -24,6 +25,7 @@ from hsv.cli.report import report
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.simulate import simulate
+from hsv.cli.study import study
 from hsv.cli.trim import trim
 from hsv.cli.verify import verify
 from hsv.cli.view import view
@@ -60,6 +62,8 @@ for command in (
     export,
     bench,
     figures,
+    claims,
+    study,
 ):
     app.command()(command)
 app.add_typer(montecarlo, name="montecarlo")

@@ -1,0 +1,47 @@
+"""The command ``hsv study``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import FlightsOption, JsonOption
+from hsv.cli.output import console, print_json
+
+
+def study(
+    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters or fault.")],
+    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of the study.")] = Path("study"),
+    flights: FlightsOption = Path("bags/study"),
+    coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,
+    json: JsonOption = False,
+) -> None:
+    """Carry the results over what the paper leaves open, until each controller is lost; plot and say where.
+
+    Example: hsv study coupling --out study
+    """
+    import matplotlib
+
+    from hsv.cli.progress import stages
+    from hsv.errors import QuantityError
+    from hsv.study.figures.style import RC, save
+    from hsv.study.sensitivity.catalogue import STUDIES, page
+
+    if name not in STUDIES:
+        raise QuantityError(f"study = {name!r}: expected one of {', '.join(STUDIES)}")
+    if not 1.0 <= coarseness <= 100.0:
+        raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
+    out.mkdir(parents=True, exist_ok=True)
+    with stages() as progress, matplotlib.rc_context(RC):
+        outcome = STUDIES[name].run(coarseness, flights, progress)
+        written = save(outcome.figure, out / name)
+    target = out / f"{name}.md"
+    target.write_text(page(STUDIES[name], outcome), encoding="utf-8")
+    if json:
+        print_json({"study": name, "findings": list(outcome.findings), "strips": outcome.strips})
+        return
+    for finding in outcome.findings:
+        console.print(f"- {finding}", soft_wrap=True, markup=False)
+    console.print(f"written {', '.join(map(str, (*written, target)))}", soft_wrap=True)

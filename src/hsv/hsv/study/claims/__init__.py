@@ -1,0 +1,1 @@
+"""The paper's checkable statements, measured: one module a part of the paper."""

@@ -1,0 +1,115 @@
+"""A scenario flown with the nominal vehicle and at every corner of the parameter bounds, and what was measured."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.campaign.tube_levels import TubeLevels
+from hsv.control.design_file import ControlDesign
+from hsv.design.region import Corner, corners
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.study.measures import flight_measures
+from hsv.study.sources import DIGITS, flight_digest
+from hsv.vehicle.plant import FlightStatus, Plant
+
+Progress = Callable[[str, int, int], None]
+
+Table = dict[str, np.ndarray]
+"""Columns (flights) by measure, the nominal vehicle first; what a flight does not define is not a number."""
+
+
+def compiled(values: dict[str, Any]) -> dict[str, Any]:
+    """Return parameters of the same flight that the compiled loop takes.
+
+    Robust MPC, u = K (x - x_r) + u_r, is the tube law with F = K about a nominal trajectory under u_n = K x_n: the
+    nominal state drops out. It holds in exact arithmetic; the flights agree to rounding.
+    """
+    if values["controller"] != "robust_mpc":
+        return values
+    design = ControlDesign.from_parameters(values)
+    gain = design.nominal_gains[values["robust_mpc.gain_index"]].ravel().tolist()
+    kept = {name: value for name, value in values.items() if not name.startswith("tube.")}
+    return {
+        **kept,
+        "controller": "tube_mpc",
+        "feedback.gain": gain,
+        "nominal.gains": gain,
+        "nominal.ellipsoids": design.nominal_ellipsoids[0].ravel().tolist(),
+    }
+
+
+def fly_over(
+    values: dict[str, Any],
+    over: Sequence[Corner],
+    half_width: np.ndarray,
+    progress: Callable[[int], None] = lambda done: None,
+    coupling_scale: float | None = None,
+) -> Table:
+    """Fly the flat parameters ``values`` with each of the vehicles in ``over``, in as many threads as processors.
+
+    Args:
+        values: Of the nominal flight.
+        over: Relative changes of the vehicle's parameters, one flight each.
+        half_width: (5) as for :func:`hsv.study.measures.flight_measures`.
+        progress: Called with the number of flights done.
+        coupling_scale: Times the derived inertial coupling, in place of a named set.
+    """
+    levels, parts = TubeLevels(values), assemble(compiled(values))
+    if coupling_scale is not None:
+        p = parts.plant
+        vehicle = p.vehicle.with_coupling_scale(coupling_scale)
+        parts = replace(parts, plant=Plant(vehicle, p.initial, p.period, p.steps, p.substeps))
+
+    def job(corner: Corner) -> dict[str, float]:
+        flight = fly(parts.perturbed(corner))
+        data = flight.data()
+        level = levels.worst(data)
+        return {
+            "diverged": float(flight.status is FlightStatus.DIVERGED),
+            "end_time": float(data.time[-1]),
+            **({} if level is None else {"tube_level": level}),
+            **flight_measures(data, half_width),
+        }
+
+    rows = []
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        for row in pool.map(job, over):
+            rows.append(row)
+            progress(len(rows))
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
+
+
+def corner_table(scenario: str, folder: Path, half_width: np.ndarray, progress: Progress) -> Table:
+    """Return the table of a shipped scenario over the nominal vehicle and all corners, flown once and kept.
+
+    Args:
+        scenario: Its name.
+        folder: Where tables are kept, under a digest of what they depend on.
+        half_width: (5) as above.
+        progress: Called with what is done.
+    """
+    path = folder / f"corners_{scenario}_{flight_digest(scenario)[:DIGITS]}.npz"
+    if path.is_file():
+        with np.load(path) as kept:
+            return dict(kept)
+    over = corners()
+    what = f"corners of {scenario}"
+    progress(what, 0, len(over))
+    values = flight_parameters(load_scenario(scenario))
+    table = fly_over(values, over, half_width, lambda done: progress(what, done, len(over)))
+    folder.mkdir(parents=True, exist_ok=True)
+    new = path.with_suffix(".tmp")
+    with new.open("wb") as stream:
+        np.savez_compressed(stream, **table)  # type: ignore[arg-type]
+    new.rename(path)
+    return table

@@ -1,0 +1,115 @@
+"""The sampled closed loop, linear: the vehicle at trim under held inputs, the discrete notch filter, the feedback F."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsv.control.notch_filter import NotchSection, discretise, series
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.envelope import FOOT
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.trim import trim
+
+START = (85500.0 * FOOT, 7900.0 * FOOT)
+TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
+"""Altitude (m) and velocity (m/s) at which Case 1 starts and ends."""
+
+PITCH_RATE, ELEVATOR = 4, 1
+ELASTIC_FROM = 8.0
+"""rad/s: poles that oscillate faster are elastic."""
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """A (9 + s, 9 + s) of vehicle and filter, the loop open; B (9 + s, 2) of the inputs; gain (2, 9 + s), u = gain x.
+
+    ``period`` in s; the effectiveness of the elevator is in B.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    gain: np.ndarray
+    period: float
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Poles of the closed loop as continuous ones, rad/s, complex."""
+        closed = np.linalg.eigvals(self.A + self.B @ self.gain).astype(complex)
+        return np.asarray(np.log(closed) / self.period)
+
+    @property
+    def growth(self) -> float:
+        """Largest real part of all poles, 1/s: below zero the loop is stable."""
+        return float(self.poles.real.max())
+
+    @property
+    def elastic_growth(self) -> float:
+        """Largest real part of the elastic poles, 1/s."""
+        poles = self.poles
+        return float(poles[np.abs(poles.imag) > ELASTIC_FROM].real.max())
+
+    def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
+        """Return L (f), the response of the loop broken at the elevator, the other input closed; -1 is critical."""
+        A = self.A + np.outer(self.B[:, 1 - ELEVATOR], self.gain[1 - ELEVATOR])
+        z = np.exp(1j * np.asarray(frequencies, float) * self.period)
+        states = np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, self.B[:, ELEVATOR, None].astype(complex))
+        return np.asarray(-(self.gain[ELEVATOR] @ states[:, :, 0].T))
+
+
+def sampled_loop(
+    vehicle: VehicleParameters,
+    feedback: np.ndarray,
+    notch: Sequence[NotchSection],
+    period: float,
+    *,
+    point: tuple[float, float] = TARGET,
+    effectiveness: float = 1.0,
+) -> SampledLoop:
+    """Return the loop around ``vehicle``.
+
+    Args:
+        vehicle: Coupled or not.
+        feedback: (2, 9) gain F (times tau) on the states, the filtered pitch rate among them.
+        notch: Sections of the filter, none: the pitch rate passes.
+        period: Control period (s).
+        point: Altitude (m) and velocity (m/s) of the trim.
+        effectiveness: Of the elevator.
+
+    Raises:
+        TrimError: No equilibrium there.
+    """
+    equilibrium = trim(vehicle, *point)
+    A, B = zero_order_hold(*jacobian(equilibrium.state, equilibrium.input, vehicle), period)
+    A_s, B_s, C_s, D_s = series(discretise(notch, period))
+    n, s = len(A), len(A_s)
+    whole, inputs = np.zeros((n + s, n + s)), np.zeros((n + s, B.shape[1]))
+    whole[:n, :n], whole[n:, n:], whole[n:, PITCH_RATE] = A, A_s, B_s
+    inputs[:n] = B
+    inputs[:, ELEVATOR] *= effectiveness
+    gain = np.hstack((feedback, np.outer(feedback[:, PITCH_RATE], C_s)))
+    gain[:, PITCH_RATE] *= D_s
+    return SampledLoop(whole, inputs, gain, period)
+
+
+@dataclass(frozen=True)
+class Margin:
+    """A crossing of unit gain: frequency (rad/s) and phase margin (rad, its distance from -1 on the circle)."""
+
+    frequency: float
+    phase: float
+
+
+def phase_margins(frequencies: np.ndarray, response: np.ndarray) -> list[Margin]:
+    """Return the phase margin at every crossing of unit gain of L (f), by linear interpolation of its logarithm."""
+    gain, phase = np.log(np.abs(response)), np.unwrap(np.angle(response))
+    margins = []
+    for i in np.flatnonzero(np.sign(gain[:-1]) != np.sign(gain[1:])):
+        share = gain[i] / (gain[i] - gain[i + 1])
+        angle = phase[i] + share * (phase[i + 1] - phase[i])
+        distance = np.abs(np.angle(np.exp(1j * (angle - np.pi))))
+        margins.append(Margin(float(frequencies[i] + share * (frequencies[i + 1] - frequencies[i])), float(distance)))
+    return margins

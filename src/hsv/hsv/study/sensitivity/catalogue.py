@@ -1,0 +1,24 @@
+"""All studies by name, and the page of one."""
+
+from __future__ import annotations
+
+from hsv.study.sensitivity import coupling, fault, notch, parameters, sampling
+from hsv.study.sensitivity.study import Outcome, Study
+
+STUDIES: dict[str, Study] = {m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault)}
+
+_PAGE = """# Sensitivity: {title}
+Made by `hsv study {name} --out docs/study`; the numbers are of this run.
+
+![{title}]({name}.png)
+
+{shows}
+
+{findings}
+"""
+
+
+def page(study: Study, outcome: Outcome) -> str:
+    """Return the page in Markdown."""
+    findings = "\n".join(f"- {finding[0].upper()}{finding[1:]}." for finding in outcome.findings)
+    return _PAGE.format(title=study.title, name=study.name, shows=outcome.shows, findings=findings)

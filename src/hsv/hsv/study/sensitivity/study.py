@@ -1,0 +1,49 @@
+"""What a sensitivity study is and what comes out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A study done: its figure, a sentence on what is shown, what was found, and the numbers behind it (SI)."""
+
+    figure: Figure
+    shows: str
+    findings: tuple[str, ...]
+    strips: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study; ``run`` takes how coarse to be (1: as in the docs), a folder for designs, and a progress callback."""
+
+    name: str
+    title: str
+    run: Callable[[float, Path, Progress], Outcome]
+
+
+def grid(low: float, high: float, step: float, coarseness: float) -> np.ndarray:
+    """Return values from ``low`` to ``high``, ``step`` apart where ``coarseness`` is 1, fewer where it is larger."""
+    count = max(2, round((high - low) / (step * coarseness)) + 1)
+    return np.linspace(low, high, count)
+
+
+def lost_from(values: np.ndarray, kept: np.ndarray) -> float | None:
+    """Return the first of the increasing ``values`` (n) that is not ``kept`` (n), ``None`` if all are."""
+    lost = np.flatnonzero(~kept)
+    return float(values[lost[0]]) if len(lost) else None
+
+
+def share(kept: np.ndarray) -> float:
+    """Return the share of flights that are kept."""
+    return float(np.mean(kept))

@@ -1,0 +1,84 @@
+import math
+
+import numpy as np
+import pytest
+
+from hsv.study.claims import modelling, notch
+from hsv.study.claims.catalogue import GROUPS
+from hsv.study.claims.claim import Finding, Judged, Reading, Verdict
+from hsv.study.claims.evidence import Evidence, nominal, worst
+from hsv.study.claims.page import condition, page, shown
+from hsv.study.claims.ranking import METRICS, Rank
+
+CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
+
+
+@pytest.fixture(scope="module")
+def evidence(tmp_path_factory):
+    return Evidence(tmp_path_factory.mktemp("evidence"))
+
+
+def finding(*values):
+    return Finding(tuple(Reading(f"reading {i}", value, "1", at_most=1.0) for i, value in enumerate(values)), "why")
+
+
+def test_there_are_twenty_claims_and_more_each_quoted_once():
+    assert len(CLAIMS) >= 20
+    assert len({claim.name for claim in CLAIMS}) == len(CLAIMS)
+    for claim in CLAIMS:
+        assert len(claim.quote) > 20
+        assert claim.location
+
+
+def test_the_verdict_follows_from_the_readings():
+    assert finding(0.5, 1.0).verdict is Verdict.HOLDS
+    assert finding(0.5, 1.1).verdict is Verdict.CONDITIONS
+    assert finding(1.1, math.inf).verdict is Verdict.FAILS
+    assert finding(math.nan).verdict is Verdict.FAILS
+    assert Reading("x", 1.0, "1", at_least=1.0).holds
+    assert not Reading("x", 0.9, "1", at_least=1.0).holds
+
+
+def test_numbers_are_shown_in_the_paper_s_units():
+    assert shown(0.3048, "m") == "1 ft"
+    assert shown(math.pi / 360.0, "rad") == "0.5 deg"
+    assert shown(math.inf, "s") == "unbounded"
+    assert shown(math.nan, "s") == "not defined"
+    assert condition(Reading("x", 0.0, "rad", at_most=math.pi / 360.0)) == "at most 0.5 deg"
+    assert condition(Reading("x", 0.0, "dB", at_least=20.0)) == "at least 20 dB"
+
+
+def test_a_lost_flight_has_no_worst_value():
+    assert worst({"x": np.array([1.0, -3.0])}, "x") == 3.0
+    assert worst({"x": np.array([1.0, np.nan])}, "x") == math.inf
+    assert nominal({"x": np.array([1.0, 2.0])}, "x") == 1.0
+
+
+def test_the_page_holds_every_claim_and_the_ranking():
+    judged = {group: [Judged(claim, finding(0.5, 2.0)) for claim in claims] for group, claims in GROUPS.items()}
+    ranks = {metric: {"tube": Rank(1.0, 2.0, 1, 1)} for metric in METRICS}
+    text = page(judged, ranks)
+    for claim in CLAIMS:
+        assert f"> {claim.quote}" in text
+    assert f"Of {len(CLAIMS)} claims 0 hold, {len(CLAIMS)} hold under conditions, 0 do not hold." in text
+    assert all(what in text for what, _ in METRICS.values())
+
+
+@pytest.mark.parametrize("claim", modelling.CLAIMS, ids=lambda claim: claim.name)
+def test_claims_on_the_model_are_measured(claim, evidence):
+    result = claim.measure(evidence)
+    assert result.readings
+    assert all(math.isfinite(reading.value) for reading in result.readings)
+
+
+def test_one_section_takes_out_the_first_mode_and_lessens_the_second(evidence):
+    fall = notch.reductions(evidence)
+    assert fall["first"] > 20.0
+    assert 5.0 < fall["second"] < 10.0
+
+
+def test_the_notch_raises_the_smallest_margin_and_lowers_that_of_the_rigid_body(evidence):
+    [claim] = [claim for claim in notch.CLAIMS if claim.name == "phase margin"]
+    smallest, rigid = (np.degrees(reading.value) for reading in claim.measure(evidence).readings)
+    assert smallest > 30.0
+    assert rigid < -10.0

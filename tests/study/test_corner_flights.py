@@ -1,0 +1,64 @@
+import numpy as np
+import pytest
+
+from hsv.design.region import corners
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.study.corner_flights import compiled, fly_over
+from hsv.study.linear_loop import phase_margins, sampled_loop
+from hsv.vehicle.parameters import vehicle_parameters
+
+HALF_WIDTH = np.ones(5)
+
+
+def short(scenario):
+    return {**flight_parameters(load_scenario(scenario)), "duration": 4.0, "fault.starts": [1.0]}
+
+
+def test_robust_mpc_is_the_tube_law_about_its_own_nominal_trajectory():
+    values = short("case1_rmpc_fourth_k")
+    stepwise, at_once = fly(assemble(values)), fly(assemble(compiled(values)))
+    np.testing.assert_allclose(at_once.history.state, stepwise.history.state, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(at_once.history.command, stepwise.history.command, rtol=1e-10, atol=1e-12)
+
+
+def test_a_table_has_a_row_for_every_vehicle_in_order():
+    over = corners()[:4]
+    table = fly_over(short("case1"), over, HALF_WIDTH)
+    parts = assemble(short("case1"))
+    for index, corner in enumerate(over):
+        flight = fly(parts.perturbed(corner)).data()
+        assert table["altitude_end_error"][index] == flight.state[-1, 0] - flight.reference[-1, 0]
+    assert not table["diverged"].any()
+
+
+def test_coupling_is_scaled_from_the_derived_set():
+    derived = {**short("case1"), "vehicle.coupling": "derived"}
+    named = fly_over(derived, [{}], HALF_WIDTH)
+    scaled = fly_over(short("case1"), [{}], HALF_WIDTH, coupling_scale=1.0)
+    assert scaled["elevator_deflection_maximum"] == named["elevator_deflection_maximum"]
+
+
+def test_the_sampled_loop_agrees_with_the_flights_on_who_is_stable():
+    from hsv.study.claims.evidence import Design
+
+    flown = Design("baseline").flown
+    growth = {
+        (coupling, bool(notch)): sampled_loop(
+            vehicle_parameters(coupling), flown.feedback_gain, notch, flown.period
+        ).growth
+        for coupling in ("paper_like", "derived")
+        for notch in ((), flown.notch)
+    }
+    assert growth["paper_like", True] == pytest.approx(-0.293, abs=2e-3)
+    assert -0.01 < growth["paper_like", False] < 0.0
+    assert growth["derived", True] < -0.15
+    assert growth["derived", False] > 1.0
+
+
+def test_phase_margin_of_an_integrator_is_a_right_angle():
+    frequencies = np.logspace(-2, 2, 2000)
+    [margin] = phase_margins(frequencies, 1.0 / (1j * frequencies))
+    assert margin.frequency == pytest.approx(1.0, rel=1e-3)
+    assert margin.phase == pytest.approx(np.pi / 2)
