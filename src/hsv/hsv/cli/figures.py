@@ -7,14 +7,15 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import FlightsOption
-from hsv.cli.output import console, errors
+from hsv.cli.options import FlightsOption, JsonOption
+from hsv.cli.output import console, errors, print_json
 
 
 def figures(
     only: Annotated[list[int] | None, typer.Option(help="Draw this figure of the paper; may be repeated.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
     flights: FlightsOption = Path("bags/study"),
+    json: JsonOption = False,
 ) -> None:
     """Draw the paper's figures from this project's designs and flights, to be laid beside the paper's.
 
@@ -50,5 +51,9 @@ def figures(
             written.append(save(drawing.figure, out / figure.stem))
             (out / f"{figure.stem}.md").write_text(page(figure, drawing), encoding="utf-8")
         progress("figures", len(chosen), len(chosen))
+    if json:
+        made = zip(chosen, written, strict=True)
+        print_json({"figures": [{"number": f.number, "paths": [str(path) for path in paths]} for f, paths in made]})
+        return
     for figure, paths in zip(chosen, written, strict=True):
         console.print(f"Figure {figure.number:2}  {', '.join(map(str, paths))}", soft_wrap=True)
