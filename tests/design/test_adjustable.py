@@ -94,8 +94,10 @@ def test_nominal_bounds_grow_with_the_room(stored, subject):
     trim_input = np.array([0.3, 0.2])
     grown = relaxed_bound(np.array([0.25, 0.19]), trim_input, narrow, wide)
     assert_allclose(grown, [0.25 * 0.2 / 0.1, 0.19 * 0.3 / 0.2])
-    with pytest.raises(DesignError, match="expected room above zero"):
-        relaxed_bound(np.array([0.25, 0.19]), np.array([0.05, 0.2]), narrow, wide)
+    with pytest.raises(DesignError, match=r"U minus F Z at tau = 1: .* expected room above zero"):
+        relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), narrow, wide)
+    with pytest.raises(DesignError, match=r"U minus F' Z': .* expected room above zero"):
+        relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), wide, narrow)
     assert np.all(room_at_one(design, subject.certificate["tube"]) > 0.0)
 
 

@@ -60,7 +60,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
 
     tell("common Lyapunov function", 0, 2)
     loops = certified_loops(design, inputs.disturbance.elevator_effectiveness)
-    lyapunov = common_lyapunov(loops, _error_scale(inputs), "F', common Lyapunov function")
+    lyapunov = common_lyapunov(loops, error_scale(inputs), "F', common Lyapunov function")
     tell("common Lyapunov function", 1, 2)
     columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
     full = full_state_report(inputs, design, gains.model.whole, columns) if design.filtered else None
@@ -108,7 +108,8 @@ def _sets(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Ad
     )
 
 
-def _error_scale(inputs: DesignInputs) -> np.ndarray:
+def error_scale(inputs: DesignInputs) -> np.ndarray:
+    """Return sizes of the errors of rigid states and filter that count as equal, those that F' was found with, SI."""
     rigid = inputs.feedback.state_scale.array()
     filters = [rigid[-1] / section.pole_frequency**power for section in inputs.notch for power in (1, 2)]
     return np.concatenate((rigid, filters))

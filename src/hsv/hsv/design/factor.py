@@ -35,11 +35,12 @@ def relaxed_bound(
     Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53).
 
     Raises:
-        DesignError: No room at all at tau = 1.
+        DesignError: No room at all, at tau = 1 or at the factor.
     """
     before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
-    if not before.min() > 0.0:
-        raise DesignError(f"U minus F Z at tau = 1: {before.tolist()} about the trim, expected room above zero")
+    for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
+        if not room.min() > 0.0:
+            raise DesignError(f"{name}: {room.tolist()} about the trim, expected room above zero")
     return np.asarray(bound * after / before)
 
 

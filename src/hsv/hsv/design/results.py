@@ -9,7 +9,7 @@ from hsv.control.design_file import find_design
 from hsv.design.certificate import certificate_path, read_certificate
 from hsv.units import to_paper
 
-DESIGNS = ("baseline", "baseline_single_k", "baseline_derived")
+DESIGNS = ("baseline", "baseline_single_k", "baseline_derived", "adjustable")
 
 _HEADER = """# Results of the shipped designs
 Made by `python -m hsv.design.results > offline_design/results.md` from the certificates that `hsv design NAME` writes
@@ -30,9 +30,12 @@ def _in(unit: str, *values: float) -> str:
     return ", ".join(f"{to_paper(float(value), unit)[0]:.4g}" for value in values)
 
 
-def _half_width(certificate: dict[str, Any]) -> str:
+def _half_width(tube: dict[str, Any]) -> str:
+    return _sizes(tube["invariant_set"]["half_width"])
+
+
+def _sizes(half_width: Sequence[float]) -> str:
     units = ("m", "m/s", "rad", "rad", "rad/s")
-    half_width: Sequence[float] = certificate["tube"]["invariant_set"]["half_width"]
     return ", ".join(_in(unit, value) for unit, value in zip(units, half_width, strict=False))
 
 
@@ -68,6 +71,12 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
     "spectral radius of A + BF, rigid; all states": lambda c: (
         f"{max(c['feedback']['spectral_radii']):.5f}; {c['feedback']['spectral_radius_all_states']:.5f}"
     ),
+    "adjustable factor; share of fault and parameter bounds in W (eq. 47)": lambda c: (
+        f"{c['adjustable']['tau'][0]:g}; {c['adjustable']['share']:g}" if "adjustable" in c else "1; 1"
+    ),
+    "largest nominal input from trim: fuel; elevator deg (eq. 35, 52)": lambda c: _each(
+        c, c["adjustable"]["input_bound"] if "adjustable" in c else list(c["inputs"]["nominal"]["input_bound"].values())
+    ),
     "nominal gains; certified cost of the outermost, s (eq. 32)": lambda c: (
         f"{len(c['nominal'])}; {c['nominal'][0]['certified_gamma']:.1f}"
     ),
@@ -75,7 +84,11 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
     "inertial coupling; share of W in the tube": lambda c: (
         f"{c['inputs']['disturbance']['coupling']}; {c['inputs']['disturbance']['share']:g}"
     ),
-    "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": _half_width,
+    "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": lambda c: _half_width(c["tube"]),
+    "the same of Z for the whole W at tau = 1": lambda c: (
+        _half_width(c["adjustable"]["complete"]) if "adjustable" in c else "-"
+    ),
+    "the paper's tau Z": lambda c: _sizes(c["adjustable"]["scaled_half_width"]) if "adjustable" in c else "-",
     "half-range of F Z: fuel; elevator deg": lambda c: _each(c, c["tube"]["invariant_set"]["feedback_half_range"]),
     "U minus F Z with trim: fuel; elevator deg (eq. 30)": _range,
     "least room of the nominal plan in it: fuel; elevator deg": _room,
@@ -94,7 +107,10 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
         f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_deviation'])}; "
         f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_from_nominal'])}"
     ),
-    "their saturated steps": lambda c: f"{c['tube']['flights']['worst']['saturated_steps']:g}",
+    "worst level of flights with the whole fault": lambda c: (
+        f"{c['adjustable']['complete_fault']['worst_level']:.3f}" if "adjustable" in c else "-"
+    ),
+    "saturated steps of the flights": lambda c: f"{c['tube']['flights']['worst']['saturated_steps']:g}",
 }
 
 
