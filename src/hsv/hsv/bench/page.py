@@ -47,6 +47,15 @@ def machine() -> str:
     return f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}{load}"
 
 
+def busy() -> str:
+    """Return a warning if other programs keep this machine from showing what it can; else nothing."""
+    cores = os.cpu_count() or 1
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    if load < 0.5 * cores:
+        return ""
+    return f"load average {load:.1f} on {cores} cores: figures of several processes will be worse than on an idle machine"
+
+
 class Page:
     """A page of the documentation with marks, between which the table of a whole run is kept."""
 

@@ -24,7 +24,7 @@ def bench(
 
     Example: hsv bench --only in_process --only mcap
     """
-    from hsv.bench.page import Page, machine
+    from hsv.bench.page import Page, busy, machine
     from hsv.bench.suite import groups
     from hsv.cli.progress import stages
     from hsv.errors import QuantityError, RunError
@@ -43,6 +43,8 @@ def bench(
             raise QuantityError(f"only = {name!r}: expected one of {', '.join(available)}")
     chosen = [name for name in available if not only or name in only]
     measured_on = machine()
+    if warning := busy():
+        errors.print(f"[yellow]{warning}[/]", soft_wrap=True)
     figures: list[Figure] = []
     skipped: dict[str, str] = {}
     with stages() as progress:
