@@ -53,7 +53,9 @@ def busy() -> str:
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     if load < 0.5 * cores:
         return ""
-    return f"load average {load:.1f} on {cores} cores: figures of several processes will be worse than on an idle machine"
+    return (
+        f"load average {load:.1f} on {cores} cores: figures of several processes will be worse than on an idle machine"
+    )
 
 
 class Page:
