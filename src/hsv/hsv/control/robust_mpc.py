@@ -68,7 +68,9 @@ class RobustMpc:
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         x_n, u_n = self._none
         error = filtered_pitch_rate - float(reference[PITCH_RATE])
-        tube_input(self.data, 0, state, error, reference, x_n, u_n, reference_input, u_feedback, total, u)
+        tube_input(
+            self.data, self.data.gains[0], state, error, reference, x_n, u_n, reference_input, u_feedback, total, u
+        )
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,

@@ -77,7 +77,7 @@ def active_gain(data: Any, step: int) -> int:
 @njit(cache=True)
 def tube_input(
     data: Any,
-    active: int,
+    gain: np.ndarray,
     x: np.ndarray,
     pitch_rate_error: float,
     x_r: np.ndarray,
@@ -88,12 +88,11 @@ def tube_input(
     u_total: np.ndarray,
     u: np.ndarray,
 ) -> None:
-    """Write the feedback part of gain ``active``, the sum of the three parts and the limited input, (2) each.
+    """Write the feedback part, by ``gain`` (2, 9), the sum of the three parts and the limited input, (2) each.
 
     ``pitch_rate_error``: filtered pitch rate less that of the plan. Where the sum is not finite (a measurement that is
     not a number) the input is the reference's: an actuator gets a number whatever happens.
     """
-    gain = data.gains[active]
     for i in range(len(u)):
         feedback = 0.0
         for j in range(len(x)):
@@ -221,7 +220,7 @@ class TubeLaw:
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         tube_input(
             self.data,
-            active,
+            self.data.gains[active],
             state,
             pitch_rate_error,
             reference,

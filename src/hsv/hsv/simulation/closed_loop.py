@@ -91,14 +91,27 @@ def _fly(
     x_n = x - reference.state[min(max(-reference.first, 0), last)]
     S, new = np.empty(n * (n + m)), np.empty(n)
     u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    # Copies, made when another row holds: views of rows in every step take a twentieth of the loop's time.
+    x_r, u_r, defect, row = np.empty(n), np.empty(m), np.empty(n), -1
+    gain, active = tube.gains[0].copy(), 0
     rows = len(history.filtered_pitch_rate)
     for k in range(rows):
         if k > 0:
             advance(x, actuator, vehicle, period, substeps, work)
         for i in range(n):
             history.state[k, i] = x[i]
-        row = min(max(k - reference.first, 0), last)
-        x_r, u_r = reference.state[row], reference.input[row]
+        due = min(max(k - reference.first, 0), last)
+        if due != row:
+            row = due
+            for i in range(n):
+                x_r[i] = reference.state[row, i]
+                defect[i] = reference.defect[row, i]
+            for i in range(m):
+                u_r[i] = reference.input[row, i]
+        due = active_gain(tube, k)
+        if due != active:
+            active = due
+            gain[:] = tube.gains[active]
         q_f = filter_step(notch, filter_state, x[4])
         history.filtered_pitch_rate[k] = q_f
         for i in range(n):
@@ -111,12 +124,12 @@ def _fly(
             pitch_rate_error = q_f - filter_step(tube.notch, planned_state, x_r[4] + x_n[4])
         else:
             pitch_rate_error = q_f - x_n[4] - x_r[4]
-        tube_input(tube, active_gain(tube, k), x, pitch_rate_error, x_r, x_n, u_n, u_r, u_feedback, total, u)
+        tube_input(tube, gain, x, pitch_rate_error, x_r, x_n, u_n, u_r, u_feedback, total, u)
         for i in range(m):
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
             history.command[k, i] = u[i]
-        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, reference.defect[row], S, new)
+        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, defect, S, new)
         apply_faults(faults, k, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
