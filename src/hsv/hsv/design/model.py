@@ -26,7 +26,7 @@ _POINTS = 46
 """Altitudes, and velocities, at which the model is compared with the vehicle."""
 
 _FREQUENCIES = np.logspace(-2.0, 2.0, 200)
-"""rad/s, those of the paper's figure 2."""
+"""rad/s, those of the paper's figure 2; those above the Nyquist frequency are left out."""
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequenc
         off_grid(*VELOCITY_RANGE, _POINTS),
         state_scale(inputs, notch),
         inputs.tensor_product.input_scale.array(),
-        _FREQUENCIES,
+        _FREQUENCIES[_FREQUENCIES < 0.99 * np.pi / inputs.period],
         inputs.period,
     )
     return replace(model, report=model.report | {"accuracy": accuracy.report()})

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from hsv.study.claims import controller, modelling, notch, simulation
+from hsv.study.claims import adjustable, controller, modelling, notch, simulation
 from hsv.study.claims.claim import Claim, Judged
 from hsv.study.claims.evidence import Evidence
 
@@ -13,6 +13,7 @@ GROUPS: dict[str, tuple[Claim, ...]] = {
     "Baseline controller": controller.CLAIMS,
     "Notch filter": notch.CLAIMS,
     "Case 1": simulation.CLAIMS,
+    "Adjustable controller and Case 2": adjustable.CLAIMS,
 }
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.design.region import corners
 from hsv.simulation.assembly import flight_parameters
@@ -52,6 +53,12 @@ class Evidence:
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return what was measured on the nominal flight of a scenario with other parameters."""
         values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
+        return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
+
+    def adjustable_step(self) -> dict[str, float]:
+        """Return what was measured on the step of Case 1 with the adjustable design."""
+        design = read_parameters(find_design("adjustable"))
+        values = {**design, **load_scenario("case1").parameters()}
         return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
 
     def _growth(self, coupling: str, notch: tuple[NotchSection, ...], design: str = "baseline") -> np.ndarray:

@@ -8,11 +8,16 @@ from hsv.study.figures import (
     figure_04,
     figure_05,
     figure_06,
+    figure_08,
     figure_09,
     figure_10,
     figure_11,
     figure_12,
     figure_13,
+    figure_14,
+    figure_15,
+    figure_16,
+    figure_17,
 )
 from hsv.study.figures.figure import PaperFigure
 
@@ -24,11 +29,16 @@ FIGURES: dict[int, PaperFigure] = {
         figure_04,
         figure_05,
         figure_06,
+        figure_08,
         figure_09,
         figure_10,
         figure_11,
         figure_12,
         figure_13,
+        figure_14,
+        figure_15,
+        figure_16,
+        figure_17,
     )
 }
 """Figures 1 and 7 are block diagrams."""

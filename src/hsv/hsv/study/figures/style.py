@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 RC: Any = {
     "font.family": "STIXGeneral",
@@ -45,6 +46,14 @@ def letter(axes: Iterable[Axes]) -> None:
     """Mark panels (a), (b), ... as the paper does."""
     for index, axis in enumerate(axes):
         axis.set_title(f"({chr(ord('a') + index)})", loc="left", fontweight="bold")
+
+
+def plain_log(axis: Axes) -> None:
+    """Make the vertical axis logarithmic, with plain numbers on it."""
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.yaxis.set_minor_formatter(NullFormatter())
 
 
 def save(figure: Figure, stem: Path) -> list[Path]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hsv.study.sensitivity import coupling, fault, notch, parameters, sampling
+from hsv.study.sensitivity import coupling, factor, fault, notch, parameters, sampling
 from hsv.study.sensitivity.study import Outcome, Study
 
-STUDIES: dict[str, Study] = {m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault)}
+STUDIES: dict[str, Study] = {m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, factor)}
 
 _PAGE = """# Sensitivity: {title}
 Made by `hsv study {name} --out docs/study`; the numbers are of this run.

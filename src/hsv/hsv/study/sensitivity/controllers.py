@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,22 +28,21 @@ class Controller:
     scenario: str
     color: str
     design: str = "baseline"
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: tuple[tuple[str, Any], ...] = ()
 
-    @property
     def parameters(self) -> dict[str, Any]:
         """Flat parameters of the flight."""
         return {
             **read_parameters(find_design(self.design)),
             **load_scenario(self.scenario).parameters(),
-            **self.changes,
+            **dict(self.changes),
         }
 
 
 WITH_NOTCH = Controller("tube with notch at 15 rad/s", "case1", BLUE)
 WIDER_NOTCH = Controller("tube with notch at 14 rad/s, wider", "case1", GREEN, "baseline_derived")
 WITHOUT_NOTCH = Controller("tube without notch", "case1_no_notch", ORANGE)
-RMPC = Controller("RMPC, fourth gain", "case1_rmpc_fourth_k", RED, changes={"vehicle.model": "CM"})
+RMPC = Controller("RMPC, fourth gain", "case1_rmpc_fourth_k", RED, changes=(("vehicle.model", "CM"),))
 
 ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC)
 
@@ -64,7 +64,7 @@ def corners_of(scale: float) -> list[Corner]:
 
 def flown(controller: Controller, over: Sequence[Corner], coupling_scale: float | None = None, **changes: Any) -> Table:
     """Return what is measured on the flights of a controller with each vehicle; changed parameters with __ for dots."""
-    values = controller.parameters | {name.replace("__", "."): value for name, value in changes.items()}
+    values = controller.parameters() | {name.replace("__", "."): value for name, value in changes.items()}
     return fly_over(values, over, HALF_WIDTH, coupling_scale=coupling_scale)
 
 
@@ -83,15 +83,20 @@ def growth(
         notch: Sections of the filter.
         effectiveness: Of the elevator, the worst of these.
     """
-    values = controller.parameters
+    gain, own, period = _feedback(controller)
+    return max(
+        sampled_loop(vehicle, gain, own if notch is None else notch, period, point=point, effectiveness=share).growth
+        for point in (START, TARGET)
+        for share in effectiveness
+    )
+
+
+@cache
+def _feedback(controller: Controller) -> tuple[np.ndarray, tuple[NotchSection, ...], float]:
+    """Return gain (2, 9), filter and period (s) of a controller."""
+    values = controller.parameters()
     design = ControlDesign.from_parameters(values)
     gain = design.adjusted_gain(design.tau)
     if values["controller"] == "robust_mpc":
         gain = design.nominal_gains[values["robust_mpc.gain_index"]]
-    if notch is None:
-        notch = flown_sections(values) if values["notch.enabled"] else ()
-    return max(
-        sampled_loop(vehicle, gain, notch, design.period, point=point, effectiveness=share).growth
-        for point in (START, TARGET)
-        for share in effectiveness
-    )
+    return gain, flown_sections(values) if values["notch.enabled"] else (), design.period

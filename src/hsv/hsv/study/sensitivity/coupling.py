@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.study.figures.style import GREY, letter, new_figure
+from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown, growth
 from hsv.study.sensitivity.flights_strip import Strip, draw_metric, finding, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
@@ -48,7 +48,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     axes[0].set_ylabel("largest real part (1/s)")
     draw_metric(axes[1], kappas, strips, "elastic_decay_time", "s", "elastic decay (s)")
     draw_metric(axes[2], kappas, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
-    axes[2].set_yscale("log")
+    plain_log(axes[2])
     axes[2].set_xlabel(r"coupling $\kappa$ (1: derived from a beam model)")
     for axis in axes:
         for kappa in (0.25, 1.0):

@@ -57,9 +57,24 @@ def draw_share(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip]) -> No
 
 
 def finding(
-    controller: Controller, x: np.ndarray, columns: Strip, say: Callable[[float], str], rising: bool = True
+    controller: Controller,
+    x: np.ndarray,
+    columns: Strip,
+    say: Callable[[float], str],
+    *,
+    rising: bool = True,
+    nominal: bool = True,
 ) -> str:
-    """Return in words where a controller first meets its limits and where it is lost, going along ``x``."""
+    """Return in words where a controller first meets its limits and where it is lost, going along ``x``.
+
+    Args:
+        controller: Whose strip it is.
+        x: Values along the strip, increasing.
+        columns: The strip.
+        say: Makes words of a value.
+        rising: Go from the least value on, else from the largest.
+        nominal: Whether the strip changes the nominal vehicle's flight, too.
+    """
     order = slice(None) if rising else slice(None, None, -1)
     along = x[order]
 
@@ -67,7 +82,5 @@ def finding(
         lost = np.flatnonzero(np.array(columns[name])[order] < 1.0)
         return f"at {say(float(along[lost[0]]))}" if len(lost) else "nowhere"
 
-    return (
-        f"{controller.label}: at its limits first {first('without_limits')}, a first flight lost "
-        f"{first('finished')}, the nominal vehicle lost {first('nominal_finished')}"
-    )
+    lost = f"{controller.label}: at its limits first {first('without_limits')}, a first flight lost {first('finished')}"
+    return f"{lost}, the nominal vehicle {first('nominal_finished')}" if nominal else lost

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsv.control.notch_filter import NotchSection
-from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
+from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import WITH_NOTCH, flown, growth
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.vehicle.parameters import vehicle_parameters
@@ -46,7 +46,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         )
         axis.contour(centres, depths, maps[name].T, levels=[0.0], colors="black", linewidths=1.2)
         axis.plot(15.0, 0.02, "k+", markersize=8)
-        axis.set_yscale("log")
+        plain_log(axis)
         axis.set_title(label, loc="right")
         axis.set_xlabel("notch centre (rad/s)")
         axis.grid(visible=False)

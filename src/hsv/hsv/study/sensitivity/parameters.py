@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hsv.study.figures.style import GREY, letter, new_figure
+from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown
 from hsv.study.sensitivity.flights_strip import Strip, draw_metric, draw_share, finding, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
@@ -30,7 +30,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     draw_metric(axes[1], scales, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
     draw_metric(axes[2], scales, strips, "altitude_end_error", "m", "altitude error at end (ft)")
     for axis in axes[1:]:
-        axis.set_yscale("log")
+        plain_log(axis)
     for axis in axes:
         axis.axvline(1.0, color=GREY, linewidth=0.6, linestyle=":")
     axes[2].set_xlabel("parameter scale (1: the paper's bounds, mass and moment of inertia 10 %)")
@@ -42,7 +42,10 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         "of "
         "flights that come to their end (solid), and without a second at the limits of the inputs (dotted); (b), (c) "
         "nominal vehicle solid, worst corner dashed, a line ends where a flight is lost.",
-        tuple(finding(c, scales, columns, lambda s: f"{s:.2f} times the bounds") for c, columns in strips.items()),
+        tuple(
+            finding(c, scales, columns, lambda s: f"{s:.2f} times the bounds", nominal=False)
+            for c, columns in strips.items()
+        ),
         {"scale": scales.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
     )
 

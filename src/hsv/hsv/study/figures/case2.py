@@ -1,0 +1,30 @@
+"""The curves of Figures 14 to 17, and what is measured on them."""
+
+from __future__ import annotations
+
+from hsv.study.figures.figure import Material
+from hsv.study.figures.style import BLUE, GREEN, ORANGE
+from hsv.study.figures.time_histories import Curve
+
+ADJUSTABLE = ("case2_uncertain", "case2")
+WHOLE = ("case2_uncertain_tau1", "case2_tau1")
+BASELINE = ("case2_uncertain_baseline", "case2_baseline")
+"""Scenarios with uncertain and with nominal parameters."""
+
+SCENARIOS = (*ADJUSTABLE, *WHOLE, *BASELINE)
+
+CONDITIONS = (
+    "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator effectiveness "
+    "0.9 "
+    "from 100 s; thin: nominal parameters. The adjustable design at the paper's tau = 0.8 and at 1, and the baseline "
+    "design on the same ramp"
+)
+
+
+def curves(material: Material) -> list[Curve]:
+    """Return the three controllers, the paper's on top."""
+    f = material.flights
+    named = (("baseline", ORANGE, BASELINE), (r"adjustable, $\tau$ = 1", GREEN, WHOLE))
+    below = [Curve(label, color, f[u], f[n], width=2.0) for label, color, (u, n) in named]
+    below[1] = Curve(below[1].label, GREEN, f[WHOLE[0]], f[WHOLE[1]], width=1.4)
+    return [*below, Curve(r"adjustable, $\tau$ = 0.8", BLUE, f[ADJUSTABLE[0]], f[ADJUSTABLE[1]], width=0.9)]
