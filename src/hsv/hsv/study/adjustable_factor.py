@@ -1,0 +1,175 @@
+"""What the adjustable factor tau buys and costs: the designs of section 4 over tau, flown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.design.adjustable import error_scale
+from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
+from hsv.design.common_lyapunov import common_lyapunov
+from hsv.design.factor import certified_loops, relaxed_bound
+from hsv.design.inputs import DesignInputs, with_tau
+from hsv.design.region import Corner, Region, region_parameters
+from hsv.design.tube import MeasuredSet, measured_set
+from hsv.errors import DesignError
+from hsv.simulation.assembly import assemble
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.metrics import flight_metrics
+from hsv.study.linear_loop import sampled_loop
+from hsv.vehicle.dynamics import N_RIGID
+from hsv.vehicle.parameters import COUPLING_SETS, vehicle_parameters
+from hsv.vehicle.trim import trim
+
+Progress = Callable[[str, int, int], None]
+
+FACTORS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
+"""Of the designs that are made and flown, unless fewer are asked for."""
+
+FINE = np.linspace(0.25, 1.0, 76)
+"""Of the linear loops."""
+
+
+@dataclass(frozen=True)
+class FactorRow:
+    """One factor; SI. ``certified``: one Lyapunov function for every factor between it and 1.
+
+    ``half_width`` and ``half_width_complete`` (5): of Z' for W'(tau), and for the whole W; not a number: there is
+    none, or nothing of an input is left. ``scaled`` (5): the paper's tau Z. ``room`` (2): of the nominal input in U
+    minus F' Z' about the target's trim, on the side with less of it; below zero there is none, and K' keeps its bounds.
+    ``input_bound`` (2): of K'. ``settling`` (2): altitude and velocity after a step, nominal vehicle. ``ramp`` (2):
+    integral absolute errors of altitude and velocity in Case 2. ``attitude`` and ``worst_attitude``: after the fault,
+    from nominal, at the nominal vehicle and the worst of a quarter of the corners; ``worst_error`` (2): altitude and
+    velocity at the end there.
+    """
+
+    tau: float
+    certified: bool
+    half_width: np.ndarray
+    half_width_complete: np.ndarray
+    scaled: np.ndarray
+    room: np.ndarray
+    input_bound: np.ndarray
+    settling: np.ndarray
+    ramp: np.ndarray
+    attitude: float
+    worst_attitude: float
+    worst_error: np.ndarray
+
+    def report(self) -> dict[str, Any]:
+        """Return the row for JSON."""
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in vars(self).items()}
+
+
+@dataclass(frozen=True)
+class FactorStudy:
+    """The rows; by coupling set the rightmost pole (1/s) over :data:`FINE`; what is certified.
+
+    ``least_certified``: the least of :data:`FINE` with one Lyapunov function for it and everything up to 1.
+    """
+
+    rows: list[FactorRow]
+    growth: dict[str, np.ndarray]
+    least_certified: float
+
+
+def factor_study(inputs: DesignInputs, factors: Sequence[float], progress: Progress) -> FactorStudy:
+    """Design and fly at each of ``factors``; ``inputs`` as of the shipped adjustable design.
+
+    Raises:
+        DesignError: No design at tau = 1.
+    """
+    # Slower loops have sets of slower contraction.
+    wide = inputs.invariant_set.model_copy(update={"contraction": [0.988, 0.990, 0.992, 0.994, 0.996]})
+    inputs = inputs.model_copy(update={"invariant_set": wide})
+    gains = replace(design_gains(inputs, progress).design, filtered=True)
+    one = _with(gains, 1.0)
+    complete = measured_set(one, Region(one, inputs, 1.0), inputs, lambda *_: None)
+    rows = []
+    for done, tau in enumerate(factors):
+        progress("factors", done, len(factors))
+        rows.append(_row(gains, with_tau(inputs, [tau]), tau, complete))
+    progress("factors", len(factors), len(factors))
+    effectiveness = inputs.disturbance.elevator_effectiveness
+    growth = {coupling: _growth(gains, coupling, effectiveness) for coupling in COUPLING_SETS}
+    certified = [tau for tau in FINE.tolist() if _certified(gains, inputs, tau)]
+    return FactorStudy(rows, growth, min(certified))
+
+
+def _row(gains: ControlDesign, inputs: DesignInputs, tau: float, complete: MeasuredSet) -> FactorRow:
+    unrelaxed = _with(gains, tau)
+    incomplete = _measured(unrelaxed, inputs, tau)
+    target = inputs.nominal.target
+    trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
+    given, design = inputs.nominal.input_bound.array(), unrelaxed
+    room = incomplete.bounds.symmetric(trimmed) if incomplete else np.full(2, np.nan)
+    if incomplete and room.min() > 0.0:
+        bound = relaxed_bound(given, trimmed, complete.bounds, incomplete.bounds)
+        problem = nominal_problem(inputs, unrelaxed.polytope, bound)
+        design = with_family(unrelaxed, problem, nominal_family(inputs, problem, lambda *_: None))
+    step = inputs.model_copy(update={"disturbance": inputs.disturbance.model_copy(update={"ramp": None})})
+    stepped, ramped = _metrics(design, step, [{}])[0], _metrics(design, inputs, Region(design, inputs, 1.0).fraction())
+    nominal = ramped[0]
+    return FactorRow(
+        tau=tau,
+        certified=_certified(gains, inputs, tau),
+        half_width=_half_width(incomplete),
+        half_width_complete=_half_width(_measured(design, inputs, 1.0)),
+        scaled=tau * complete.found.half_width[:N_RIGID],
+        room=room,
+        input_bound=design.nominal_input_bound,
+        settling=np.array([stepped.get(f"{axis}_settling_time", np.nan) for axis in ("altitude", "velocity")]),
+        ramp=np.array([nominal[f"{axis}_integral_absolute_error"] for axis in ("altitude", "velocity")]),
+        attitude=nominal["post_fault_attitude_from_nominal"],
+        worst_attitude=max(m["post_fault_attitude_from_nominal"] for m in ramped),
+        worst_error=np.array([max(abs(m[f"{axis}_end_error"]) for m in ramped) for axis in ("altitude", "velocity")]),
+    )
+
+
+def _measured(design: ControlDesign, inputs: DesignInputs, share: float) -> MeasuredSet | None:
+    try:
+        return measured_set(design, Region(design, inputs, share), inputs, lambda *_: None)
+    except DesignError:
+        return None
+
+
+def _half_width(found: MeasuredSet | None) -> np.ndarray:
+    return found.found.half_width[:N_RIGID] if found else np.full(N_RIGID, np.nan)
+
+
+def _with(gains: ControlDesign, tau: float) -> ControlDesign:
+    factor = np.full(N_RIGID, tau)
+    return replace(gains, tau=factor, tau_minimum=factor)
+
+
+def _metrics(design: ControlDesign, inputs: DesignInputs, over: Sequence[Corner]) -> list[dict[str, float]]:
+    parts = assemble({**design.to_parameters(), **region_parameters(inputs)})
+    return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
+
+
+def _growth(gains: ControlDesign, coupling: str, effectiveness: float) -> np.ndarray:
+    """Return the rightmost pole (1/s) of the loop around the coupled vehicle over :data:`FINE`, after the fault."""
+    loops = (
+        sampled_loop(
+            vehicle_parameters(coupling),
+            tau * gains.feedback_gain,
+            gains.notch,
+            gains.period,
+            effectiveness=effectiveness,
+        )
+        for tau in FINE
+    )
+    return np.array([loop.growth for loop in loops])
+
+
+def _certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:
+    loops = certified_loops(_with(gains, tau), inputs.disturbance.elevator_effectiveness)
+    try:
+        common_lyapunov(loops, error_scale(inputs), f"tau = {tau:g}")
+    except DesignError:
+        return False
+    return True
