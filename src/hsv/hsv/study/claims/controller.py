@@ -123,7 +123,7 @@ def _nominal_stable(evidence: Evidence) -> Finding:
     certificate = evidence.design("baseline").certificate
     radius = max(gain["spectral_radius_all_states"] for gain in certificate["nominal"])
     return Finding(
-        (Reading("spectral radius of A + BK, worst gain and vertex", radius, "1", at_most=1.0),),
+        (Reading("1 less the spectral radius of A + BK, worst gain and vertex", 1.0 - radius, "1", at_least=0.0),),
         "For each of the seven nested gains, one Lyapunov function over all vertices (34).",
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown, growth
-from hsv.study.sensitivity.flights_strip import Strip, draw_metric, finding, strip
+from hsv.study.sensitivity.flights_strip import Strip, draw_metric, finding, legend, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
 from hsv.vehicle.parameters import vehicle_parameters
 
@@ -56,7 +56,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     axes[0].text(0.255, 1.32, "paper-like", color=GREY, fontsize=8)
     axes[0].text(0.995, 1.32, "derived", color=GREY, fontsize=8, ha="right")
     letter(axes)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    legend(figure, shares=False)
     return Outcome(
         figure,
         f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {len(over) - 1} corners of the "

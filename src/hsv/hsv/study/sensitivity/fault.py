@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown
-from hsv.study.sensitivity.flights_strip import Strip, draw_metric, draw_share, finding, strip
+from hsv.study.sensitivity.flights_strip import Strip, draw_metric, draw_share, finding, legend, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 
 
@@ -39,7 +39,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         axis.set_xlim(1.0, 0.3)
     axes[2].set_xlabel("elevator effectiveness after the fault (0.9: the paper's)")
     letter(axes)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    legend(figure, shares=True)
     return Outcome(
         figure,
         f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {len(over) - 1} corners of the "

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from hsv.study.corner_flights import Table
 from hsv.study.sensitivity.controllers import Controller
@@ -54,6 +56,16 @@ def draw_share(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip]) -> No
         axis.plot(x, 100.0 * np.array(columns["without_limits"]), ":", color=controller.color, linewidth=1.2)
     axis.set_ylabel("flights (%)")
     axis.set_ylim(-5.0, 105.0)
+
+
+def legend(figure: Figure, *, shares: bool) -> None:
+    """Put the controllers and what the line styles mean above the panels; ``shares``: one panel is of shares."""
+    controllers, _ = figure.axes[0].get_legend_handles_labels()
+    styles = {"-": "nominal vehicle", "--": "worst corner"}
+    if shares:
+        styles[":"] = "(a): not a second at the limits"
+    keys = [Line2D([], [], color="black", linestyle=s, linewidth=0.9, label=text) for s, text in styles.items()]  # type: ignore[arg-type]
+    figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
 def finding(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown
-from hsv.study.sensitivity.flights_strip import Strip, draw_metric, draw_share, finding, strip
+from hsv.study.sensitivity.flights_strip import Strip, draw_metric, draw_share, finding, legend, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 
 
@@ -35,7 +35,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         axis.axvline(1.0, color=GREY, linewidth=0.6, linestyle=":")
     axes[2].set_xlabel("parameter scale (1: the paper's bounds, mass and moment of inertia 10 %)")
     letter(axes)
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    legend(figure, shares=True)
     return Outcome(
         figure,
         "Case 1 on the coupled model, paper-like coupling, the vehicle at 32 corners of the scaled bounds. (a) Share "
