@@ -28,13 +28,19 @@ HEADER = "# Exact versions of everything installed. Made by tools/lock.py; do no
 LOCKS: dict[str, tuple[list[str], list[str]]] = {
     # The ROS wheels are compiled against numpy 2.4; requirements-ros.txt holds setuptools back.
     "constraints.txt": (
-        ["requirements-ros.txt", "requirements.txt", "requirements-viewers.txt", "requirements-bench.txt"],
+        [
+            "requirements-ros.txt",
+            "requirements.txt",
+            "requirements-viewers.txt",
+            "requirements-bench.txt",
+            "requirements-docs.txt",
+        ],
         ["numpy==2.4.*"],
     ),
     # Ubuntu 24.04 builds ROS 2 Jazzy against its numpy 1.26, Jazzy's pytest plugins are written for pytest 7, and
     # its colcon needs a setuptools that still has "develop".
     "constraints-jazzy.txt": (
-        ["requirements.txt", "requirements-viewers.txt", "requirements-bench.txt"],
+        ["requirements.txt", "requirements-viewers.txt", "requirements-bench.txt", "requirements-docs.txt"],
         ["numpy==1.26.4", "pytest<8", "setuptools<80"],
     ),
 }

@@ -24,6 +24,7 @@ setup(
         "cvxpy",
         "distributed",
         "jinja2",
+        "matplotlib",
         "mcap",
         "numba",
         "numpy",
