@@ -45,6 +45,16 @@ def test_trim_of_the_literature_to_all_digits(hsv):
     assert values["largest_residual_si"] < 1e-12
 
 
+def test_trim_of_a_climb(hsv):
+    level = hsv("trim", "--json").json
+    climbing = hsv("trim", "--climb-rate", "10 ft/s", "--acceleration", "4 ft/s^2", "--json").json
+    sinking = hsv("trim", "--climb-rate", "-10 ft/s", "--json").json
+    for values, sine in ((level, 0.0), (climbing, 10.0 / 7900.0), (sinking, -10.0 / 7900.0)):
+        assert math.sin(values["pitch_angle_rad"] - values["angle_of_attack_rad"]) == pytest.approx(sine, abs=1e-12)
+        assert values["largest_residual_si"] < 1e-12
+    assert sinking["thrust_N"] < level["thrust_N"] < climbing["thrust_N"]
+
+
 def test_trim_in_si(hsv):
     values = hsv("trim", *PUBLISHED_POINT, "--json").json
     assert values["altitude_m"] == 25908.0
@@ -170,6 +180,16 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
         (
             ("trim", "--altitude", "200000 ft"),
             "altitude = '200000 ft', velocity = '7900 ft/s': trim needs fuel_equivalence_ratio = -0.114628, expected",
+        ),
+        (("trim", "--climb-rate", "10"), "climb_rate = '10': the unit is missing"),
+        (("trim", "--acceleration", "4 ft/s"), "acceleration = '4 ft/s': wrong unit"),
+        (
+            ("trim", "--climb-rate", "10 km/s"),
+            "altitude = '85500 ft', velocity = '7900 ft/s', climb_rate = '10 km/s': expected a climb rate below",
+        ),
+        (
+            ("trim", "--acceleration", "100 ft/s^2"),
+            "altitude = '85500 ft', velocity = '7900 ft/s', acceleration = '100 ft/s^2': trim needs fuel_equivalence",
         ),
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
         (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),

@@ -1,4 +1,4 @@
-"""The level equilibrium at a flight condition as it is written on the command line."""
+"""The equilibrium at a flight condition as it is written on the command line."""
 
 from __future__ import annotations
 
@@ -8,16 +8,28 @@ if TYPE_CHECKING:
     from hsv.vehicle.parameters import VehicleParameters
     from hsv.vehicle.trim import Trim
 
+AT_REST = ("0 m/s", "0 m/s^2")
+"""Climb rate and acceleration of level, steady flight."""
 
-def trim_at(vehicle: VehicleParameters, altitude: str, velocity: str) -> Trim:
-    """Return the level equilibrium at an altitude and a velocity with units.
+
+def trim_at(
+    vehicle: VehicleParameters,
+    altitude: str,
+    velocity: str,
+    climb_rate: str = AT_REST[0],
+    acceleration: str = AT_REST[1],
+) -> Trim:
+    """Return the equilibrium at a condition with units, see :func:`hsv.vehicle.trim.trim`.
 
     Raises:
-        QuantityError: One of the two cannot be read.
+        QuantityError: One of them cannot be read; the message names it.
         TrimError: No equilibrium there; the message repeats the condition as it was written.
     """
     from hsv.units import parse_quantity
     from hsv.vehicle.trim import trim
 
-    condition = parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity")
-    return trim(vehicle, *condition, where=f"altitude = {altitude!r}, velocity = {velocity!r}")
+    units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
+    written = dict(zip(units, (altitude, velocity, climb_rate, acceleration), strict=True))
+    condition = {name: parse_quantity(text, units[name], name) for name, text in written.items()}
+    shown = [name for name in units if condition[name] or name in ("altitude", "velocity")]
+    return trim(vehicle, **condition, where=", ".join(f"{name} = {written[name]!r}" for name in shown))

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
+
+from hsv.cli.flight_point import AT_REST
 from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, UnitsOption, VelocityOption
 from hsv.cli.output import Units, print_json, print_table, to_json
 
@@ -9,11 +14,13 @@ from hsv.cli.output import Units, print_json, print_table, to_json
 def trim(
     altitude: AltitudeOption = "85500 ft",
     velocity: VelocityOption = "7900 ft/s",
+    climb_rate: Annotated[str, typer.Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
+    acceleration: Annotated[str, typer.Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
     coupling: CouplingOption = "paper_like",
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
-    """Level equilibrium at an altitude and a velocity (paper eq. 5).
+    """Equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating as on a ramp.
 
     Example: hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper
     """
@@ -22,7 +29,7 @@ def trim(
     from hsv.vehicle.parameters import vehicle_parameters
 
     vehicle = vehicle_parameters(coupling)
-    result = trim_at(vehicle, altitude, velocity)
+    result = trim_at(vehicle, altitude, velocity, climb_rate, acceleration)
     state = zip(STATE_NAMES, zip(result.state.tolist(), STATE_UNITS, strict=True), strict=True)
     inputs = zip(INPUT_NAMES, zip(result.input.tolist(), INPUT_UNITS, strict=True), strict=True)
     force_units = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}
