@@ -24,6 +24,7 @@ def test_a_diagonal_factor_moves_all_dimensions_together():
         ([1.0, 0.7, 1.0, 1.0, 1.0], SCALAR, r"feedback\.tau\[1\] = 0\.7: expected 0\.8 to 1"),
         ([0.9, 1.0, 1.0, 1.0, 1.0], SCALAR, "all the same share of the way from 1"),
         ([0.8, 1.0, 1.0, 1.0, 1.0], DIAGONAL, "all the same share of the way from 1"),
+        ([0.9], DIAGONAL, r"feedback\.tau = \[0\.9, .*the way from 1 to \[0\.8, 0\.6, 1\.0, 1\.0, 1\.0\]"),
         ([0.9], np.ones(5), "expected 1: no other factor is certified"),
     ],
 )

@@ -91,6 +91,9 @@ def _summary(report: dict[str, Any]) -> None:
 
 def _steps(report: dict[str, Any]) -> Table:
     """Return the seven steps of Algorithm 1 with what came of each."""
+    import numpy as np
+
+    from hsv.control.adjustable import compact
     from hsv.units import to_paper
 
     feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
@@ -106,7 +109,7 @@ def _steps(report: dict[str, Any]) -> Table:
     bounds = f"{fuel:.3f}, {to_paper(elevator, 'rad')[0]:.1f} deg"
     beyond = adjustable["complete_fault"]
     parts = adjustable["full_state"]["largest_real_part"] if adjustable["full_state"] else {}
-    tau = ", ".join(f"{value:g}" for value in dict.fromkeys(adjustable["tau"]))
+    tau = ", ".join(f"{value:g}" for value in compact(np.array(adjustable["tau"])))
     rows = {
         "notch filter": f"centre {sections}",
         "extended control model (ECM)": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",

@@ -50,14 +50,17 @@ def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name
         ParameterError: Names the value that does not, and the range.
     """
     tau = factors(values, name)
-    for index in np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))[:1]:
+    outside = np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))
+    # One value for a range that differs by dimension: the range of any one of them would mislead.
+    blurred = len(values) == 1 and np.ptp(minimum) > 0.0
+    for index in [] if blurred else outside[:1]:
         place = f"[{index}]" if len(values) > 1 else ""
         low = float(minimum[index])
         expected = f"{low:g} to 1, the certified range" if low < 1.0 else "1: no other factor is certified"
         raise ParameterError(f"parameter {name}{place} = {tau[index]:g}: expected {expected} (feedback.tau_minimum)")
     lessened = minimum < 1.0
     share = (1.0 - tau[lessened]) / (1.0 - minimum[lessened])
-    if share.size and np.ptp(share) > _SAME_SHARE:
+    if outside.size or (share.size and np.ptp(share) > _SAME_SHARE):
         raise ParameterError(
             f"parameter {name} = {tau.tolist()}: expected factors that are all the same share of the way from 1 to "
             f"{compact(minimum).tolist()} (feedback.tau_minimum), no others are certified"
