@@ -120,7 +120,7 @@ def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequenc
         off_grid(*VELOCITY_RANGE, _POINTS),
         state_scale(inputs, notch),
         inputs.tensor_product.input_scale.array(),
-        _FREQUENCIES[_FREQUENCIES < 0.99 * np.pi / inputs.period],
+        _FREQUENCIES[: np.searchsorted(_FREQUENCIES, 0.99 * np.pi / inputs.period)],
         inputs.period,
     )
     return replace(model, report=model.report | {"accuracy": accuracy.report()})

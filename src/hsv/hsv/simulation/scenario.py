@@ -30,9 +30,7 @@ class VehicleTable(Table):
 
     model: Literal["CM", "DM"] = "CM"
     coupling: Literal["paper_like", "derived"] = "paper_like"
-    perturbation: dict[str, Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]] = Field(
-        default_factory=dict
-    )
+    perturbation: dict[str, Change] = Field(default_factory=dict)
 
 
 class InitialTable(Table):
