@@ -95,9 +95,9 @@ def factor_study(inputs: DesignInputs, factors: Sequence[float], progress: Progr
         rows.append(_row(gains, with_tau(inputs, [tau]), tau, complete))
     progress("factors", len(factors), len(factors))
     effectiveness = inputs.disturbance.elevator_effectiveness
-    growth = {coupling: _growth(gains, coupling, effectiveness) for coupling in COUPLING_SETS}
-    certified = [tau for tau in FINE.tolist() if _certified(gains, inputs, tau)]
-    return FactorStudy(rows, growth, min(certified))
+    poles = {coupling: growth(gains, coupling, effectiveness) for coupling in COUPLING_SETS}
+    certified = [tau for tau in FINE.tolist() if is_certified(gains, inputs, tau)]
+    return FactorStudy(rows, poles, min(certified))
 
 
 def _row(gains: ControlDesign, inputs: DesignInputs, tau: float, complete: MeasuredSet) -> FactorRow:
@@ -116,7 +116,7 @@ def _row(gains: ControlDesign, inputs: DesignInputs, tau: float, complete: Measu
     nominal = ramped[0]
     return FactorRow(
         tau=tau,
-        certified=_certified(gains, inputs, tau),
+        certified=is_certified(gains, inputs, tau),
         half_width=_half_width(incomplete),
         half_width_complete=_half_width(_measured(design, inputs, 1.0)),
         scaled=tau * complete.found.half_width[:N_RIGID],
@@ -151,7 +151,7 @@ def _metrics(design: ControlDesign, inputs: DesignInputs, over: Sequence[Corner]
     return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
 
 
-def _growth(gains: ControlDesign, coupling: str, effectiveness: float) -> np.ndarray:
+def growth(gains: ControlDesign, coupling: str, effectiveness: float) -> np.ndarray:
     """Return the rightmost pole (1/s) of the loop around the coupled vehicle over :data:`FINE`, after the fault."""
     loops = (
         sampled_loop(
@@ -166,7 +166,8 @@ def _growth(gains: ControlDesign, coupling: str, effectiveness: float) -> np.nda
     return np.array([loop.growth for loop in loops])
 
 
-def _certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:
+def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:
+    """Return whether one Lyapunov function is found for ``tau`` and everything up to 1, with the fault and without."""
     loops = certified_loops(_with(gains, tau), inputs.disturbance.elevator_effectiveness)
     try:
         common_lyapunov(loops, error_scale(inputs), f"tau = {tau:g}")

@@ -1,0 +1,23 @@
+import numpy as np
+import pytest
+
+from hsv.control.design_file import find_design, read_design
+from hsv.design.inputs import find_inputs, read_inputs
+from hsv.study.adjustable_factor import FINE, growth, is_certified
+
+
+@pytest.fixture(scope="module")
+def design():
+    return read_design(find_design("adjustable"))
+
+
+@pytest.mark.parametrize("coupling", ["paper_like", "derived"])
+def test_the_loop_is_lost_between_a_half_and_four_tenths(design, coupling):
+    # Control study, section 7.
+    poles = growth(design, coupling, 0.9)
+    assert np.all(poles[FINE >= 0.5] < 0.0) and np.all(poles[FINE <= 0.4] > 0.0)
+
+
+def test_what_is_certified_ends_before_the_loop_is_lost(design):
+    inputs = read_inputs(find_inputs("adjustable"))
+    assert [is_certified(design, inputs, tau) for tau in (0.8, 0.5, 0.4)] == [True, True, False]
