@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.study.adjustable_factor import FACTORS, FINE, FactorStudy, factor_study
+from hsv.study.adjustable_factor import FACTORS, FINE, FactorRow, FactorStudy, factor_study
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.sensitivity.study import Outcome, Progress, Study, lost_from
 from hsv.units import to_paper
@@ -90,14 +90,31 @@ def _findings(done: FactorStudy) -> tuple[str, ...]:
         )
         room = " and ".join(f"{value:.2f}" for value in row.room / first.room)
         found.append(
-            f"τ = {row.tau:g}: Z' {feet * row.half_width[1]:.1f} ft/s, τZ {feet * row.scaled[1]:.1f} ft/s; room of the "
+            f"at τ = {row.tau:g}: Z' {feet * row.half_width[1]:.1f} ft/s, τZ {feet * row.scaled[1]:.1f} ft/s; room of the "
             f"nominal input (fuel and elevator) {room} of that at 1; step settled in {settled}; Case 2 error over time "
             f"{row.ramp[0] / first.ramp[0]:.2f} (altitude) and {row.ramp[1] / first.ramp[1]:.2f} (velocity) of that at "
             f"1; attitude after the fault {degrees * row.attitude:.3f} deg, worst corner "
             f"{degrees * row.worst_attitude:.3f} deg, its end {feet * row.worst_error[0]:.1f} ft and "
             f"{feet * row.worst_error[1]:.1f} ft/s off"
         )
-    return tuple(found)
+    return (*found, _claim(first, done.rows[-1]))
+
+
+def _claim(first: FactorRow, last: FactorRow) -> str:
+    """Return what shows of the paper's claim that a smaller factor is faster and less robust (section 4.3)."""
+
+    def compared(before: float, after: float, less: str, more: str) -> str:
+        return less if after < before else more
+
+    velocity = compared(first.settling[1], last.settling[1], "settles sooner", "does not settle sooner")
+    ramp = compared(first.ramp[1], last.ramp[1], "is followed more closely", "is followed less closely")
+    attitude = compared(first.worst_attitude, last.worst_attitude, "moves less", "moves more")
+    size = compared(first.half_width[1], last.half_width[1], "smaller", "larger, not smaller as τZ is")
+    return (
+        f"of the paper's claim, from τ = {first.tau:g} to {last.tau:g}: the velocity {velocity} after a step, because "
+        f"K' may use more of the inputs; the ramp, on which the nominal input has nothing to do, {ramp}; after the "
+        f"fault the attitude {attitude}; the set of the gain that flies is {size}"
+    )
 
 
 def _lost(done: FactorStudy, coupling: str) -> str:
