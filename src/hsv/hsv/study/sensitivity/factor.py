@@ -89,13 +89,13 @@ def _findings(done: FactorStudy) -> tuple[str, ...]:
             f"{name} {value:.1f} s" for name, value in zip(("altitude", "velocity"), row.settling, strict=True)
         )
         room = " and ".join(f"{value:.2f}" for value in row.room / first.room)
+        share = row.ramp / first.ramp
         found.append(
-            f"at τ = {row.tau:g}: Z' {feet * row.half_width[1]:.1f} ft/s, τZ {feet * row.scaled[1]:.1f} ft/s; room of the "
-            f"nominal input (fuel and elevator) {room} of that at 1; step settled in {settled}; Case 2 error over time "
-            f"{row.ramp[0] / first.ramp[0]:.2f} (altitude) and {row.ramp[1] / first.ramp[1]:.2f} (velocity) of that at "
-            f"1; attitude after the fault {degrees * row.attitude:.3f} deg, worst corner "
-            f"{degrees * row.worst_attitude:.3f} deg, its end {feet * row.worst_error[0]:.1f} ft and "
-            f"{feet * row.worst_error[1]:.1f} ft/s off"
+            f"at τ = {row.tau:g}: Z' {feet * row.half_width[1]:.1f} ft/s, τZ {feet * row.scaled[1]:.1f} ft/s; room of "
+            f"the nominal input (fuel and elevator) {room} of that at 1; step settled in {settled}; Case 2 error over "
+            f"time {share[0]:.2f} (altitude) and {share[1]:.2f} (velocity) of that at 1; attitude after the fault "
+            f"{degrees * row.attitude:.3f} deg, worst corner {degrees * row.worst_attitude:.3f} deg, its end "
+            f"{feet * row.worst_error[0]:.1f} ft and {feet * row.worst_error[1]:.1f} ft/s off"
         )
     return (*found, _claim(first, done.rows[-1]))
 
