@@ -9,11 +9,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.control.design_file import ControlDesign
+from hsv.design.adjustable import design_adjustable
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.error_system import error_system, union
 from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
 from hsv.design.inputs import read_inputs, with_tau
 from hsv.design.region import corners, incomplete_share, region_parameters
+from hsv.design.sets.ellipsoid_set import vertex_residuals
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.design.verification.adjustable import adjustable_claims
@@ -56,18 +58,33 @@ def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
 def test_set_is_invariant_under_every_factor_that_is_certified(subject):
     found = certified_set(subject)
     design, model = subject.design, channel_model(subject.design)
-    for tau in (0.8, 0.87, 1.0):
+    # The inequality is linear in vertices and multipliers: between the two factors those between theirs prove it.
+    least, one = np.split(found.multipliers, 2)
+    for tau, multipliers in ((0.8, least), (0.87, 0.65 * least + 0.35 * one), (1.0, one)):
         gain = tau * design.feedback_gain[:, :5]
         system = error_system(design.polytope.A, design.polytope.B, gain, model.notch, model.columns)
-        columns = dataclasses.replace(found.problem, system=system).columns(found.centre)
-        # The worst next level from any point of the boundary, by the S-procedure with the certified contraction.
+        problem = dataclasses.replace(found.problem, system=system)
+        assert vertex_residuals(problem, found.centre, found.Q, found.contraction, multipliers).min() > 0.0
+        # From the boundary straight on, every disturbance at its worst sign for the direction taken.
         factor = np.linalg.cholesky(found.Q)
-        A = np.linalg.solve(factor, system.A @ factor)
-        assert np.linalg.norm(A, 2, axis=(1, 2)).max() < 1.0
-        reach = np.abs(np.linalg.solve(factor, columns)).sum(axis=2)
-        assert np.linalg.norm(reach, axis=1).max() < 1.0
+        start = np.random.default_rng(3).normal(size=(500, len(factor)))
+        start = start / np.linalg.norm(start, axis=1, keepdims=True)
+        free = np.einsum("rij,kj->rki", np.linalg.solve(factor, system.A @ factor), start)
+        columns = np.linalg.solve(factor, problem.columns(found.centre))
+        signs = np.sign(np.einsum("rki,rid->rkd", free, columns))
+        signs[..., -1] = 1.0  # the drift of the centre is what it is
+        reached = np.linalg.norm(free + np.einsum("rid,rkd->rki", columns, signs), axis=2)
+        assert 0.9 < reached.max() <= 1.0
     assert len(found.problem.system.A) == 12
     assert_allclose(found.problem.system.F[:, :4], 0.8 * subject.design.feedback_gain[:, :4])
+
+
+def test_room_at_one_is_that_of_the_whole_feedback(stored, subject):
+    tube, design = subject.certificate["tube"], subject.design
+    smaller = room_at_one(dataclasses.replace(design, tau_minimum=np.full(5, 0.9)), tube)
+    assert_allclose(smaller, stored["room_at_one"])
+    at_least = np.minimum(tube["tightening"]["plan"]["margin_to_lower"], tube["tightening"]["plan"]["margin_to_upper"])
+    assert np.all(smaller < at_least)
 
 
 def test_tau_z_is_too_small_for_the_gain_that_flies(stored, subject):
@@ -164,3 +181,18 @@ def test_wrong_factors_are_named():
         with_tau(inputs, [1.2])
     with pytest.raises(DesignError, match=r"expected a design with an \[adjustable\] table"):
         with_tau(read_inputs(OFFLINE_DESIGN / "baseline.toml"), [0.8])
+
+
+@pytest.mark.parametrize(
+    ("table", "choice", "message"),
+    [
+        ("model", {"system": "DM"}, r"model\.system = 'DM': expected 'ECM' in an adjustable design"),
+        ("invariant_set", {"method": "zonotope"}, r"invariant_set\.method = 'zonotope': expected 'ellipsoid'"),
+        ("tightening", {"chain": "literal"}, r"tightening\.chain = 'literal': expected 'design_bounds'"),
+    ],
+)
+def test_what_an_adjustable_design_cannot_be_is_refused_at_once(table, choice, message):
+    inputs = read_inputs(OFFLINE_DESIGN / "adjustable.toml")
+    changed = inputs.model_copy(update={table: getattr(inputs, table).model_copy(update=choice)})
+    with pytest.raises(DesignError, match=message):
+        design_adjustable(changed)

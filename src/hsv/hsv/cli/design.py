@@ -108,7 +108,7 @@ def _steps(report: dict[str, Any]) -> Table:
     fuel, elevator = adjustable["input_bound"]
     bounds = f"{fuel:.3f}, {to_paper(elevator, 'rad')[0]:.1f} deg"
     beyond = adjustable["complete_fault"]
-    parts = adjustable["full_state"]["largest_real_part"] if adjustable["full_state"] else {}
+    parts = adjustable["full_state"]["largest_real_part"]
     tau = ", ".join(f"{value:g}" for value in compact(np.array(adjustable["tau"])))
     rows = {
         "notch filter": f"centre {sections}",
@@ -125,7 +125,7 @@ def _steps(report: dict[str, Any]) -> Table:
     table = Table(title="Algorithm 1", title_justify="left", box=None, pad_edge=False, show_header=False)
     for number, (name, value) in enumerate(rows.items(), 1):
         table.add_row(f"({number})", name, value)
-        if number == 4 and parts:
+        if number == 4:
             table.add_row(
                 "",
                 "",

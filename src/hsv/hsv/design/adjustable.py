@@ -23,7 +23,7 @@ from hsv.design.baseline import (
 from hsv.design.common_lyapunov import CommonLyapunov, common_lyapunov
 from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
 from hsv.design.full_state import full_state_report
-from hsv.design.inputs import DesignInputs
+from hsv.design.inputs import AdjustableInputs, DesignInputs
 from hsv.design.nominal import nominal_gain
 from hsv.design.region import Region, incomplete_share
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
@@ -49,21 +49,19 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     were tau W under F' itself, is reported beside it. The input bounds of K' grow as U minus F' Z' does (eq. 52-53).
 
     Arguments and errors as for :func:`hsv.design.baseline.design_baseline`; a DesignError, too, where ``inputs`` has no
-    adjustable factor or where a nominal plan has no room at a certified factor.
+    adjustable factor, chooses what such a design cannot have, or where a plan has no room at a certified factor.
     """
-    if inputs.adjustable is None:
-        raise DesignError("adjustable: missing, expected a table with the factor tau")
+    tau = _checked(inputs).array()
     tell = progress or (lambda stage, done, total: None)
-    tau = inputs.adjustable.array()
     gains = design_gains(inputs, tell)
-    design = replace(gains.design, tau=tau, tau_minimum=tau, filtered=inputs.model.system == "ECM")
+    design = replace(gains.design, tau=tau, tau_minimum=tau, filtered=True)
 
     tell("common Lyapunov function", 0, 2)
     loops = certified_loops(design, inputs.disturbance.elevator_effectiveness)
-    lyapunov = common_lyapunov(loops, error_scale(inputs), "F', common Lyapunov function")
+    lyapunov = common_lyapunov(loops, inputs.error_scale(), "F', common Lyapunov function")
     tell("common Lyapunov function", 1, 2)
     columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
-    full = full_state_report(inputs, design, gains.model.whole, columns) if design.filtered else None
+    full = full_state_report(inputs, design, gains.model.whole, columns)
     tell("common Lyapunov function", 2, 2)
 
     sets = _sets(design, inputs, tell)
@@ -108,11 +106,17 @@ def _sets(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Ad
     )
 
 
-def error_scale(inputs: DesignInputs) -> np.ndarray:
-    """Return sizes of the errors of rigid states and filter that count as equal, those that F' was found with, SI."""
-    rigid = inputs.feedback.state_scale.array()
-    filters = [rigid[-1] / section.pole_frequency**power for section in inputs.notch for power in (1, 2)]
-    return np.concatenate((rigid, filters))
+def _checked(inputs: DesignInputs) -> AdjustableInputs:
+    if inputs.adjustable is None:
+        raise DesignError("adjustable: missing, expected a table with the factor tau")
+    for name, value, expected, why in (
+        ("model.system", inputs.model.system, "ECM", "whose feedback is adjusted"),
+        ("invariant_set.method", inputs.invariant_set.method, "ellipsoid", "of which two factors can share one"),
+        ("tightening.chain", inputs.tightening.chain, "design_bounds", "which grow with the factor's room"),
+    ):
+        if value != expected:
+            raise DesignError(f"{name} = {value!r}: expected {expected!r} in an adjustable design, {why}")
+    return inputs.adjustable
 
 
 def _report(

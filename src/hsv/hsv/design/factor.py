@@ -5,14 +5,17 @@ Nothing here needs a solver: a node recomputes it before it flies.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
+from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system
-from hsv.design.tightening import TightenedInputs
-from hsv.design.tube_problem import channel_model, factors
+from hsv.design.sets.ellipsoid_set import from_report
+from hsv.design.tightening import TightenedInputs, tighten
+from hsv.design.tube_problem import channel_model, factors, tube_problem
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_RIGID
 
@@ -45,13 +48,16 @@ def relaxed_bound(
 
 
 def room_at_one(design: ControlDesign, tube: dict[str, Any]) -> np.ndarray:
-    """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1."""
-    stored, plan = tube["invariant_set"], tube["tightening"]["plan"]
-    F = _system(design, np.ones(N_RIGID), 1.0).F
-    middle, half = F @ np.array(stored["centre"]), np.sqrt(np.einsum("ij,jk,ik->i", F, np.array(stored["Q"]), F))
-    to_lower = np.array(plan["lowest"]) - (design.input_minimum - middle + half)
-    to_upper = (design.input_maximum - middle - half) - np.array(plan["highest"])
-    return np.minimum(to_lower, to_upper)
+    """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1.
+
+    Raises:
+        DesignError: The feedback leaves nothing of an input there.
+    """
+    one = replace(design, tau_minimum=np.ones(N_RIGID))
+    problem = tube_problem(one, DisturbanceSet.from_report(tube["disturbance"]["channels"]))
+    bounds = tighten(from_report(problem, tube["invariant_set"]), design.input_minimum, design.input_maximum)
+    plan = tube["tightening"]["plan"]
+    return np.asarray(bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"])).min(axis=1))
 
 
 def _system(design: ControlDesign, factor: np.ndarray, effectiveness: float) -> ErrorSystem:

@@ -41,14 +41,11 @@ def full_state_report(
     disturbance = np.zeros((len(kept), columns.shape[1]))
     disturbance[:N_RIGID] = columns
     disturbance[PITCH_RATE] *= notch.D
-    rate = inputs.feedback.state_scale.pitch_rate
-    # A state of the filter counts as much as the pitch rate that excites it at the notch.
-    filter_scale = [rate / section.pole_frequency**power for section in design.notch for power in (1, 2)]
     found = feedback_gain(
         whole.A[:, kept][:, :, kept],
         whole.B[:, kept],
         disturbance,
-        np.concatenate((inputs.feedback.state_scale.array(), filter_scale)),
+        inputs.error_scale(),
         inputs.feedback.input_scale.array(),
     )
     target = inputs.nominal.target

@@ -254,6 +254,15 @@ class DesignInputs(_Table):
     tightening: TighteningInputs
     adjustable: AdjustableInputs | None = None
 
+    def error_scale(self) -> np.ndarray:
+        """Return sizes (5 + 2 s) of the errors of rigid states and s filter sections that count as equal, SI.
+
+        Those that F is found with; a state of the filter counts as much as the pitch rate that excites it at the notch.
+        """
+        rigid = self.feedback.state_scale.array()
+        filters = [rigid[-1] / section.pole_frequency**power for section in self.notch for power in (1, 2)]
+        return np.concatenate((rigid, filters))
+
 
 def parse_inputs(table: dict[str, Any]) -> DesignInputs:
     """Return the design inputs in a table as TOML gives it, with units.

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
-from hsv.design.adjustable import error_scale
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.factor import certified_loops, relaxed_bound
@@ -170,7 +169,7 @@ def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool
     """Return whether one Lyapunov function is found for ``tau`` and everything up to 1, with the fault and without."""
     loops = certified_loops(_with(gains, tau), inputs.disturbance.elevator_effectiveness)
     try:
-        common_lyapunov(loops, error_scale(inputs), f"tau = {tau:g}")
+        common_lyapunov(loops, inputs.error_scale(), f"tau = {tau:g}")
     except DesignError:
         return False
     return True

@@ -10,6 +10,7 @@ Convex combinations of vertices follow, because the set is convex. For fixed lam
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,6 +67,18 @@ def from_shape(
     F = problem.system.F
     feedback = np.sqrt(np.einsum("ij,jk,ik->i", F, Q, F))
     return EllipsoidSet(problem, centre, np.sqrt(np.diag(Q)), feedback, Q, contraction, multipliers, solver)
+
+
+def from_report(problem: TubeProblem, report: Mapping[str, Any]) -> EllipsoidSet:
+    """Return the set that ``report``, the invariant set in a certificate, describes for ``problem``."""
+    return from_shape(
+        problem,
+        np.array(report["centre"]),
+        np.array(report["Q"]),
+        report["contraction"],
+        np.array(report["multipliers"]),
+        SolverReport(**report["solver"], time=0.0),
+    )
 
 
 def vertex_residuals(

@@ -43,14 +43,13 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     K = np.linalg.solve(Q, np.array(single["Y"]).T).T
     gamma, _ = certified_cost(nominal_problem(inputs, design.polytope, relaxed), K, Q, "single nominal gain K'")
     yield same("certified cost of the single K'", gamma, single["certified_gamma"], 1e-6)
-    full = stored.get("full_state")
-    if full:
-        parts = largest_real_parts(design, np.array(full["gain"]), (target.altitude, target.velocity))
-        for coupling, value in parts["structured"].items():
-            yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", value, 0.0)
-        derived = parts["full_state"]["derived"]
-        yield above("the same with the full-state F', derived coupling", derived, 0.0)
-        yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], 1e-6)
+    full = stored["full_state"]
+    parts = largest_real_parts(design, np.array(full["gain"]), (target.altitude, target.velocity))
+    for coupling, value in parts["structured"].items():
+        yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", value, 0.0)
+    derived = parts["full_state"]["derived"]
+    yield above("the same with the full-state F', derived coupling", derived, 0.0)
+    yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], 1e-6)
 
 
 def _set_claims(name: str, design: ControlDesign, stored: dict[str, Any]) -> Generator[Claim, None, EllipsoidSet]:

@@ -9,8 +9,7 @@ import numpy as np
 
 from hsv.control.design_file import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, Extremes
-from hsv.design.lmi import SolverReport
-from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape, vertex_residuals
+from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same
@@ -23,16 +22,8 @@ def certified_set(subject: Subject) -> EllipsoidSet:
 
 def stored_set(design: ControlDesign, stored: dict[str, Any]) -> EllipsoidSet:
     """Return the ellipsoid that ``stored``, a tube in a certificate, describes for ``design``."""
-    s = stored["invariant_set"]
     disturbance = DisturbanceSet.from_report(stored["disturbance"]["channels"])
-    return from_shape(
-        tube_problem(design, disturbance),
-        np.array(s["centre"]),
-        np.array(s["Q"]),
-        s["contraction"],
-        np.array(s["multipliers"]),
-        SolverReport(**s["solver"], time=0.0),
-    )
+    return from_report(tube_problem(design, disturbance), stored["invariant_set"])
 
 
 def set_claims(subject: Subject) -> Iterable[Claim]:
