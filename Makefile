@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-viewers lint references bench clean
+.PHONY: help setup run test test-viewers lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -50,6 +50,11 @@ bench: setup ## set up, then measure this machine; replaces the table in docs/be
 	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-bench.txt --constraint "$$pins"
 	@$(IN_ENVIRONMENT) hsv bench --out docs/benchmarks.md $(ARGS)
 
+docs: setup ## set up, then build the documentation into docs/_build (open docs/_build/index.html)
+	@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
+	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-docs.txt --constraint "$$pins"
+	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
+
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

@@ -12,7 +12,7 @@ from hsv.cli.output import console, print_json
 
 
 def study(
-    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters, fault or factor.")],
+    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp or factor.")],
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of the study.")] = Path("study"),
     flights: FlightsOption = Path("bags/study"),
     coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from hsv.study.sensitivity import coupling, factor, fault, notch, parameters, sampling
+from hsv.study.sensitivity import coupling, factor, fault, notch, parameters, ramp, sampling, weights
 from hsv.study.sensitivity.study import Outcome, Study
 
-STUDIES: dict[str, Study] = {m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, factor)}
+STUDIES: dict[str, Study] = {
+    m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, weights, ramp, factor)
+}
 
 _PAGE = """# Sensitivity: {title}
 Made by `hsv study {name} --out docs/study`; the numbers are of this run.

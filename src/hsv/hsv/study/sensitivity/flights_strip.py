@@ -16,6 +16,16 @@ from hsv.units import to_paper
 Strip = dict[str, list[float]]
 """Columns over the points of a strip, by name."""
 
+_METRICS = (
+    "post_fault_attitude_deviation",
+    "post_fault_attitude_from_nominal",
+    "altitude_end_error",
+    "altitude_error_maximum",
+    "velocity_error_maximum",
+    "elastic_decay_time",
+    "fuel_equivalence_ratio_maximum",
+)
+
 SATURATED_STEPS = 50
 """Limited steps, one second, from which a flight counts as at its limits."""
 
@@ -31,7 +41,7 @@ def strip(tables: Sequence[Table]) -> Strip:
         columns["finished"].append(float(finished.mean()))
         columns["nominal_finished"].append(float(finished[0]))
         columns["without_limits"].append(float((finished & (table["saturated_steps"] <= SATURATED_STEPS)).mean()))
-    for name in ("post_fault_attitude_deviation", "altitude_end_error", "elastic_decay_time"):
+    for name in _METRICS:
         rows = [np.abs(table[name]) if name in table else np.full(len(table["diverged"]), np.nan) for table in tables]
         rows = [np.where(table["diverged"] == 0.0, row, np.nan) for table, row in zip(tables, rows, strict=True)]
         columns[f"{name}_nominal"] = [float(row[0]) for row in rows]
