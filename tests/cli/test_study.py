@@ -1,0 +1,45 @@
+import pytest
+
+
+def test_a_figure_is_drawn_with_its_page(hsv, tmp_path):
+    ran = hsv("figures", "--only", "4", "--out", "drawn")
+    assert ran.code == 0
+    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == [
+        "figure_04.md",
+        "figure_04.pdf",
+        "figure_04.png",
+    ]
+    assert not (tmp_path / "bags").exists()
+
+
+def test_a_figure_that_is_none_of_the_paper_s_is_named(hsv):
+    ran = hsv("figures", "--only", "7")
+    assert ran.code == 2
+    assert ran.error == "only = 7: expected one of 2, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17"
+
+
+def test_a_study_is_plotted_and_printed_as_json(hsv, tmp_path):
+    ran = hsv("study", "notch", "--coarseness", "20", "--out", "plots", "--json")
+    assert ran.code == 0
+    assert ran.json["study"] == "notch"
+    assert len(ran.json["strips"]["centre_rad_per_s"]) == 3
+    assert (tmp_path / "plots" / "notch.png").is_file()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("weather",), "study = 'weather': expected one of coupling, sampling, notch, parameters"),
+        (("coupling", "--coarseness", "0.1"), "coarseness = 0.1: expected 1 to 100"),
+    ],
+)
+def test_a_study_that_is_none_is_named(hsv, words, message):
+    ran = hsv("study", *words)
+    assert ran.code == 2
+    assert ran.error.startswith(message)
+
+
+def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv):
+    ran = hsv("claims", "--out", "absent/claims.md")
+    assert ran.code == 2
+    assert ran.error.startswith("out = 'absent/claims.md'")
