@@ -45,7 +45,7 @@ def _accuracy(evidence: Evidence) -> Finding:
             Reading("Bode magnitude apart, off the samples", accuracy["bode_magnitude_error_db"], "dB", at_most=1e-3),
             Reading("Bode phase apart", accuracy["bode_phase_error_deg"], "deg", at_most=1e-2),
         ),
-        "Of the decoupled model, over six points, all states and inputs. What the coupling changes is not in it.",
+        "Of the decoupled model, over 37 points, all states and inputs. What the coupling changes is not in it.",
     )
 
 

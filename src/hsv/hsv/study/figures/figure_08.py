@@ -53,7 +53,7 @@ def draw(material: Material) -> Drawing:
         f"Elevator deflection to filtered pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} ft/s, off the samples, "
         "all "
         f"discrete at {period:g} s; {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
-        "The co-designed model conforms to the ECM without its coupling, the notch included: over six points, all "
+        "The co-designed model conforms to the ECM without its coupling, the notch included: over 37 points, all "
         "states "
         f"and inputs, {accuracy['bode_magnitude_error_db']:.2f} dB and {accuracy['bode_phase_error_deg']:.2f} deg "
         "apart at "
