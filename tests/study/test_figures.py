@@ -11,7 +11,7 @@ from hsv.study.figures.figure import Material
 from hsv.study.figures.page import page
 from hsv.study.figures.style import RC, save
 from hsv.study.flights import Flights
-from hsv.study.sources import flight_digest
+from hsv.study.sources import drop_older, flight_digest
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +58,17 @@ def test_a_digest_is_of_the_scenario_flown():
     assert flight_digest("case1") != flight_digest("case1_no_notch")
     with pytest.raises(ScenarioError):
         flight_digest("case9")
+
+
+def test_only_the_newest_of_a_name_is_kept(tmp_path):
+    new, old = "0123456789ab", "ba9876543210"
+    for name in (f"case1_{new}", f"case1_{old}", f"case1_no_notch_{old}"):
+        (tmp_path / name).mkdir()
+        (tmp_path / f"{name}.npz").touch()
+    drop_older(tmp_path / f"case1_{new}")
+    drop_older(tmp_path / f"case1_{new}.npz")
+    kept = {path.name.removesuffix(".npz") for path in tmp_path.iterdir()}
+    assert kept == {f"case1_{new}", f"case1_no_notch_{old}"}
 
 
 def test_the_notch_takes_out_its_centre_and_passes_the_rest(flights):

@@ -18,7 +18,7 @@ from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.study.measures import flight_measures
-from hsv.study.sources import DIGITS, flight_digest
+from hsv.study.sources import DIGITS, drop_older, flight_digest
 from hsv.vehicle.plant import FlightStatus, Plant
 
 Progress = Callable[[str, int, int], None]
@@ -112,4 +112,5 @@ def corner_table(scenario: str, folder: Path, half_width: np.ndarray, progress: 
     with new.open("wb") as stream:
         np.savez_compressed(stream, **table)  # type: ignore[arg-type]
     new.rename(path)
+    drop_older(path)
     return table

@@ -19,7 +19,7 @@ from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import FlightData
 from hsv.simulation.scenario import load_scenario
-from hsv.study.sources import DIGITS, flight_digest
+from hsv.study.sources import DIGITS, drop_older, flight_digest
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""
@@ -87,6 +87,7 @@ class Flights:
             )
             self._progress(f"flying {scenario}", prepared.steps, prepared.steps)
             (workplace / bag.name).rename(bag)
+            drop_older(bag)
         finally:
             shutil.rmtree(workplace)
         return flight_data(Bag(bag))
@@ -101,6 +102,7 @@ class Flights:
         with new.open("wb") as stream:
             np.savez_compressed(stream, **_packed(flight))
         new.rename(path)
+        drop_older(path)
         return flight
 
 

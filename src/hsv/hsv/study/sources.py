@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 from collections.abc import Iterable
 from functools import cache
 from importlib.resources import files
@@ -34,6 +35,14 @@ def flight_digest(scenario: str) -> str:
     """
     design = find_design(load_scenario(scenario).design).read_bytes()
     return _digest((scenario_text(scenario).encode(), design, code_digest().encode()))
+
+
+def drop_older(path: Path) -> None:
+    """Remove what was kept beside ``path`` under the same name and another digest: what it depended on is gone."""
+    name, _, rest = path.name.rpartition("_")
+    for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
+        if other != path:
+            shutil.rmtree(other) if other.is_dir() else other.unlink()
 
 
 def _digest(parts: Iterable[bytes]) -> str:
