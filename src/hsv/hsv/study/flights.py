@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -98,6 +99,8 @@ class Flights:
             with np.load(path) as kept:
                 return _unpacked(kept)
         flight = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
+        # The stamps of a bag are whole nanoseconds.
+        flight = replace(flight, time=np.round(flight.time * 1e9) * 1e-9)
         new = path.with_suffix(".tmp")
         with new.open("wb") as stream:
             np.savez_compressed(stream, **_packed(flight))

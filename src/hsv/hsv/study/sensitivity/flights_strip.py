@@ -73,6 +73,7 @@ def legend(figure: Figure, *, shares: bool) -> None:
     controllers, _ = figure.axes[0].get_legend_handles_labels()
     styles = {"-": "nominal vehicle", "--": "worst corner"}
     if shares:
+        styles["-"] = "nominal vehicle; (a): flown to the end"
         styles[":"] = "(a): not a second at the limits"
     keys = [Line2D([], [], color="black", linestyle=s, linewidth=0.9, label=text) for s, text in styles.items()]  # type: ignore[arg-type]
     figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
