@@ -20,9 +20,7 @@ def _vertices(evidence: Evidence) -> Finding:
     return Finding(
         (Reading("vertices", count, "1", at_most=6.0), Reading("vertices", count, "1", at_least=6.0)),
         f"{rows} in altitude by {columns} in velocity at a relative tolerance of 1e-5, a hundred thousand times "
-        "coarser than "
-        "that of "
-        "the twenty vertices: it is the tolerance that makes the count, not the co-design.",
+        "coarser than that of the twenty vertices: it is the tolerance that makes the count, not the co-design.",
     )
 
 
@@ -86,8 +84,7 @@ def _improves(evidence: Evidence) -> Finding:
             ),
         ),
         "Stability is ensured for the decoupled model, and seen in flight. Performance on the paper's own manoeuvre "
-        "is the "
-        "baseline's or worse.",
+        "is the baseline's or worse.",
     )
 
 
@@ -111,10 +108,8 @@ def _faster(evidence: Evidence) -> Finding:
             ),
         ),
         f"The relaxed bounds of K' make a step faster: velocity settles in {step['velocity_settling_time']:.1f} s "
-        "instead of "
-        f"{nominal(baseline, 'velocity_settling_time'):.1f} s. Along the ramp they are not needed, and the softer "
-        "feedback "
-        "tracks less closely.",
+        f"instead of {nominal(baseline, 'velocity_settling_time'):.1f} s. Along the ramp they are not needed, and the "
+        "softer feedback tracks less closely.",
     )
 
 
@@ -138,8 +133,7 @@ def _faster_ramp(evidence: Evidence) -> Finding:
             ),
         ),
         "Integral of the velocity error over Case 2. The paper compares with nothing on the ramp; its baseline flies "
-        "a step "
-        "there, which is slower to settle whatever flies it.",
+        "a step there, which is slower to settle whatever flies it.",
     )
 
 
@@ -163,8 +157,7 @@ def _less_robust(evidence: Evidence) -> Finding:
             ),
         ),
         f"Worst corner {_degrees(worst(ramp, name)):.3f} deg with tau = 0.8, {_degrees(worst(whole, name)):.3f} deg "
-        "with the "
-        "whole feedback.",
+        "with the whole feedback.",
     )
 
 
@@ -196,8 +189,7 @@ def _scaled_set(evidence: Evidence) -> Finding:
             Reading("half-width of Z' over Z, largest", float(whole.max()), "1", at_most=1.0),
         ),
         "The law applies tau F', a weaker feedback, whose set is larger for the same disturbances. Disturbances "
-        "scaled by tau "
-        "do not make up for it.",
+        "scaled by tau do not make up for it.",
     )
 
 
@@ -259,21 +251,18 @@ def _degrees(value: float) -> float:
 
 _TAU = (
     "When τ is decreased, the nominal system constraint is relaxed such that the control performance becomes better "
-    "and the "
-    "robustness is worse."
+    "and the robustness is worse."
 )
 _CASE2 = (
     "As can be seen from Figures 14 and 15, the adjustable control scheme not only ensures the stability of the "
-    "aircraft, "
-    "but also improves the rapidity of speed response."
+    "aircraft, but also improves the rapidity of speed response."
 )
 
 CLAIMS = (
     Claim(
         "better performance and stability",
         "On the basis, the adjustable Tube-MPC controller is developed to improve the control performance and ensure "
-        "the "
-        "stability of the system.",
+        "the stability of the system.",
         "Abstract",
         _improves,
     ),
@@ -321,8 +310,7 @@ CLAIMS = (
     Claim(
         "inputs in Case 2",
         "As can be seen from Figure 17, in case of failure, the control inputs of the adjustable method can still be "
-        "maintained "
-        "within a reasonable range.",
+        "maintained within a reasonable range.",
         "5.2, Figure 17",
         _in_range,
     ),

@@ -53,8 +53,8 @@ def _box(evidence: Evidence) -> Finding:
             ),
         ),
         "The paper's box does not exist in these coordinates: oscillating and integrating pairs lose their sign in "
-        "|.|. An "
-        "ellipsoid about a shifted centre, with the filter's states in it, does, and is certified at every vertex.",
+        "|.|. An ellipsoid about a shifted centre, with the filter's states in it, does, and is certified at every "
+        "vertex.",
     )
 
 
@@ -114,8 +114,7 @@ def _input_set(evidence: Evidence) -> Finding:
             Reading("share of W for which this is so, derived coupling", float(derived), "1", at_least=1.0),
         ),
         "Not empty is the weak test; that the nominal plan fits, trim included, is the one that matters. With the "
-        "derived "
-        f"coupling it fits for {derived:g} W only.",
+        f"derived coupling it fits for {derived:g} W only.",
     )
 
 
@@ -146,10 +145,8 @@ def _input_bound(evidence: Evidence) -> Finding:
             ),
         ),
         "The bound is kept and is what slows the flight: symmetric about trim, it forgoes most of the fuel that U "
-        "leaves. A "
-        f"single K misses the velocity by {to_paper(abs(nominal(single, 'velocity_end_error')), 'm/s')[0]:.0f} ft/s "
-        "at the "
-        "end; nested gains settle.",
+        "leaves. A single K misses the velocity by "
+        f"{to_paper(abs(nominal(single, 'velocity_end_error')), 'm/s')[0]:.0f} ft/s at the end; nested gains settle.",
     )
 
 
@@ -169,16 +166,14 @@ CLAIMS = (
     Claim(
         "the trajectory enters and keeps to the set",
         "The control law (16) forces the trajectory of the actual system into mRPI set and the actual trajectory will "
-        "get "
-        "close to the nominal.",
+        "get close to the nominal.",
         "3.2",
         _in_the_set,
     ),
     Claim(
         "the trajectory comes close to the nominal",
         "The robust auxiliary feedback control law steers the actual trajectory into the mRPI set and makes it "
-        "approximate "
-        "the nominal trajectory.",
+        "approximate the nominal trajectory.",
         "1",
         _close_to_nominal,
     ),
@@ -186,8 +181,7 @@ CLAIMS = (
     Claim(
         "the nominal law stabilises",
         "In conclusion, the nominal control law u_n(k) = Kx_n(k) = YG^{-1}x_n(k) can guarantee the stability of the "
-        "nominal "
-        "system (15).",
+        "nominal system (15).",
         "3.2",
         _nominal_stable,
     ),

@@ -33,8 +33,8 @@ def _vertices(evidence: Evidence) -> Finding:
     count = float(rows * columns)
     return Finding(
         (Reading("vertices", count, "1", at_most=20.0), Reading("vertices", count, "1", at_least=20.0)),
-        f"{rows} in altitude by {columns} in velocity at a relative tolerance of {tolerance:g} of the singular values. "
-        "The count depends on tolerance and scales, which the paper does not give.",
+        f"{rows} in altitude by {columns} in velocity at a relative tolerance of {tolerance:g} of the singular "
+        "values. The count depends on tolerance and scales, which the paper does not give.",
     )
 
 
@@ -104,8 +104,7 @@ def _underdamped(evidence: Evidence) -> Finding:
             ),
         ),
         f"Real parts {elastic[0].pole.real:.2f} and {elastic[1].pole.real:.2f} 1/s. The pole that dominates the open "
-        "loop is "
-        f"another: the rigid body is unstable, {max(m.pole.real for m in rigid):+.2f} 1/s.",
+        f"loop is another: the rigid body is unstable, {max(m.pole.real for m in rigid):+.2f} 1/s.",
     )
 
 
@@ -121,30 +120,28 @@ CLAIMS = (
     Claim(
         "weak coupling",
         "To linearize nonlinear vehicle model, the weak coupling between the rigid body and the flexible modes is "
-        "ignored "
-        "(called Decoupling Model, DM).",
+        "ignored (called Decoupling Model, DM).",
         "3.1",
         _weak_coupling,
     ),
     Claim(
         "bounded disturbance",
-        "In summary, uncertain parameters, modelling error, and actuator failure of flexible hypersonic vehicle can be "
-        "lumped into a bounded term Δ.",
+        "In summary, uncertain parameters, modelling error, and actuator failure of flexible hypersonic vehicle can "
+        "be lumped into a bounded term Δ.",
         "3.1, (18)",
         _bounded,
     ),
     Claim(
         "seven modes",
-        "From Figure 4, it can be seen that CM (1) has a total of 7 motion modes, including five motion modes of rigid "
-        "body and two aeroelastic modes.",
+        "From Figure 4, it can be seen that CM (1) has a total of 7 motion modes, including five motion modes of "
+        "rigid body and two aeroelastic modes.",
         "3.3, Figure 4",
         _seven_modes,
     ),
     Claim(
         "almost structural frequencies",
         "Two flexible modes correspond to two pairs of underdamped conjugate complex roots, whose natural frequencies "
-        "are "
-        "almost consistent with the natural frequencies of structural flexibility.",
+        "are almost consistent with the natural frequencies of structural flexibility.",
         "3.3, Figure 4",
         _almost_structural,
     ),

@@ -68,9 +68,8 @@ def _unaffected(evidence: Evidence) -> Finding:
             Reading("phase lag there", float(lag[1]), "rad", at_most=np.radians(5.0)),
             Reading("fall of the second mode's peak", reductions(evidence)["second"], "dB", at_most=0.5),
         ),
-        "Slow signals pass. A filter wide enough for an uncertain mode takes phase from the loop below it, and from "
-        "the second "
-        "mode above it, which is welcome.",
+        "Slow signals pass. A filter wide enough for an uncertain mode takes phase from the loop below it; that it "
+        "lowers the second mode above it is welcome.",
     )
 
 
@@ -85,10 +84,8 @@ def _without_notch(evidence: Evidence) -> Finding:
             Reading("growth, nominal, derived coupling", float(derived[0]), "1/s", at_most=0.0),
         ),
         f"Without the notch {lost} of {len(growth)} vehicles are unstable, most slowly (worst second-mode ringing in "
-        "flight: "
-        f"{worst(table, 'elastic_rate_2_span') / nominal(table, 'elastic_rate_2_span'):.0f} times the nominal); with "
-        "the "
-        "derived coupling the flight is lost. The stability proof is one of the decoupled model.",
+        f"flight: {worst(table, 'elastic_rate_2_span') / nominal(table, 'elastic_rate_2_span'):.0f} times the "
+        "nominal); with the derived coupling the flight is lost. The stability proof is one of the decoupled model.",
     )
 
 
@@ -137,11 +134,10 @@ def _phase_margin(evidence: Evidence) -> Finding:
                 at_least=0.0,
             ),
         ),
-        f"Loop broken at the elevator. Without the notch the second mode crosses unit gain with "
+        "Loop broken at the elevator. Without the notch the second mode crosses unit gain with "
         f"{np.degrees(smallest['without']):.1f} deg left; the notch removes that crossing. At the rigid body's own "
-        "crossover, "
-        f"{rigid['without'].frequency:.1f} rad/s, it costs phase: {np.degrees(rigid['without'].phase):.0f} deg before, "
-        f"{np.degrees(rigid['with'].phase):.0f} deg after.",
+        f"crossover, {rigid['without'].frequency:.1f} rad/s, it costs phase: {np.degrees(rigid['without'].phase):.0f} "
+        f"deg before, {np.degrees(rigid['with'].phase):.0f} deg after.",
     )
 
 
@@ -161,13 +157,13 @@ def _closer(evidence: Evidence) -> Finding:
         (
             Reading("rigid error with over without notch, nominal", float(whole[0]), "1", at_most=1.0),
             Reading("rigid error with over without notch, worst corner", float(whole.max()), "1", at_most=1.0),
+            Reading("closer by 5 % or more: the same, nominal", float(whole[0]), "1", at_most=0.95),
             Reading("pitch-rate error with over without notch, nominal", float(rate[0]), "1", at_most=1.0),
             Reading("pitch-rate error with over without notch, worst corner", float(rate.max()), "1", at_most=1.0),
         ),
         "Root mean square over the 20 s after the fault. The notch changes the vibration and little else: the rigid "
-        "error is "
-        f"closer by {100.0 * (1.0 - whole[0]):.1f} % for the nominal vehicle; at the corners parameters make the "
-        "error.",
+        f"error is closer by {100.0 * (1.0 - whole[0]):.1f} % for the nominal vehicle; at the corners parameters make "
+        "the error.",
     )
 
 
@@ -211,8 +207,8 @@ def _unit_circle(evidence: Evidence) -> Finding:
     distance = float(np.abs(np.abs(zeros) - 1.0).max())
     return Finding(
         (Reading("distance of the zeros from the unit circle", distance, "1", at_most=1e-6),),
-        "Only for a zero numerator damping, epsilon_z = 0: then the notch is infinitely deep and as sensitive. Ours is "
-        f"{flown.notch[0].zero_damping:g}, "
+        "Only for a zero numerator damping, epsilon_z = 0: then the notch is infinitely deep and as sensitive. Ours "
+        f"is {flown.notch[0].zero_damping:g}, "
         f"{-20.0 * np.log10(flown.notch[0].zero_damping / flown.notch[0].pole_damping):.0f} dB deep.",
     )
 
@@ -221,16 +217,14 @@ CLAIMS = (
     Claim(
         "peaks eliminated",
         "In order to weaken the effect of flexibility, a notch filter is introduced to eliminate the frequency "
-        "response peak "
-        "of flexible modes.",
+        "response peak of flexible modes.",
         "Abstract",
         _peaks,
     ),
     Claim(
         "peak suppressed",
         "From the figure, it can be seen that the peak caused by the flexible mode is suppressed after the notch "
-        "filter is "
-        "connected into the flexible hypersonic vehicle.",
+        "filter is connected into the flexible hypersonic vehicle.",
         "3.3, Figure 3",
         _suppressed,
     ),
@@ -243,16 +237,14 @@ CLAIMS = (
     Claim(
         "other frequencies unaffected",
         "First of all, the principle of notch filter is that the non-notch frequency is not affected, so only the "
-        "first "
-        "flexible mode is filtered out.",
+        "first flexible mode is filtered out.",
         "3.3",
         _unaffected,
     ),
     Claim(
         "stable without the notch",
         "The Tube-MPC controller designed above can guarantee the stability of the rigid body states and flexible "
-        "states of "
-        "hypersonic vehicle with actuator faults.",
+        "states of hypersonic vehicle with actuator faults.",
         "3.3",
         _without_notch,
     ),
@@ -265,8 +257,7 @@ CLAIMS = (
     Claim(
         "phase margin",
         "As previously analysed, the appropriate parameter selection of notch filter will not destroy the stability "
-        "of the "
-        "original system, and will even increase the phase margin of the system.",
+        "of the original system, and will even increase the phase margin of the system.",
         "3.3",
         _phase_margin,
     ),
@@ -279,8 +270,7 @@ CLAIMS = (
     Claim(
         "closer to the nominal trajectory",
         "At the same time, compared with the system without notch filter, the position of system states with notch "
-        "filter in "
-        "the mRPI set is closer to the nominal trajectory, as shown in Figure 6.",
+        "filter in the mRPI set is closer to the nominal trajectory, as shown in Figure 6.",
         "3.3, Figure 6",
         _closer,
     ),
@@ -293,8 +283,7 @@ CLAIMS = (
     Claim(
         "zeros on the unit circle",
         "The notch is deep enough and has a certain width. All zeros of transfer function of notch filter should be "
-        "on the "
-        "unit circle.",
+        "on the unit circle.",
         "3.3 (1)",
         _unit_circle,
     ),

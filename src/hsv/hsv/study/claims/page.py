@@ -66,8 +66,7 @@ def _claim(entry: Judged) -> str:
     table = "\n".join(rows)
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
-        f"**{finding.verdict.capitalize()}.** "
-        f"{finding.why}\n\n{table}\n"
+        f"**{finding.verdict.capitalize()}.** {finding.why}\n\n{table}\n"
     )
 
 

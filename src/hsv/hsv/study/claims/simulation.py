@@ -63,11 +63,9 @@ def _rmpc_altitude(evidence: Evidence) -> Finding:
             ),
         ),
         "Decoupled model, as in the paper; the tube with the single gain ends "
-        f"{_feet(abs(nominal(tube, 'altitude_end_error'))):.1f} "
-        "ft off there. The size of the error is the size of the gain, which the paper does not give: the last gain of "
-        "the "
-        f"family leaves {_feet(abs(last['altitude_end_error'])):.0f} ft, limits inputs in "
-        f"{last['saturated_steps']:.0f} steps and "
+        f"{_feet(abs(nominal(tube, 'altitude_end_error'))):.1f} ft off there. The size of the error is the size of "
+        "the gain, which the paper does not give: the last gain of the family leaves "
+        f"{_feet(abs(last['altitude_end_error'])):.0f} ft, limits inputs in {last['saturated_steps']:.0f} steps and "
         f"is lost with uncertain parameters; the fourth leaves {_feet(float(gains.min())):.0f} ft to "
         f"{_feet(float(gains.max())):.0f} ft over the corners.",
     )
@@ -184,8 +182,7 @@ def _rmpc_vibrates(evidence: Evidence) -> Finding:
             ),
         ),
         "The coordinates follow the larger swing of the angle of attack; that is not vibration. Their rates move no "
-        "more, "
-        "because robust MPC flies the decoupled model.",
+        "more, because robust MPC flies the decoupled model.",
     )
 
 
@@ -257,8 +254,7 @@ def _accurate(evidence: Evidence) -> Finding:
             Reading("velocity, worst corner", worst(table, "velocity_end_error") / step[1], "1", at_most=0.02),
         ),
         "2 % of the step is the usual band of a settled response. Stable everywhere; accurate for the nominal "
-        "vehicle, and in "
-        "altitude not at the corners, where mass and thrust are off.",
+        "vehicle, and in altitude not at the corners, where mass and thrust are off.",
     )
 
 
@@ -362,10 +358,8 @@ def _rmpc_flexible(evidence: Evidence) -> Finding:
             Reading("the same without notch filter", errors[2] / decoupled, "1", at_least=1.5),
         ),
         f"Not satisfactory, but not for its flexibility: the fourth gain ends {_feet(errors[1]):.0f} ft off on the "
-        "coupled "
-        f"model, {_feet(errors[2]):.0f} ft without notch filter, {_feet(decoupled):.0f} ft on the decoupled model. "
-        "What "
-        "robust MPC lacks is an answer to the fault.",
+        f"coupled model, {_feet(errors[2]):.0f} ft without notch filter, {_feet(decoupled):.0f} ft on the decoupled "
+        "model. What robust MPC lacks is an answer to the fault.",
     )
 
 
@@ -417,8 +411,7 @@ CLAIMS = (
     Claim(
         "gentler with the notch",
         "Compared with Tube-MPC without notch filter, the state change of Tube-MPC with notch filter is gentler and "
-        "smoother "
-        "after fault occurs.",
+        "smoother after fault occurs.",
         "5.2, Figure 10",
         _gentler,
     ),
@@ -449,16 +442,14 @@ CLAIMS = (
     Claim(
         "notch at the second mode",
         "It can be known that the notch filter has a slight inhibition on the derivative of the first-order flexible "
-        "mode, and "
-        "a significant impact on the derivative of the second-order flexible mode.",
+        "mode, and a significant impact on the derivative of the second-order flexible mode.",
         "5.2, Figure 13",
         _second_mode,
     ),
     Claim(
         "accurate and stable",
         "Simulation results show that the Tube-MPC with notch filter can realize accurate and stable trajectory "
-        "tracking in "
-        "presence of uncertain parameters and actuator loss of effectiveness fault.",
+        "tracking in presence of uncertain parameters and actuator loss of effectiveness fault.",
         "5.2",
         _accurate,
     ),

@@ -15,9 +15,8 @@ SCENARIOS = (*ADJUSTABLE, *WHOLE, *BASELINE)
 
 CONDITIONS = (
     "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator effectiveness "
-    "0.9 "
-    "from 100 s; thin: nominal parameters. The adjustable design at the paper's tau = 0.8 and at 1, and the baseline "
-    "design on the same ramp"
+    "0.9 from 100 s; thin: nominal parameters. The adjustable design at the paper's tau = 0.8 and at 1, and the "
+    "baseline design on the same ramp"
 )
 
 

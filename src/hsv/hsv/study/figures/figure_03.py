@@ -47,19 +47,18 @@ def draw(material: Material) -> Drawing:
     return Drawing(
         figure,
         "Elevator to pitch rate after the filter, coupled model with the paper-like coupling where Case 1 starts; "
-        "zeros "
-        f"at {section.zero_frequency:g} rad/s with damping {section.zero_damping:g}.",
-        f"The peak of the first mode falls from {peaks[0]:.1f} dB to {peaks[1]:.1f} dB with the design's filter; wider "
-        "poles widen the notch.",
-        f"The filter is not free of charge off its centre: at 5 rad/s it takes {-lag:.0f} deg of phase. With "
-        "omega_p away from omega_z the gain above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %: one moves "
-        "both together. The paper gives neither its zeros nor the channel it shows.",
+        f"zeros at {section.zero_frequency:g} rad/s with damping {section.zero_damping:g}.",
+        f"The peak of the first mode falls from {peaks[0]:.1f} dB to {peaks[1]:.1f} dB with the design's filter; "
+        "wider poles widen the notch.",
+        f"The filter is not free of charge off its centre: at 5 rad/s it takes {-lag:.0f} deg of phase. With omega_p "
+        "away from omega_z the gain above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %: one moves both "
+        "together. The paper gives neither its zeros nor the channel it shows.",
     )
 
 
 FIGURE = PaperFigure(
     3,
-    "Bode diagram of notch filter's effect on flexible hypersonic vehicle. (a) Effect of omega_p when epsilon_p = 0.5. "
-    "(b) Effect of epsilon_p when omega_p = 15.",
+    "Bode diagram of notch filter's effect on flexible hypersonic vehicle. (a) Effect of omega_p when epsilon_p = "
+    "0.5. (b) Effect of epsilon_p when omega_p = 15.",
     draw,
 )

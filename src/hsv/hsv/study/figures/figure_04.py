@@ -67,13 +67,13 @@ def draw(material: Material) -> Drawing:
         figure,
         "Poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), both sets of inertial "
         "coupling.",
-        f"Seven modes, five of the rigid body and two lightly damped pairs; with the paper-like coupling these are at "
+        "Seven modes, five of the rigid body and two lightly damped pairs; with the paper-like coupling these are at "
         f"{like[0].natural_frequency:.2f} and {like[1].natural_frequency:.2f} rad/s, almost the structural 16.02 and "
         f"19.58 rad/s. The rigid body is unstable, {fast:+.2f} 1/s.",
         f"With the coupling derived from a beam model they are at {derived[0].natural_frequency:.2f} and "
         f"{derived[1].natural_frequency:.2f} rad/s, not almost structural: the paper's statement is what makes the "
-        "paper-like set a quarter of the derived one. The seven count the slow pair as "
-        "two: as pairs the rigid body has four modes.",
+        "paper-like set a quarter of the derived one. The seven count the slow pair as two: as pairs the rigid body "
+        "has four modes.",
     )
 
 

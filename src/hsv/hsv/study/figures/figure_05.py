@@ -46,15 +46,13 @@ def draw(material: Material) -> Drawing:
     phase.set_xticks([], minor=True)
     return Drawing(
         figure,
-        f"Elevator to pitch rate, coupled model with the paper-like coupling where Case 1 starts; notch at "
+        "Elevator to pitch rate, coupled model with the paper-like coupling where Case 1 starts; notch at "
         f"{section[0].zero_frequency:g} rad/s.",
         f"At the first mode the gain falls by {peaks['first'][0] - peaks['first'][1]:.0f} dB; the second, at the edge "
-        "of "
-        f"the notch, by {peaks['second'][0] - peaks['second'][1]:.0f} dB.",
-        "The centre is 15 rad/s, the value of the paper's Figure 3, and not the mode itself (15.88 rad/s): a dip at 15 "
-        "rad/s and a small peak at the mode remain beside each other. The lower centre serves the derived coupling "
-        "too, "
-        "whose first mode is lower.",
+        f"of the notch, by {peaks['second'][0] - peaks['second'][1]:.0f} dB.",
+        "The centre is 15 rad/s, the value of the paper's Figure 3, and not the mode itself (15.88 rad/s): a dip at "
+        "15 rad/s and a small peak at the mode remain beside each other. The lower centre serves the derived coupling "
+        "too, whose first mode is lower.",
     )
 
 

@@ -88,12 +88,12 @@ def draw(material: Material) -> Drawing:
     closer, larger = _comparison(*(tube_error(flight) for _, _, flight in flights.values()))
     return Drawing(
         figure,
-        "Tube errors e = x - x_r - x_n with uncertain parameters at the same twelve instants after the fault, in three "
-        "planes of the certified ellipsoid (its shadows), and the level of the rigid errors in its shadow over time.",
+        "Tube errors e = x - x_r - x_n with uncertain parameters at the same twelve instants after the fault, in "
+        "three planes of the certified ellipsoid (its shadows), and the level of the rigid errors in its shadow over "
+        "time.",
         f"All states stay inside, with the notch (worst level {worst['Tube-MPC with notch']:.2f}) and without "
         f"({worst['Tube-MPC without notch']:.2f}). Over the {len(INSTANTS)} instants the pitch-rate error with the "
-        "notch "
-        f"is the smaller one {closer} times.",
+        f"notch is the smaller one {closer} times.",
         "Closer to the nominal trajectory with the notch is true of the pitch rate, where the vibration shows (its "
         f"root mean square over the 20 s after the fault is {larger:.2f} times as large without), and hardly of the "
         "other states, which the lost elevator and the parameters move. The set is certified for the loop with the "

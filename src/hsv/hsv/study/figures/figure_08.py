@@ -51,20 +51,14 @@ def draw(material: Material) -> Drawing:
     return Drawing(
         figure,
         f"Elevator deflection to filtered pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} ft/s, off the samples, "
-        "all "
-        f"discrete at {period:g} s; {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
+        f"all discrete at {period:g} s; {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
         "The co-designed model conforms to the ECM without its coupling, the notch included: over 37 points, all "
-        "states "
-        f"and inputs, {accuracy['bode_magnitude_error_db']:.2f} dB and {accuracy['bode_phase_error_deg']:.2f} deg "
-        "apart at "
-        f"most; at {accuracy['points']} points the matrices differ by {accuracy['relative_frobenius_error']:.1g} of "
-        "their "
-        "norm.",
+        f"states and inputs, {accuracy['bode_magnitude_error_db']:.2f} dB and {accuracy['bode_phase_error_deg']:.2f} "
+        f"deg apart at most; at {accuracy['points']} points the matrices differ by "
+        f"{accuracy['relative_frobenius_error']:.1g} of their norm.",
         "With its coupling (grey, paper-like) the ECM has the peaks of the elastic modes at 15.9 and 19.5 rad/s, "
-        "which no "
-        "control-oriented model of the paper has: that the weak coupling is ignored is part of the design, and the "
-        "price "
-        "is that stability with flexibility has to be shown by other means.",
+        "which no control-oriented model of the paper has: that the weak coupling is ignored is part of the design, "
+        "and the price is that stability with flexibility has to be shown by other means.",
     )
 
 
@@ -76,7 +70,7 @@ def _coupled(notch: tuple[NotchSection, ...], point: tuple[float, float]) -> tup
 
 FIGURE = PaperFigure(
     8,
-    "Bode diagram comparison of codesigned polytopic LPV model and ECM. (a) Amplitude frequency characteristics. "
-    "(b) Phase frequency characteristics.",
+    "Bode diagram comparison of codesigned polytopic LPV model and ECM. (a) Amplitude frequency characteristics. (b) "
+    "Phase frequency characteristics.",
     draw,
 )

@@ -37,11 +37,10 @@ def draw(material: Material) -> Drawing:
         figure,
         case1.CONDITIONS + "; its single gain of the whole step is shown beside it.",
         f"Both tubes track through the fault, {end[case1.NOTCH[0]]:.1f} ft from the command at 200 s with the notch "
-        "and "
-        f"{end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
+        f"and {end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
         "How far robust MPC ends off is the size of its gain, which the paper does not state: with the single gain of "
-        f"(32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. The tube keeps a few feet "
-        "of error, because its law has no integral action.",
+        f"(32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. The tube keeps a few "
+        "feet of error, because its law has no integral action.",
     )
 
 

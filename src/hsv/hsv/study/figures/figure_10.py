@@ -26,11 +26,10 @@ def draw(material: Material) -> Drawing:
         case1.CONDITIONS + ".",
         "Attitude moves at the fault and settles at the new equilibrium, less with the tube "
         f"({off[case1.NOTCH[0]]:.2f} deg) than with robust MPC ({off[case1.RMPC[0]]:.2f} deg). With the notch it is "
-        "the "
-        f"smoother: the pitch rate between 10 s and 20 s after the fault spans {rates[case1.NOTCH[0]]:.3f} deg/s, "
+        f"the smoother: the pitch rate between 10 s and 20 s after the fault spans {rates[case1.NOTCH[0]]:.3f} deg/s, "
         f"without it {rates[case1.NO_NOTCH[0]]:.3f} deg/s.",
-        "The size of the excursion is set by the lost elevator and not by the notch: "
-        f"{off[case1.NO_NOTCH[0]]:.2f} deg without it. What the notch takes away is the ringing that follows.",
+        f"The size of the excursion is set by the lost elevator and not by the notch: {off[case1.NO_NOTCH[0]]:.2f} "
+        "deg without it. What the notch takes away is the ringing that follows.",
     )
 
 

@@ -22,18 +22,14 @@ def draw(material: Material) -> Drawing:
     return Drawing(
         figure,
         case1.CONDITIONS + ".",
-        "The coordinates vibrate at the fault and return to rest; with the notch within "
-        f"{decay[case1.NOTCH[0]]:.1f} s (5 % of the peak of their rates; nominal parameters "
-        f"{decay[case1.NOTCH[1]]:.1f} s), without it they still ring at the end, {decay[case1.NO_NOTCH[0]]:.0f} s "
-        "later "
-        f"(nominal {decay[case1.NO_NOTCH[1]]:.0f} s).",
+        f"The coordinates vibrate at the fault and return to rest; with the notch within {decay[case1.NOTCH[0]]:.1f} "
+        f"s (5 % of the peak of their rates; nominal parameters {decay[case1.NOTCH[1]]:.1f} s), without it they still "
+        f"ring at the end, {decay[case1.NO_NOTCH[0]]:.0f} s later (nominal {decay[case1.NO_NOTCH[1]]:.0f} s).",
         "Without the notch the second mode already grows before the fault with these parameters: its rate spans "
         f"{before[0]:.2f} slug^½ ft/s from 30 s to 40 s and {before[1]:.2f} from 90 s to 100 s. The fault lowers the "
-        "gain "
-        "of the loop and calms it. Robust MPC does not vibrate a lot more than the tubes: it flies the decoupled "
-        "model, "
-        f"which feeds no vibration back (second rate after the fault {spans[1]:.2f}, tube with notch {spans[0]:.2f}); "
-        "what moves far are its coordinates, with the angle of attack.",
+        "gain of the loop and calms it. Robust MPC does not vibrate a lot more than the tubes: it flies the decoupled "
+        f"model, which feeds no vibration back (second rate after the fault {spans[1]:.2f}, tube with notch "
+        f"{spans[0]:.2f}); what moves far are its coordinates, with the angle of attack.",
     )
 
 

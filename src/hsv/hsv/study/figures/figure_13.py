@@ -34,11 +34,11 @@ def draw(material: Material) -> Drawing:
     return Drawing(
         figure,
         'Nominal parameters, as we read the paper\'s "nominal system", with the fault; notch at 19.47 rad/s, the '
-        "second "
-        "coupled mode.",
+        "second coupled mode.",
         f"The second rate decays in {second[1]:.1f} s instead of {second[0]:.1f} s.",
-        f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, more than the slight effect the paper "
-        f"sees: a filter with poles this wide passes only {100.0 * passed:.0f} % of the pitch rate at the first mode.",
+        f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, more than the slight effect the "
+        f"paper sees: a filter with poles this wide passes only {100.0 * passed:.0f} % of the pitch rate at the first "
+        "mode.",
     )
 
 

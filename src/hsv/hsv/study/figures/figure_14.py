@@ -21,10 +21,8 @@ def draw(material: Material) -> Drawing:
         f"The ramp is tracked, at most {largest[0]:.0f} ft off and {end:.1f} ft at the end, through the fault.",
         "The paper says that the adjustable scheme responds faster in velocity. Along a ramp nothing of it shows: the "
         f"integral of the velocity error is {lag[0]:.0f} ft with tau = 0.8, {lag[1]:.0f} ft with tau = 1 and "
-        f"{lag[2]:.0f} ft "
-        "with the baseline. The relaxed bounds of K' make a step faster, a ramp does not need them. The length of the "
-        "ramp "
-        "is ours, the paper gives none.",
+        f"{lag[2]:.0f} ft with the baseline. The relaxed bounds of K' make a step faster, a ramp does not need them. "
+        "The length of the ramp is ours, the paper gives none.",
     )
 
 

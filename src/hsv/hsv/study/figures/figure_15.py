@@ -18,8 +18,7 @@ def draw(material: Material) -> Drawing:
         case2.CONDITIONS + ".",
         f"Attitude stays calm along the ramp, moves by {off[0]:.2f} deg at the fault and settles.",
         f"With the whole feedback it moves less, {off[1]:.2f} deg, as with the baseline, {off[2]:.2f} deg: this is "
-        "what "
-        "tau = 0.8 costs. The corners at which the ramp begins and ends show, because the reference's climb does.",
+        "what tau = 0.8 costs. The corners at which the ramp begins and ends show, because the reference's climb does.",
     )
 
 

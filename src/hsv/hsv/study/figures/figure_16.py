@@ -18,8 +18,7 @@ def draw(material: Material) -> Drawing:
         case2.CONDITIONS + ".",
         f"The coordinates vibrate at the fault and are at rest after {decay[0]:.1f} s.",
         f"So they are with tau = 1 ({decay[1]:.1f} s) and with the baseline ({decay[2]:.1f} s): it is the notch "
-        "filter that "
-        "does it, which all three have. A little sooner with tau = 0.8, whose loop gain is lower.",
+        "filter that does it, which all three have. A little sooner with tau = 0.8, whose loop gain is lower.",
     )
 
 

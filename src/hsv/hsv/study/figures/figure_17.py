@@ -22,8 +22,8 @@ def draw(material: Material) -> Drawing:
         f"The inputs stay within a reasonable range: {fuel[0]:.2f} to {fuel[1]:.2f} and {elevator[0]:.1f} deg to "
         f"{elevator[1]:.1f} deg, no step limited.",
         "With tau = 0.8 the elevator answers the fault more slowly than with the whole feedback. The jumps of the "
-        "fuel ratio "
-        "at 20 s and 80 s are the climbing trim's: the reference begins and ends to climb and accelerate at once.",
+        "fuel ratio at 20 s and 80 s are the climbing trim's: the reference begins and ends to climb and accelerate "
+        "at once.",
     )
 
 

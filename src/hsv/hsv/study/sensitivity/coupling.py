@@ -60,9 +60,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {len(over) - 1} corners of the "
-        "parameters "
-        "(dashed); (a) linear sampled loop, before and after the fault, at both ends of the step; (b), (c) flights, a "
-        "line ends where one is lost.",
+        "parameters (dashed); (a) linear sampled loop, before and after the fault, at both ends of the step; (b), (c) "
+        "flights, a line ends where one is lost.",
         tuple(findings),
         {
             "kappa": kappas.tolist(),

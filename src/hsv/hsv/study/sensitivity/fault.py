@@ -43,10 +43,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {len(over) - 1} corners of the "
-        "parameters. "
-        "(a) Share of flights that come to their end (solid), and without a second at the limits of the inputs "
-        "(dotted); "
-        "(b), (c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost.",
+        "parameters. (a) Share of flights that come to their end (solid), and without a second at the limits of the "
+        "inputs (dotted); (b), (c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost.",
         tuple(
             finding(c, shares, columns, lambda s: f"effectiveness {s:.3g}", rising=False)
             for c, columns in strips.items()

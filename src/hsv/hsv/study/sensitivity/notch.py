@@ -67,11 +67,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         "(a), (b) Largest real part of the sampled loop's poles over the notch's centre and the damping of its zeros, "
-        "nominal "
-        "vehicle, the worst of both ends of the step, before and after the fault; black: the limit of stability, "
-        "cross: "
-        "the baseline's filter. Zeros and poles share the centre, pole damping 0.5. (c) Decay time in flight; no point "
-        "where the flight is lost; dashed: the limits of the scenarios.",
+        "nominal vehicle, the worst of both ends of the step, before and after the fault; black: the limit of "
+        "stability, cross: the baseline's filter. Zeros and poles share the centre, pole damping 0.5. (c) Decay time "
+        "in flight; no point where the flight is lost; dashed: the limits of the scenarios.",
         tuple(_findings(centres, depths, maps, decays)),
         {
             "centre_rad_per_s": centres.tolist(),
@@ -114,8 +112,7 @@ def _findings(
         best = np.nanargmin(np.where(np.isnan(decays[name]), np.inf, decays[name]))
         said.append(
             f"{label}: stable with the centre at {span} (deep notch), at 15 rad/s {limit}; the shortest decay in "
-            "flight is "
-            f"{decays[name][best]:.1f} s at {centres[best]:.1f} rad/s"
+            f"flight is {decays[name][best]:.1f} s at {centres[best]:.1f} rad/s"
         )
     return said
 

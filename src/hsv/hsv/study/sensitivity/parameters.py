@@ -39,9 +39,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         "Case 1 on the coupled model, paper-like coupling, the vehicle at 32 corners of the scaled bounds. (a) Share "
-        "of "
-        "flights that come to their end (solid), and without a second at the limits of the inputs (dotted); (b), (c) "
-        "nominal vehicle solid, worst corner dashed, a line ends where a flight is lost.",
+        "of flights that come to their end (solid), and without a second at the limits of the inputs (dotted); (b), "
+        "(c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost.",
         tuple(
             finding(c, scales, columns, lambda s: f"{s:.2f} times the bounds", nominal=False)
             for c, columns in strips.items()

@@ -56,8 +56,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         f"Case 2 with the ramp from 20 s on; nominal vehicle and {len(over) - 1} corners of the parameters. (c) After "
-        "the "
-        "fault, black: half a degree.",
+        "the fault, black: half a degree.",
         tuple(_finding(controller, lengths, columns) for controller, columns in strips.items()),
         {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
     )
@@ -70,8 +69,7 @@ def _finding(controller: Controller, lengths: np.ndarray, columns: Strip) -> str
     met = f"inputs limited for ramps up to {limited.max():g} s" if len(limited) else "inputs never limited"
     return (
         f"{controller.label}: nominal vehicle {altitude[0]:.0f} ft and {velocity[0]:.1f} ft/s off at most with a ramp "
-        "of "
-        f"{lengths[0]:g} s, {altitude[-1]:.0f} ft and {velocity[-1]:.1f} ft/s with one of {lengths[-1]:g} s; {met}"
+        f"of {lengths[0]:g} s, {altitude[-1]:.0f} ft and {velocity[-1]:.1f} ft/s with one of {lengths[-1]:g} s; {met}"
     )
 
 

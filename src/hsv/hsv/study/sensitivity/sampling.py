@@ -66,17 +66,15 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         decay = _ends(table["elastic_decay_time"])
         findings.append(
             f"T = {period:g} s: linear loop unstable {said[0]} with the notch, {said[1]} without; Case 1 with the "
-            "paper-like "
-            f"coupling: attitude excursion {attitude[0]:.3f} deg (worst of {len(over) - 1} corners {attitude[1]:.3f} "
-            "deg), "
-            f"decay {decay[0]:.1f} s ({decay[1]:.1f} s), {int(table['diverged'].sum())} flights lost"
+            f"paper-like coupling: attitude excursion {attitude[0]:.3f} deg (worst of {len(over) - 1} corners "
+            f"{attitude[1]:.3f} deg), decay {decay[0]:.1f} s ({decay[1]:.1f} s), {int(table['diverged'].sum())} "
+            "flights lost"
         )
     return Outcome(
         figure,
         "The baseline's inputs designed anew at each period (polytopic model, F, K), notch at 15 rad/s discretised at "
-        "that "
-        "period; largest real part of the sampled loop's poles over the coupling, nominal vehicle, the worst of both "
-        "ends of the step, before and after the fault.",
+        "that period; largest real part of the sampled loop's poles over the coupling, nominal vehicle, the worst of "
+        "both ends of the step, before and after the fault.",
         tuple(findings),
         {
             "kappa": kappas.tolist(),

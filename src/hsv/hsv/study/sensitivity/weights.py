@@ -75,10 +75,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     return Outcome(
         figure,
         "F designed anew with another scale of the elevator, all else the baseline's; nominal vehicle and "
-        f"{len(over) - 1} "
-        "corners, paper-like coupling. (a) Linear sampled loop, before and after the fault, worst vehicle; (b) "
-        "attitude from "
-        "nominal after the fault, black: half a degree; (c) altitude error at the end.",
+        f"{len(over) - 1} corners, paper-like coupling. (a) Linear sampled loop, before and after the fault, worst "
+        "vehicle; (b) attitude from nominal after the fault, black: half a degree; (c) altitude error at the end.",
         tuple(_findings(scales, gains, growths, strips)),
         {
             "elevator_scale_rad": scales.tolist(),
@@ -104,8 +102,7 @@ def _findings(
     altitude = to_paper(1.0, "m")[0] * np.array(strips[WITH_NOTCH]["altitude_end_error_worst"])
     said = [
         f"scale {scales[i]:.3f} rad, gain of the elevator on the pitch rate {gains[i]:.2f} s: worst attitude from "
-        "nominal "
-        f"{attitude[i]:.3f} deg, worst altitude error {altitude[i]:.1f} ft with the notch"
+        f"nominal {attitude[i]:.3f} deg, worst altitude error {altitude[i]:.1f} ft with the notch"
         for i in (0, len(scales) // 2, -1)
     ]
     for controller, values in growths.items():
