@@ -26,7 +26,7 @@ def test_the_catalogue_is_in_the_paper_s_order_and_flies_shipped_scenarios():
         assert set(figure.scenarios) <= set(scenario_names())
 
 
-@pytest.mark.parametrize("number", [3, 4, 13])
+@pytest.mark.parametrize("number", [4, 13])
 def test_a_figure_is_written_as_pdf_and_png_with_its_page(number, flights, tmp_path):
     figure = FIGURES[number]
     with matplotlib.rc_context(RC):
