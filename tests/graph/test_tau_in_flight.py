@@ -37,6 +37,8 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     refused = processes.run(*change, "[0.4, 0.4, 0.7, 0.7, 1.0]")
     assert refused.returncode == 1
     assert "feedback.tau[0] = 0.4: expected 0.5 to 1, the certified range" in refused.stdout
+    mistyped = processes.run(*change, "0.9")
+    assert mistyped.returncode == 1 and "feedback.tau = 0.9: Wrong parameter type" in mistyped.stdout
     fixed = processes.run(*change[:-1], "feedback.tau_minimum", "[0.1]")
     assert fixed.returncode == 1 and "feedback.tau_minimum" in fixed.stdout
     taken = processes.run(*change, "[0.8, 0.8, 0.9, 0.9, 1.0]")

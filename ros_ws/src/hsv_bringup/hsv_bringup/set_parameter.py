@@ -46,11 +46,14 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         result = set_parameter(asked.node, asked.parameter, yaml.safe_load(asked.value))
     except (TypeError, yaml.YAMLError) as error:
-        result = SetParametersResult(successful=False, reason=f"value = {asked.value!r}: {error}")
+        result = SetParametersResult(successful=False, reason=" ".join(str(error).split()))
     finally:
         rclpy.try_shutdown()
-    print(
-        result.reason or f"{asked.parameter} = {asked.value} is set",
-        file=sys.stdout if result.successful else sys.stderr,
-    )
-    return 0 if result.successful else 1
+    said = f"{asked.parameter} = {asked.value}"
+    if result.successful:
+        print(f"{said} is set")
+        return 0
+    # ROS itself refuses a value of another type without naming the parameter.
+    named = asked.parameter in result.reason
+    print(result.reason if named else f"{said}: {result.reason}", file=sys.stderr)
+    return 1
