@@ -1,8 +1,10 @@
+import json
 import math
 
 import numpy as np
 import pytest
 
+from hsv.cli.claims import _as_json
 from hsv.study.claims import modelling, notch
 from hsv.study.claims.catalogue import GROUPS
 from hsv.study.claims.claim import Finding, Judged, Reading, Verdict
@@ -68,6 +70,7 @@ def test_the_page_holds_every_claim_and_the_ranking():
 def test_claims_on_the_model_are_measured(claim, evidence):
     result = claim.measure(evidence)
     assert result.readings
+    json.dumps(_as_json("model", Judged(claim, result)))
     assert all(math.isfinite(reading.value) for reading in result.readings)
 
 

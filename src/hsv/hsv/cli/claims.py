@@ -37,6 +37,8 @@ def claims(
         evidence = Evidence(flights, progress)
         judged = judge(evidence, progress)
         ranks = ranking(evidence)
+    if out:
+        out.write_text(page(judged, ranks), encoding="utf-8")
     if json:
         print_json(
             {
@@ -46,8 +48,6 @@ def claims(
         )
     else:
         _print(judged)
-    if out:
-        out.write_text(page(judged, ranks), encoding="utf-8")
 
 
 def _as_json(group: str, entry: Judged) -> dict[str, Any]:

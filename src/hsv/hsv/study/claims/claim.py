@@ -31,8 +31,8 @@ class Reading:
     def holds(self) -> bool:
         """Whether the number keeps to the threshold; what is not a number does not."""
         if self.at_most is not None:
-            return self.value <= self.at_most
-        return self.at_least is not None and self.value >= self.at_least
+            return bool(self.value <= self.at_most)
+        return bool(self.at_least is not None and self.value >= self.at_least)
 
 
 @dataclass(frozen=True)
