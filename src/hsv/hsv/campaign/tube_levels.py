@@ -13,9 +13,9 @@ from hsv.control.control_law import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, flown_sections, rest
-from hsv.control.tube_law import N_RIGID, PITCH_RATE
 from hsv.parameters import check_all
 from hsv.simulation.metrics import FlightData
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 
 
 @njit(cache=True, nogil=True)

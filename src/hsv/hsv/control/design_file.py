@@ -20,6 +20,7 @@ from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
 from hsv.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 
 DESIGN_PARAMETERS = (
     Parameter("design.name", "", "name of the design"),
@@ -53,8 +54,6 @@ DESIGN_PARAMETERS = (
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
 """What a design brings to the nodes."""
-
-N_STATES, N_INPUTS, N_RIGID = 9, 2, 5
 
 
 @dataclass(frozen=True)

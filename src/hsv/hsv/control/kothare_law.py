@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.control.design_file import N_RIGID, ControlDesign
+from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus, level
 from hsv.design.nominal_problem import NominalProblem
 from hsv.errors import DesignError
+from hsv.vehicle.dynamics import N_RIGID
 
 SOLVE_STEPS = 100
 """Steps from the start of a solve to the step at which its gain takes effect."""

@@ -11,12 +11,11 @@ import numpy as np
 import piqp
 from scipy.linalg import solve_discrete_are
 
-from hsv.control.design_file import N_RIGID, ControlDesign
+from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import DesignError
-
-PITCH_RATE = 4
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 
 BLOCKS = 30
 """Blocks of the horizon, c constant in each."""

@@ -10,9 +10,10 @@ import numpy as np
 
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.control.tube_law import N_RIGID, PITCH_RATE, TubeData, TubeResult, TubeStatusCode, tube_input
+from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_input
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 
 ROBUST_MPC_PARAMETERS = (
     Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost, -1 the last", "", -64, 63),

@@ -25,10 +25,8 @@ from hsv.control.notch_filter import (
 )
 from hsv.control.planned_filter import PlannedFilter
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 from hsv.vehicle.parameters import COUPLING_SETS
-
-PITCH_RATE = 4
-N_RIGID = 5
 
 
 class TubeStatusCode(IntEnum):

@@ -15,9 +15,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.notch_filter import NotchData, filter_step, rest, series
-from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
-
-PITCH_RATE = 4
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
 @dataclass(frozen=True)

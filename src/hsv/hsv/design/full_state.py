@@ -18,8 +18,8 @@ from hsv.design.coupled_poles import largest_real_parts
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs
 from hsv.lpv.polytope import Polytope
-from hsv.vehicle.dynamics import N_RIGID, N_STATES
-from hsv.vehicle.extended import PITCH_RATE, Filter, from_true_rate
+from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
+from hsv.vehicle.extended import Filter, from_true_rate
 
 
 def full_state_report(

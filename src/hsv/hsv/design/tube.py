@@ -12,7 +12,7 @@ from hsv.control.design_file import ControlDesign
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership
-from hsv.design.error_system import PITCH_RATE, tube_errors
+from hsv.design.error_system import tube_errors
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
 from hsv.design.sets.box import box
@@ -26,6 +26,7 @@ from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tigh
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.simulation.closed_loop import Flight
 from hsv.simulation.metrics import flight_metrics
+from hsv.vehicle.dynamics import PITCH_RATE
 
 Progress = Callable[[str, int, int], None]
 

@@ -33,6 +33,7 @@ N_STATES = len(STATE_NAMES)
 N_INPUTS = len(INPUT_NAMES)
 N_RIGID = 5
 """The first five states are those of the rigid body."""
+PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
 
 @njit(cache=True, error_model="numpy")

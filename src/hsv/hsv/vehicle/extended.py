@@ -14,10 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE, derivative
 from hsv.vehicle.parameters import VehicleParameters
-
-PITCH_RATE = 4
 
 
 class Filter(NamedTuple):

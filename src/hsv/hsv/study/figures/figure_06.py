@@ -11,6 +11,7 @@ from hsv.study.figures import case1
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREEN, GREY, letter, new_figure
 from hsv.units import to_paper
+from hsv.vehicle.dynamics import N_RIGID
 
 INSTANTS = (100.2, 100.4, 100.6, 100.8, 101.0, 101.5, 102.0, 103.0, 104.0, 105.0, 106.0, 108.0)
 """s; the same for both flights."""
@@ -20,7 +21,6 @@ PLANES = (
     (2, 3, r"$e_\alpha$ (deg)", "rad", r"$e_\theta$ (deg)", "rad"),
     (3, 4, r"$e_\theta$ (deg)", "rad", "$e_q$ (deg/s)", "rad/s"),
 )
-N_RIGID = 5
 
 
 def tube_error(flight: FlightData) -> np.ndarray:
