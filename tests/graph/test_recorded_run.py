@@ -59,11 +59,11 @@ def test_replay_over_dds_is_identical_in_every_byte(processes: Processes, bag: P
 
 def test_a_node_that_does_not_start_is_named(processes: Processes, bag: Path) -> None:
     wrong = processes.folder / "wrong.yaml"
-    wrong.write_text("/**:\n  ros__parameters:\n    feedback.gain: [1.0, 2.0]\n")
+    wrong.write_text("/**:\n  ros__parameters:\n    design.certificate: absent.json\n")
     words = ["--over-dds", "--node", "tube_mpc", "--parameters", str(wrong)]
     done = processes.run("hsv", "replay", bag, *words, timeout=60.0)
     assert done.returncode == 1
-    assert "tube_mpc ended with exit code 2" in done.stdout and "feedback.gain" in done.stdout
+    assert "tube_mpc ended with exit code 2" in done.stdout and "absent.json" in done.stdout
 
 
 @pytest.mark.parametrize("read", READERS)

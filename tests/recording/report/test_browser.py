@@ -179,7 +179,9 @@ def test_on_paper_it_is_light_without_controls_and_plots_fit(opened):
 
 
 @pytest.mark.parametrize("scenarios", [["case1"], ["case1", "case1_no_notch", "case1_derived"]], ids=len)
-def test_whole_flights_make_a_small_page_and_the_time_to_draw_it_is_told(browser, bags, tmp_path, record_property, capsys, scenarios):
+def test_whole_flights_make_a_small_page_and_its_time_is_told(
+    browser, bags, tmp_path, record_property, capsys, scenarios
+):
     flown = [record_flight(bags / f"{len(scenarios)}_{name}", name, 200.0, 100.0) for name in scenarios]
     page = tmp_path / "whole.html"
     write_report(flown, page)
