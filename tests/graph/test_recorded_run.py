@@ -10,10 +10,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from bag_readers import READERS, Messages, assert_equal, ours
 from domain_coordinator import domain_id
 from node_processes import Processes, short_scenario
 
+from hsv.control.design_file import find_design, read_parameters
 from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
@@ -59,7 +61,8 @@ def test_replay_over_dds_is_identical_in_every_byte(processes: Processes, bag: P
 
 def test_a_node_that_does_not_start_is_named(processes: Processes, bag: Path) -> None:
     wrong = processes.folder / "wrong.yaml"
-    wrong.write_text("/**:\n  ros__parameters:\n    design.certificate: absent.json\n")
+    values = read_parameters(find_design("baseline")) | {"design.certificate": "absent.json"}
+    wrong.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
     words = ["--over-dds", "--node", "tube_mpc", "--parameters", str(wrong)]
     done = processes.run("hsv", "replay", bag, *words, timeout=60.0)
     assert done.returncode == 1
