@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from hsv.control.control_law import CONTROLLER_PARAMETERS
+from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.graph
 def _start_and_fly(processes: Processes, bag: Path, pace: str = "1"):  # type: ignore[no-untyped-def]
     """Start a long flight and return it once some of it is on disk."""
     scenario = short_scenario(processes.folder, duration=120, fault=100)
-    run = processes.start("hsv", "run", scenario, "--bag", bag, "--real-time-factor", pace)
+    run = processes.start("hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", pace)
     mcap = bag / f"{bag.name}_0.mcap"
     deadline = time.monotonic() + 60.0
     while not mcap.exists() or mcap.stat().st_size < 150_000:
@@ -71,7 +71,9 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
 def test_a_hung_node_is_named(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, duration=120, fault=100)
     bag = processes.folder / "hung"
-    run = processes.start("hsv", "run", scenario, "--bag", bag, "--real-time-factor", "1", "--step-timeout", "1")
+    run = processes.start(
+        "hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", "1", "--step-timeout", "1"
+    )
     mcap = bag / "hung_0.mcap"
     deadline = time.monotonic() + 60.0
     while not mcap.exists() or mcap.stat().st_size < 150_000:

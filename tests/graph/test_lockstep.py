@@ -22,7 +22,7 @@ pytestmark = pytest.mark.graph
 
 
 def _fly(processes: Processes, scenario: Path, name: str) -> Bag:
-    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / name)
+    done = processes.run("hsv", "run", scenario, "--no-report", "--bag", processes.folder / name)
     assert done.returncode == 0, done.stdout
     return Bag(processes.folder / name)
 
@@ -84,7 +84,7 @@ def test_two_runs_are_bit_identical_whatever_the_load(processes: Processes) -> N
 
 def test_a_diverging_flight_ends_cleanly_and_says_so(processes: Processes) -> None:
     scenario = short_scenario(processes.folder, duration=30, fault=29, coupling="derived", notch=False)
-    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / "lost")
+    done = processes.run("hsv", "run", scenario, "--no-report", "--bag", processes.folder / "lost")
     assert done.returncode == 1
     assert "flight diverged at t = 17.5" in done.stdout
     bag = Bag(processes.folder / "lost")
@@ -97,7 +97,7 @@ def test_pacing_keeps_to_the_wall_clock(processes: Processes) -> None:
     import json
 
     scenario = short_scenario(processes.folder, duration=2, fault=1)
-    done = processes.run("hsv", "run", scenario, "--real-time-factor", "1", "--json")
+    done = processes.run("hsv", "run", scenario, "--no-report", "--real-time-factor", "1", "--json")
     assert done.returncode == 0, done.stdout
     # A lower bound only: a loaded machine may be late, but never early.
     assert json.loads(done.stdout[done.stdout.index("{") :])["wall_time_s"] >= 1.9

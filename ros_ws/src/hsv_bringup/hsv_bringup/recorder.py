@@ -13,7 +13,7 @@ from hsv_msgs.msg import RecorderProgress, Run
 
 from hsv.errors import ParameterError
 from hsv.graph.description import TOPICS
-from hsv.graph.node_parameters import RECORDER_PARAMETERS
+from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter

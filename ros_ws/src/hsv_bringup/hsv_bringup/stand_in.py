@@ -13,7 +13,7 @@ from hsv_msgs.msg import Ready, Run
 from rclpy.node import Node
 
 from hsv.graph import description
-from hsv.graph.node_parameters import STAND_IN_PARAMETERS
+from hsv.graph.part_parameters import STAND_IN_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic

@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run
 
 from hsv.graph import description
-from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS
+from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.process import ProcessNode

@@ -12,8 +12,8 @@ from rosgraph_msgs.msg import Clock
 
 from hsv.graph.description import peers
 from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
-from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.vehicle.plant import FlightStatus, Plant
+from hsv.graph.part_parameters import PACE_PARAMETERS
+from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
 from hsv_node.lockstep import LockstepNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
@@ -32,7 +32,7 @@ class PlantNode(LockstepNode):
 
     def __init__(self) -> None:
         super().__init__("plant")
-        self.values = declare(self, NODE_PARAMETERS["plant"])
+        self.values = declare(self, (*PLANT_PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
         self._peers = peers("plant", self.controller, self.recorded)
         self._ready: set[str] = set()

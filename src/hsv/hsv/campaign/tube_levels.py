@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hsv.control.control_law import CONTROLLER_PARAMETERS
+from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, flown_sections, rest

@@ -1,4 +1,4 @@
-"""The controllers that can close the loop, and their common interface."""
+"""The common interface of the controllers, and the one that the parameters describe."""
 
 from __future__ import annotations
 
@@ -7,14 +7,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.integral_action import INTEGRAL_PARAMETERS, IntegralTubeLaw
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeLaw, TubeResult
-from hsv.parameters import Parameter, check_all
-
-CONTROLLERS = ("tube_mpc", "robust_mpc")
-
-CONTROLLER_PARAMETERS = (Parameter("controller", "tube_mpc", "which controller closes the loop", choices=CONTROLLERS),)
+from hsv.parameters import check_all
 
 
 class ControlLaw(Protocol):

@@ -7,17 +7,19 @@ objects with the fields of their type as attributes; those handed out are filled
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.control_law import ControlLaw
 from hsv.control.nominal_law import NOT_IN_FAMILY
-from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
-from hsv.control.notch_filter import NotchFilter, NotchResult
-from hsv.control.tube_law import TubeResult
-from hsv.faults.actuator import FaultInjector, FaultResult
-from hsv.vehicle.plant import PlantResult
+
+if TYPE_CHECKING:  # a node imports its own component alone
+    from hsv.control.control_law import ControlLaw
+    from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
+    from hsv.control.notch_filter import NotchFilter, NotchResult
+    from hsv.control.tube_law import TubeResult
+    from hsv.faults.actuator import FaultInjector, FaultResult
+    from hsv.vehicle.plant import PlantResult
 
 Message = Any
 

@@ -6,7 +6,8 @@ from collections.abc import Iterable
 
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
-from hsv.graph.node_parameters import LOCKSTEP_PARAMETERS, NODE_PARAMETERS
+from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 
 _HEADER = """# Parameters of the nodes

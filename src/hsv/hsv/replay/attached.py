@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
-from hsv.control.control_law import CONTROLLER_PARAMETERS
+from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign, parse_parameters, read_design_parameters
 from hsv.errors import RecordingError
 from hsv.faults.actuator import Fault, FaultInjector

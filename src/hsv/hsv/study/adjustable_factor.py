@@ -82,9 +82,6 @@ def factor_study(inputs: DesignInputs, factors: Sequence[float], progress: Progr
     Raises:
         DesignError: No design at tau = 1.
     """
-    # Slower loops have sets of slower contraction.
-    wide = inputs.invariant_set.model_copy(update={"contraction": [0.988, 0.990, 0.992, 0.994, 0.996]})
-    inputs = inputs.model_copy(update={"invariant_set": wide})
     gains = replace(design_gains(inputs, progress).design, filtered=True)
     one = _with(gains, 1.0)
     complete = measured_set(one, Region(one, inputs, 1.0), inputs, lambda *_: None)

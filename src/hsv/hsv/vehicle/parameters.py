@@ -130,11 +130,13 @@ def vehicle_parameters(coupling: str = "paper_like") -> VehicleParameters:
     return VehicleParameters(**values)
 
 
+def uncertain_parameters() -> list[str]:
+    """Return the names of the paper's ten uncertain parameters (section 5.1)."""
+    return [name for name, row in _rows("derived").items() if "uncertainty" in row]
+
+
 @cache
 def uncertainty_bounds() -> Mapping[str, float]:
     """Return the relative bound of each of the paper's ten uncertain parameters (section 5.1), by name."""
-    return {
-        name: parse_quantity(row["uncertainty"], "1", name)
-        for name, row in _rows("derived").items()
-        if "uncertainty" in row
-    }
+    rows = _rows("derived")
+    return {name: parse_quantity(rows[name]["uncertainty"], "1", name) for name in uncertain_parameters()}

@@ -13,7 +13,7 @@ from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import forces
 from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE, in_model_range
 from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.parameters import COUPLING_SETS, MODELS, VehicleParameters, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.parameters import COUPLING_SETS, MODELS, VehicleParameters, uncertain_parameters, vehicle_parameters
 from hsv.vehicle.trim import Trim, trim
 
 
@@ -35,7 +35,7 @@ PLANT_PARAMETERS = (
     Parameter("initial.velocity", 2407.92, "velocity of the initial trim", "m/s", *VELOCITY_RANGE),
     *(
         Parameter(f"vehicle.perturbation.{name}", 0.0, f"relative change of {name.replace('_', ' ')}", "", -0.9, 10.0)
-        for name in uncertainty_bounds()
+        for name in uncertain_parameters()
     ),
 )
 
@@ -75,7 +75,7 @@ class Plant:
         nominal = vehicle_parameters(v["vehicle.coupling"])
         if v["vehicle.model"] == "DM":
             nominal = nominal.decoupled()
-        vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in uncertainty_bounds()})
+        vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in uncertain_parameters()})
         initial = trim(nominal, v["initial.altitude"], v["initial.velocity"])
         return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"])
 

@@ -1,0 +1,37 @@
+"""Parameters of the nodes' parts in the graph; those of their components are :mod:`hsv.graph.node_parameters`.
+
+Apart, so that a node does not import every other node's component: five start at the same time.
+"""
+
+from __future__ import annotations
+
+from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.parameters import Parameter
+
+LOCKSTEP_PARAMETERS = (
+    Parameter("recorder", True, "whether a recorder belongs to the graph"),
+    *CONTROLLER_PARAMETERS,
+)
+"""Of every node."""
+
+PACE_PARAMETERS = (
+    Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
+    Parameter("start_timeout", 30.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
+    Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
+    Parameter("progress", False, "print the step to standard output, for a progress bar"),
+)
+"""Of the plant, which owns time."""
+
+RECORDER_PARAMETERS = (
+    Parameter("bag.directory", "", "bag to write, a new directory; empty: bags/run_<UTC>"),
+    Parameter("bag.attachments", [""], "files to attach"),
+    Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
+)
+
+STAND_IN_PARAMETERS = (
+    Parameter("stand_in.bag", "", "bag to feed the node from"),
+    Parameter("stand_in.node", "", "node under test"),
+    Parameter("stand_in.directory", "", "bag to write with its answers, a new directory"),
+    Parameter("stand_in.timeout", 30.0, "wall time to wait for an answer", "s", 0.1, 1e6),
+)
+"""Of the stand-in for all other nodes, in a replay over DDS."""
