@@ -217,3 +217,5 @@ def test_tau_and_its_changes_become_parameters():
     assert values["tau_change.values"] == [0.6, 0.6, 0.7, 0.8, 1.0, 0.9, 0.9, 0.9, 0.9, 0.9]
     assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
     assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))
+    robust = 'controller = "robust_mpc"\n' + CASE1
+    assert "tube.tau: robust_mpc has no adjustable factor" in refusal(robust + "[tube]\ntau = 0.8\n")

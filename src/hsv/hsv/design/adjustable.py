@@ -122,17 +122,20 @@ def _checked(inputs: DesignInputs) -> AdjustableInputs:
 def _report(
     design: ControlDesign, inputs: DesignInputs, lyapunov: CommonLyapunov, sets: AdjustableSets, tube: Tube
 ) -> dict[str, Any]:
-    full = Region(design, inputs, 1.0)
-    beyond = flights_in_tube(design, full, tube.found, lambda stage, done, total: None)
+    share = incomplete_share(inputs)
+    beyond = tube.report["flights"]
+    if share < 1.0:
+        full = Region(design, inputs, 1.0)
+        beyond = flights_report(flights_in_tube(design, full, tube.found, lambda stage, done, total: None))
     tau = np.append(design.tau, [design.tau[-1]] * (len(tube.found.half_width) - N_RIGID))
     complete = sets.complete.report()
     return {
         "tau": design.tau.tolist(),
         "tau_minimum": design.tau_minimum.tolist(),
-        "share": incomplete_share(inputs),
+        "share": share,
         "lyapunov": lyapunov.report(),
         "complete": complete,
         "incomplete": sets.incomplete.report(),
         "scaled_half_width": (tau * np.array(complete["invariant_set"]["half_width"])).tolist(),
-        "complete_fault": flights_report(beyond),
+        "complete_fault": beyond,
     }

@@ -229,6 +229,9 @@ def _check(scenario: Scenario) -> None:
         if name not in uncertainty_bounds():
             expected = ", ".join(uncertainty_bounds())
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
+    if scenario.controller != "tube_mpc" and (scenario.tube.tau or scenario.tube.change):
+        field = "tube.tau" if scenario.tube.tau else "tube.change"
+        raise ScenarioError(f"{field}: {scenario.controller} has no adjustable factor, expected controller tube_mpc")
     for index, change in enumerate(scenario.tube.change):
         try:
             factors(change.tau, f"tube.change[{index}].tau")

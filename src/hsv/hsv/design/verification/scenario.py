@@ -46,7 +46,9 @@ def scenario_claims(
     name = scenario.name
     yield at_most(f"{name}: level in the set", max(f.level or 0.0 for f in flown), 1.0)
     worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
-    yield at_most(f"{name}: disturbance over its bound, {worst.channel} at step {worst.step}", worst.ratio, 1.0)
+    share = incomplete_share(subject.inputs)
+    held = f" (W' holds {share:g} of fault and parameter bounds, eq. 47)" if share < 1.0 else ""
+    yield at_most(f"{name}: disturbance over its bound, {worst.channel} at step {worst.step}{held}", worst.ratio, 1.0)
     kept = subject.certificate["tube"]["tightening"]
     bounds = TightenedInputs(np.array(kept["lower"]), np.array(kept["upper"]))
     lowest, highest = np.min([f.lowest for f in flown], axis=0)[:2], np.max([f.highest for f in flown], axis=0)[:2]
