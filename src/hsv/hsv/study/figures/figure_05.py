@@ -25,7 +25,7 @@ def draw(material: Material) -> Drawing:
     bode_lines(magnitude, phase, FREQUENCIES, filter_, "notch filter alone", color=GREY, linewidth=0.7)
     label_bode(magnitude, phase, FREQUENCIES)
     peaks = {}
-    for name, low, high in (("first", 14.0, 17.5), ("second", 18.5, 21.0)):
+    for name, low, high, side in (("first", 14.0, 17.5, "right"), ("second", 18.5, 21.0, "left")):
         index = peak(FREQUENCIES, plain, low, high)
         at = float(FREQUENCIES[index])
         peaks[name] = [float(bode(response)[0][index]) for response in (plain, plain * filter_)]
@@ -33,11 +33,10 @@ def draw(material: Material) -> Drawing:
             axis.axvline(at, color=GREY, linewidth=0.5, linestyle=":")
         magnitude.annotate(
             f"{name} mode",
-            (at, 0.03),
+            (at, 1.01),
             xycoords=("data", "axes fraction"),
-            rotation=90,
             va="bottom",
-            ha="left",
+            ha=side,
             fontsize=8,
         )
     magnitude.legend(loc="lower left")
