@@ -18,8 +18,11 @@ from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.study.measures import flight_measures
-from hsv.study.sources import DIGITS, drop_older, flight_digest
+from hsv.study.sources import DIGITS, digest_of, drop_older, file_bytes, flight_digest
 from hsv.vehicle.plant import FlightStatus, Plant
+
+_MEASURING = ("study/corner_flights.py", "study/measures.py", "campaign/tube_levels.py", "design/region.py")
+"""What is measured, and at which corners, hangs on these beside what the flight hangs on."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -98,7 +101,10 @@ def corner_table(scenario: str, folder: Path, half_width: np.ndarray, progress: 
         half_width: (5) as above.
         progress: Called with what is done.
     """
-    path = folder / f"corners_{scenario}_{flight_digest(scenario)[:DIGITS]}.npz"
+    digest = digest_of(
+        [flight_digest(scenario).encode(), half_width.tobytes(), *(file_bytes(module) for module in _MEASURING)]
+    )
+    path = folder / f"corners_{scenario}_{digest[:DIGITS]}.npz"
     if path.is_file():
         with np.load(path) as kept:
             return dict(kept)

@@ -19,8 +19,6 @@ TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
 """Altitude (m) and velocity (m/s) at which Case 1 starts and ends."""
 
 PITCH_RATE, ELEVATOR = 4, 1
-ELASTIC_FROM = 8.0
-"""rad/s: poles that oscillate faster are elastic."""
 
 
 @dataclass(frozen=True)
@@ -45,12 +43,6 @@ class SampledLoop:
     def growth(self) -> float:
         """Largest real part of all poles, 1/s: below zero the loop is stable."""
         return float(self.poles.real.max())
-
-    @property
-    def elastic_growth(self) -> float:
-        """Largest real part of the elastic poles, 1/s."""
-        poles = self.poles
-        return float(poles[np.abs(poles.imag) > ELASTIC_FROM].real.max())
 
     def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
         """Return L (f), the response of the loop broken at the elevator, the other input closed; -1 is critical."""

@@ -32,7 +32,6 @@ def flight_measures(flight: FlightData, half_width: np.ndarray) -> dict[str, flo
     after, window = since >= 0.0, (since >= 0.0) & (since <= AFTER)
     ringing = (since >= RINGING[0]) & (since <= RINGING[1])
     error = (flight.state - flight.reference - flight.deviation)[window, :5]
-    values["post_fault_attitude_from_reference"] = float(deviation[after, 2:4].max())
     values["post_fault_altitude_error"] = float(deviation[after, 0].max())
     values["rigid_error"] = float(np.sqrt(np.mean((error / half_width) ** 2)))
     values["pitch_rate_error"] = float(np.sqrt(np.mean(error[:, 4] ** 2)))

@@ -20,11 +20,19 @@ DIGITS = 12
 
 
 @cache
+def package_digest(*names: str) -> str:
+    """Return the digest of the code and tables in packages, ``names`` below the root, with those inside them."""
+    root = Path(str(files("hsv")))
+    paths = [path for name in names for path in root.joinpath(name).rglob("*") if path.suffix in (".py", ".toml")]
+    return digest_of(path.read_bytes() for path in sorted(paths))
+
+
+@cache
 def code_digest() -> str:
     """Return the digest of the code and the vehicle table that a flight runs through."""
     root = Path(str(files("hsv")))
     paths = [path for name in _FLOWN for path in root.joinpath(name).glob("*") if path.suffix in (".py", ".toml")]
-    return _digest(path.read_bytes() for path in (*sorted(paths), root / "units.py"))
+    return digest_of(path.read_bytes() for path in (*sorted(paths), root / "units.py"))
 
 
 def flight_digest(scenario: str) -> str:
@@ -34,7 +42,7 @@ def flight_digest(scenario: str) -> str:
         ScenarioError, DesignError: No such scenario, or its design is not there.
     """
     design = find_design(load_scenario(scenario).design).read_bytes()
-    return _digest((scenario_text(scenario).encode(), design, code_digest().encode()))
+    return digest_of((scenario_text(scenario).encode(), design, code_digest().encode()))
 
 
 def drop_older(path: Path) -> None:
@@ -45,7 +53,13 @@ def drop_older(path: Path) -> None:
             shutil.rmtree(other) if other.is_dir() else other.unlink()
 
 
-def _digest(parts: Iterable[bytes]) -> str:
+def file_bytes(name: str) -> bytes:
+    """Return the contents of a file of this package, ``name`` below its root."""
+    return files("hsv").joinpath(name).read_bytes()
+
+
+def digest_of(parts: Iterable[bytes]) -> str:
+    """Return one digest of several contents."""
     total = hashlib.sha256()
     for part in parts:
         total.update(hashlib.sha256(part).digest())

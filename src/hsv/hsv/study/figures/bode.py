@@ -10,15 +10,10 @@ from matplotlib.axes import Axes
 
 from hsv.control.notch_filter import NotchSection
 from hsv.lpv.frequency import bode, frequency_response
+from hsv.study.linear_loop import ELEVATOR, PITCH_RATE, START
 from hsv.vehicle.dynamics import jacobian
-from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
-
-START = (85500.0 * FOOT, 7900.0 * FOOT)
-"""Altitude (m) and velocity (m/s) at which Case 1 starts."""
-
-PITCH_RATE, ELEVATOR = 4, 1
 
 
 def notch_response(sections: Iterable[NotchSection], frequencies: np.ndarray) -> np.ndarray:

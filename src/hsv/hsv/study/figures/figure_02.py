@@ -7,9 +7,10 @@ import numpy as np
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.frequency import frequency_response
 from hsv.lpv.grid import linearise
-from hsv.study.figures.bode import ELEVATOR, PITCH_RATE, bode_lines, label_bode
+from hsv.study.figures.bode import bode_lines, label_bode
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, RED, letter, new_figure
+from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
 from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.parameters import vehicle_parameters
 
@@ -35,7 +36,7 @@ def draw(material: Material) -> Drawing:
         bode_lines(magnitude, phase, FREQUENCIES, response, label, **style)
     label_bode(magnitude, phase, FREQUENCIES)
     letter((magnitude, phase))
-    magnitude.legend(loc="lower left")
+    magnitude.legend(loc="upper right")
     model, accuracy = design.certificate["model"], design.certificate["model"]["accuracy"]
     rows, columns = model["vertices"]
     return Drawing(

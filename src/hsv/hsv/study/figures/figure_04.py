@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.study.figures.bode import START
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
+from hsv.study.linear_loop import START
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import modes
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
@@ -33,7 +33,7 @@ def draw(material: Material) -> Drawing:
             whole.annotate(
                 text,
                 (mode.pole.real, mode.pole.imag),
-                (9 if right else -9, -3),
+                (12, -10) if right else (-9, -3),
                 textcoords="offset points",
                 ha="left" if right else "right",
                 color=color,
@@ -52,7 +52,9 @@ def draw(material: Material) -> Drawing:
             f"{pole.real:+.2f}", (pole.real, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=8
         )
     for pole in rigid[2:]:
-        text = f"{pole.real:+.4f}" + (f"{pole.imag:+.3f}j" if pole.imag else "")
+        text = (
+            f"{pole.real:+.4f}{pole.imag:+.3f}j" if pole.imag else f"|s| < {10.0 ** np.ceil(np.log10(abs(pole))):.0e}"
+        )
         near.annotate(text, (pole.real, pole.imag), (10, -3), textcoords="offset points", fontsize=8)
     for axis in (whole, near):
         axis.axvline(0.0, color="black", linewidth=0.5)

@@ -79,7 +79,7 @@ def draw(material: Material) -> Drawing:
     level.axhline(1.0, color="black", linewidth=1.0)
     level.set_xlim(95.0, 130.0)
     level.set_xlabel("Time (s)")
-    level.set_ylabel("level of $e$")
+    level.set_ylabel("level of $e - c$")
     handles, labels = level.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False)
     letter((*grid[0], level))
@@ -90,8 +90,9 @@ def draw(material: Material) -> Drawing:
         figure,
         "Tube errors e = x - x_r - x_n with uncertain parameters at the same twelve instants after the fault, in "
         "three planes of the certified ellipsoid (its shadows), and the level of the rigid errors in its shadow over "
-        "time.",
-        f"All states stay inside, with the notch (worst level {worst['Tube-MPC with notch']:.2f}) and without "
+        "time: of their distance from the centre c, which lies where half of the lost elevator moves them, so that the "
+        "fault brings them nearer to it.",
+        f"The rigid errors stay inside, with the notch (worst level {worst['Tube-MPC with notch']:.2f}) and without "
         f"({worst['Tube-MPC without notch']:.2f}). Over the {len(INSTANTS)} instants the pitch-rate error with the "
         f"notch is the smaller one {closer} times.",
         "Closer to the nominal trajectory with the notch is true of the pitch rate, where the vibration shows (its "

@@ -1,4 +1,4 @@
-"""Figure 8: Bode diagram of the co-designed polytopic model against the extended control model."""
+"""Figure 8: Bode diagram of the co-designed polytopic model against the ECM (extended states coupling model)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from hsv.design.inputs import inputs_from_report
 from hsv.design.model import linearised, polytopic_model
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.frequency import frequency_response
-from hsv.study.figures.bode import ELEVATOR, PITCH_RATE, bode_lines, label_bode
+from hsv.study.figures.bode import bode_lines, label_bode
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
+from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
 from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
 from hsv.vehicle.parameters import vehicle_parameters
@@ -45,7 +46,7 @@ def draw(material: Material) -> Drawing:
         bode_lines(magnitude, phase, FREQUENCIES, response, label, **style)
     label_bode(magnitude, phase, FREQUENCIES)
     letter((magnitude, phase))
-    magnitude.legend(loc="lower left")
+    magnitude.legend(loc="upper right")
     accuracy = certificate["model"]["accuracy"]
     rows, columns = certificate["model"]["vertices"]
     return Drawing(

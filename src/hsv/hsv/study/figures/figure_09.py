@@ -44,4 +44,6 @@ def draw(material: Material) -> Drawing:
     )
 
 
-FIGURE = PaperFigure(9, "Trajectory in Case 1. (a) Altitude. (b) Velocity.", draw, case1.SCENARIOS)
+FIGURE = PaperFigure(
+    9, "Trajectory in Case 1. (a) Altitude. (b) Velocity.", draw, (*case1.SCENARIOS, *case1.RMPC_SINGLE)
+)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from hsv.simulation.metrics import FlightData
 from hsv.study.figures import case2
 from hsv.study.figures.case1 import measured
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
@@ -13,13 +16,23 @@ def draw(material: Material) -> Drawing:
     figure = histories(ATTITUDE, case2.curves(material), zoom=(95.0, 125.0), height=2.1)
     names = (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])
     off = [measured(material, name, "post_fault_attitude_deviation", "rad") for name in names]
+    flight = material.flights[names[0]]
+    moved = [_moved(flight, start) for start in (20.0, 80.0)]
     return Drawing(
         figure,
         case2.CONDITIONS + ".",
-        f"Attitude stays calm along the ramp, moves by {off[0]:.2f} deg at the fault and settles.",
+        f"Attitude moves by {off[0]:.2f} deg at the fault and settles.",
         f"With the whole feedback it moves less, {off[1]:.2f} deg, as with the baseline, {off[2]:.2f} deg: this is "
-        "what tau = 0.8 costs. The corners at which the ramp begins and ends show, because the reference's climb does.",
+        f"what tau = 0.8 costs. As the ramp begins and ends attitude moves too, by {moved[0]:.2f} deg and "
+        f"{moved[1]:.2f} deg: the reference's climb sets in and ends within one step.",
     )
+
+
+def _moved(flight: FlightData, start: float) -> float:
+    """Return the largest change (deg) of angle of attack or pitch angle within 5 s of ``start`` (s)."""
+    window = (flight.time >= start) & (flight.time <= start + 5.0)
+    attitude = flight.state[window, 2:4]
+    return float(np.degrees(np.abs(attitude - attitude[0]).max()))
 
 
 FIGURE = PaperFigure(15, "States in Case 2. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", draw, case2.SCENARIOS)

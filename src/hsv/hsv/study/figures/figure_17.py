@@ -16,14 +16,15 @@ def draw(material: Material) -> Drawing:
         return [measured(material, case2.ADJUSTABLE[0], f"{name}_{end}", unit) for end in ("minimum", "maximum")]
 
     fuel, elevator = ends("fuel_equivalence_ratio", "1"), ends("elevator_deflection", "rad")
+    limited = measured(material, case2.ADJUSTABLE[0], "saturated_steps", "1")
     return Drawing(
         figure,
         case2.CONDITIONS + ".",
         f"The inputs stay within a reasonable range: {fuel[0]:.2f} to {fuel[1]:.2f} and {elevator[0]:.1f} deg to "
-        f"{elevator[1]:.1f} deg, no step limited.",
+        f"{elevator[1]:.1f} deg, {limited:.0f} steps limited.",
         "With tau = 0.8 the elevator answers the fault more slowly than with the whole feedback. The jumps of the "
-        "fuel ratio at 20 s and 80 s are the climbing trim's: the reference begins and ends to climb and accelerate "
-        "at once.",
+        "fuel ratio at 20 s and 80 s are the climbing trim's: the reference's climb and acceleration set in and end "
+        "within one step.",
     )
 
 

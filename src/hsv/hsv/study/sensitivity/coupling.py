@@ -61,7 +61,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         figure,
         f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {len(over) - 1} corners of the "
         "parameters (dashed); (a) linear sampled loop, before and after the fault, at both ends of the step; (b), (c) "
-        "flights, a line ends where one is lost.",
+        "flights, a line ends where one is lost; a decay of 100 s: not before the end of the flight.",
         tuple(findings),
         {
             "kappa": kappas.tolist(),

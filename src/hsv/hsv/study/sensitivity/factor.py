@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.study.adjustable_factor import FACTORS, FINE, FactorRow, FactorStudy, factor_study
+from hsv.study.adjustable_factor import FACTORS, FINE, FactorStudy, factor_study
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.sensitivity.study import Outcome, Progress, Study, lost_from
 from hsv.units import to_paper
@@ -97,22 +97,26 @@ def _findings(done: FactorStudy) -> tuple[str, ...]:
             f"{degrees * row.attitude:.3f} deg, worst corner {degrees * row.worst_attitude:.3f} deg, its end "
             f"{feet * row.worst_error[0]:.1f} ft and {feet * row.worst_error[1]:.1f} ft/s off"
         )
-    return (*found, _claim(first, done.rows[-1]))
+    return (*found, _claim(done))
 
 
-def _claim(first: FactorRow, last: FactorRow) -> str:
+def _claim(done: FactorStudy) -> str:
     """Return what shows of the paper's claim that a smaller factor is faster and less robust (section 4.3)."""
 
     def compared(before: float, after: float, less: str, more: str) -> str:
         return less if after < before else more
 
+    first, last = done.rows[0], done.rows[-1]
     velocity = compared(first.settling[1], last.settling[1], "settles sooner", "does not settle sooner")
+    tau = [row.tau for row in done.rows[1:] if row.settling[0] > first.settling[0]]
+    altitude = f"later at τ = {', '.join(f'{t:g}' for t in tau)}" if tau else "no later"
     ramp = compared(first.ramp[1], last.ramp[1], "is followed more closely", "is followed less closely")
     attitude = compared(first.worst_attitude, last.worst_attitude, "moves less", "moves more")
     size = compared(first.half_width[1], last.half_width[1], "smaller", "larger, not smaller as τZ is")
     return (
         f"of the paper's claim, from τ = {first.tau:g} to {last.tau:g}: the velocity {velocity} after a step, because "
-        f"K' may use more of the inputs; the ramp, on which the nominal input has nothing to do, {ramp}; after the "
+        f"K' may use more of the inputs, altitude {altitude}; the ramp, on which the nominal input has nothing to "
+        f"do, {ramp}; after the "
         f"fault the attitude {attitude}; the set of the gain that flies is {size}"
     )
 

@@ -105,13 +105,15 @@ def _findings(
     deep = int(np.argmin(np.abs(depths - 0.02)))
     for name, label, _ in SETS:
         stable = centres[maps[name][:, deep] < 0.0]
-        span = f"{stable.min():.1f} to {stable.max():.1f} rad/s" if len(stable) else "nowhere"
+        span = f"at {stable.min():.1f} to {stable.max():.1f} rad/s" if len(stable) else "nowhere"
+        if len(stable) == len(centres):
+            span = f"wherever it was put, {centres[0]:g} to {centres[-1]:g} rad/s,"
         at = int(np.argmin(np.abs(centres - 15.0)))
         shallow = depths[maps[name][at] < 0.0]
         limit = f"up to a zero damping of {shallow.max():.2g}" if len(shallow) else "at no depth"
         best = np.nanargmin(np.where(np.isnan(decays[name]), np.inf, decays[name]))
         said.append(
-            f"{label}: stable with the centre at {span} (deep notch), at 15 rad/s {limit}; the shortest decay in "
+            f"{label}: stable with the centre {span} (deep notch), at 15 rad/s {limit}; the shortest decay in "
             f"flight is {decays[name][best]:.1f} s at {centres[best]:.1f} rad/s"
         )
     return said

@@ -55,8 +55,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     legend(figure, shares=False)
     return Outcome(
         figure,
-        f"Case 2 with the ramp from 20 s on; nominal vehicle and {len(over) - 1} corners of the parameters. (c) After "
-        "the fault, black: half a degree.",
+        f"Case 2 with the ramp from 20 s on; nominal vehicle and {len(over) - 1} corners of the parameters. The one of "
+        "80 s ends as the fault sets in, whose error its largest then holds. (c) After the fault, black: half a "
+        "degree.",
         tuple(_finding(controller, lengths, columns) for controller, columns in strips.items()),
         {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
     )

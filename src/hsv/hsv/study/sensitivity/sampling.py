@@ -17,7 +17,7 @@ from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import START, TARGET, sampled_loop
 from hsv.study.sensitivity.controllers import HALF_WIDTH, corners_of
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
-from hsv.study.sources import DIGITS, code_digest
+from hsv.study.sources import DIGITS, code_digest, package_digest
 from hsv.units import to_paper
 from hsv.vehicle.parameters import vehicle_parameters
 
@@ -102,7 +102,9 @@ def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:
     inputs = read_inputs(source)
     if period == inputs.model.period:
         return read_design(find_design("baseline"))
-    total = hashlib.sha256(f"{source.read_text(encoding='utf-8')}{code_digest()}{period}".encode()).hexdigest()
+    total = hashlib.sha256(
+        f"{source.read_text(encoding='utf-8')}{code_digest()}{package_digest('design')}{period}".encode()
+    ).hexdigest()
     path = folder / f"design_{1e3 * period:.0f}ms_{total[:DIGITS]}.yaml"
     if not path.is_file():
         folder.mkdir(parents=True, exist_ok=True)

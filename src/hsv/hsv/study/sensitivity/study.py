@@ -42,8 +42,3 @@ def lost_from(values: np.ndarray, kept: np.ndarray) -> float | None:
     """Return the first of the increasing ``values`` (n) that is not ``kept`` (n), ``None`` if all are."""
     lost = np.flatnonzero(~kept)
     return float(values[lost[0]]) if len(lost) else None
-
-
-def share(kept: np.ndarray) -> float:
-    """Return the share of flights that are kept."""
-    return float(np.mean(kept))
