@@ -18,6 +18,9 @@ START = (85500.0 * FOOT, 7900.0 * FOOT)
 TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
 """Altitude (m) and velocity (m/s) at which Case 1 starts and ends."""
 
+EFFECTIVENESS = (1.0, 0.9)
+"""Of the elevator, before and after the fault."""
+
 PITCH_RATE, ELEVATOR = 4, 1
 
 
@@ -85,6 +88,24 @@ def sampled_loop(
     gain = np.hstack((feedback, np.outer(feedback[:, PITCH_RATE], C_s)))
     gain[:, PITCH_RATE] *= D_s
     return SampledLoop(whole, inputs, gain, period)
+
+
+def worst_growth(
+    vehicle: VehicleParameters, feedback: np.ndarray, notch: Sequence[NotchSection], period: float
+) -> float:
+    """Return the largest growth (1/s) of the loop at both ends of Case 1's step, before and after its fault.
+
+    Args:
+        vehicle: As for :func:`sampled_loop`, and so are ``feedback``, ``notch`` and ``period``.
+        feedback: (2, 9).
+        notch: Sections of the filter.
+        period: Control period (s).
+    """
+    return max(
+        sampled_loop(vehicle, feedback, notch, period, point=point, effectiveness=share).growth
+        for point in (START, TARGET)
+        for share in EFFECTIVENESS
+    )
 
 
 @dataclass(frozen=True)

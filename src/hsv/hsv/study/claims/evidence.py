@@ -17,13 +17,10 @@ from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import Table, corner_table, fly_over
 from hsv.study.figures.figure import Design
 from hsv.study.flights import Flights
-from hsv.study.linear_loop import START, TARGET, sampled_loop
+from hsv.study.linear_loop import worst_growth
 from hsv.vehicle.parameters import vehicle_parameters
 
 Progress = Callable[[str, int, int], None]
-
-EFFECTIVENESS = (1.0, 0.9)
-"""Of the elevator, before and after the fault."""
 
 
 class Evidence:
@@ -72,15 +69,7 @@ class Evidence:
             if number % 50 == 0:
                 self._progress(what, number, len(over))
             vehicle = vehicle_parameters(coupling).perturbed(corner)
-            found.append(
-                max(
-                    sampled_loop(
-                        vehicle, flown.feedback_gain, notch, flown.period, point=point, effectiveness=share
-                    ).growth
-                    for point in (START, TARGET)
-                    for share in EFFECTIVENESS
-                )
-            )
+            found.append(worst_growth(vehicle, flown.feedback_gain, notch, flown.period))
         self._progress(what, len(over), len(over))
         return np.array(found)
 

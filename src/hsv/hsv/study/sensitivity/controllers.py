@@ -16,7 +16,7 @@ from hsv.design.region import Corner
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import Table, fly_over
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
-from hsv.study.linear_loop import START, TARGET, sampled_loop
+from hsv.study.linear_loop import worst_growth
 from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds
 
 
@@ -73,22 +73,16 @@ def growth(
     vehicle: VehicleParameters,
     *,
     notch: Sequence[NotchSection] | None = None,
-    effectiveness: Sequence[float] = (1.0, 0.9),
 ) -> float:
-    """Return the largest real part (1/s) of the sampled loop's poles, the worst of both ends of the step.
+    """Return the largest real part (1/s) of the sampled loop's poles, the worst as in :func:`worst_growth`.
 
     Args:
         controller: Its feedback, and its filter where ``notch`` gives no other.
         vehicle: Coupled or not.
         notch: Sections of the filter.
-        effectiveness: Of the elevator, the worst of these.
     """
     gain, own, period = _feedback(controller)
-    return max(
-        sampled_loop(vehicle, gain, own if notch is None else notch, period, point=point, effectiveness=share).growth
-        for point in (START, TARGET)
-        for share in effectiveness
-    )
+    return worst_growth(vehicle, gain, own if notch is None else notch, period)
 
 
 @cache

@@ -14,7 +14,7 @@ from hsv.design.inputs import find_inputs, read_inputs
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import fly_over
 from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
-from hsv.study.linear_loop import START, TARGET, sampled_loop
+from hsv.study.linear_loop import worst_growth
 from hsv.study.sensitivity.controllers import HALF_WIDTH, corners_of
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
 from hsv.study.sources import DIGITS, code_digest, package_digest
@@ -89,11 +89,7 @@ def _ends(values: np.ndarray) -> tuple[float, float]:
 
 def _growth(design: ControlDesign, kappa: float, notch: tuple[NotchSection, ...]) -> float:
     vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
-    return max(
-        sampled_loop(vehicle, design.feedback_gain, notch, design.period, point=point, effectiveness=share).growth
-        for point in (START, TARGET)
-        for share in (1.0, 0.9)
-    )
+    return worst_growth(vehicle, design.feedback_gain, notch, design.period)
 
 
 def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:

@@ -7,21 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign, find_design, read_design
-from hsv.control.notch_filter import NotchSection
+from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import disturbance_columns
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import fly_over
 from hsv.study.figures.style import GREY, letter, new_figure
-from hsv.study.linear_loop import START, TARGET, sampled_loop
+from hsv.study.linear_loop import worst_growth
 from hsv.study.sensitivity.controllers import HALF_WIDTH, WITH_NOTCH, WITHOUT_NOTCH, Controller, corners_of
 from hsv.study.sensitivity.flights_strip import Strip, draw_metric, legend, strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study
 from hsv.units import to_paper
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.parameters import vehicle_parameters
 
 CONTROLLERS = (WITH_NOTCH, WITHOUT_NOTCH)
 
@@ -51,7 +50,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         design = replace(flown, feedback_gain=gain, tube=None)
         for controller in CONTROLLERS:
             notch = flown.notch if controller is WITH_NOTCH else ()
-            growths[controller].append(max(_growth(design, vehicle.perturbed(corner), notch) for corner in over))
+            growths[controller].append(
+                max(worst_growth(vehicle.perturbed(corner), gain, notch, flown.period) for corner in over)
+            )
             values = {**design.to_parameters(), **load_scenario(controller.scenario).parameters()}
             tables[controller].append(fly_over(values, over, HALF_WIDTH))
     progress("weights", len(scales), len(scales))
@@ -84,14 +85,6 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
             "growth_per_s": {c.label: worst for c, worst in growths.items()},
             "flights": {c.label: columns for c, columns in strips.items()},
         },
-    )
-
-
-def _growth(design: ControlDesign, vehicle: VehicleParameters, notch: tuple[NotchSection, ...]) -> float:
-    return max(
-        sampled_loop(vehicle, design.feedback_gain, notch, design.period, point=point, effectiveness=share).growth
-        for point in (START, TARGET)
-        for share in (1.0, 0.9)
     )
 
 
