@@ -1,4 +1,4 @@
-"""The extended control model: the vehicle's own equations seen through its notch filter."""
+"""The extended states coupling model: the vehicle's own equations seen through its notch filter."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Extended control model (ECM, paper eq. 39-43): the vehicle with a linear filter on its pitch rate, compiled.
+"""Extended states coupling model (ECM, paper eq. 39-43): the vehicle with a linear filter on its pitch rate, compiled.
 
 State x' (9 + k): that of the vehicle with the filtered pitch rate q' in place of q, then the k states s of the filter.
 q' = C s + D q, so that q = (q' - C s) / D; the vehicle's own equations are those of :mod:`hsv.vehicle.dynamics`.
