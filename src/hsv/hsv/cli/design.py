@@ -114,7 +114,7 @@ def _steps(report: dict[str, Any]) -> Table:
     span = f"{tau} to 1" if least.min() < 1.0 else tau
     rows = {
         "notch filter": f"centre {sections}",
-        "extended coupling model (ECM)": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",
+        "extended states coupling model": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",
         "co-designed polytopic model": f"{' x '.join(str(n) for n in model['vertices'])} vertices, Bode within "
         f"{accuracy['bode_magnitude_error_db']:.2f} dB, {accuracy['bode_phase_error_deg']:.2f} deg",
         "feedback gain F'": f"spectral radius {max(feedback['spectral_radii']):.5f}; one Lyapunov function for tau "
