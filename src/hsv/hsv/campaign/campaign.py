@@ -17,7 +17,7 @@ from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
 _BATCHES = 256
-_BATCH_LIMITS = (8, 256)
+_BATCH_LIMITS = (32, 256)
 
 
 @dataclass(frozen=True)

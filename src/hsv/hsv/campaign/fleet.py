@@ -95,6 +95,7 @@ def fleet(workers: int, scheduler: str = "") -> Iterator[Fleet]:
     if workers == 1 and not scheduler:
         yield OwnProcess()
         return
+    import dask
     from distributed import Client, LocalCluster
 
     if scheduler:
@@ -107,6 +108,8 @@ def fleet(workers: int, scheduler: str = "") -> Iterator[Fleet]:
             yield DaskWorkers(client)
         return
     with (
+        # It samples the stack of every flight, for a dashboard that is not there.
+        dask.config.set({"distributed.worker.profile.enabled": False}),
         LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
