@@ -13,7 +13,7 @@ from hsv.campaign.fleet import fleet
 from hsv.campaign.store import Store
 
 
-def over_workers(repeats: int, workers: int, samples: int = 256) -> list[Figure]:
+def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:
     """Return the pace of ``workers`` against as many times that of one, flights of Case 1, workers warm."""
     paces: dict[int, list[float]] = {1: [], workers: []}
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
