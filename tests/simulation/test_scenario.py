@@ -87,6 +87,13 @@ def test_metres_serve_as_well_as_feet():
         ("loss_of_effectiveness", "melted", "fault[0].type = 'melted': expected one of loss_of_effectiveness"),
         ('"elevator_deflection"', '"rudder"', "fault[0].channel = 'rudder': expected one of fuel_equivalence_ratio"),
         ('"100 s"', '"-1 s"', "fault[0].start = '-1 s': expected a time"),
+        ('"100 s"', '"200 s"', "fault[0].start = 200 s: expected a time before the flight's end, 200 s"),
+        ('"600 ft"', '"600 ft"\nstart = "250 s"', "command[0].start = 250 s: expected a time before the flight's end"),
+        (
+            "[[fault]]",
+            '[[tube.change]]\nstart = "999 s"\ntau = 1.0\n[[fault]]',
+            "tube.change[0].start = 999 s: expected a time before the flight's end, 200 s",
+        ),
         ("[[fault]]", "[fault]", "fault = {"),
         ("saturated_steps", "stalls", "limits.stalls: no such metric, expected one of altitude_rise_time"),
         ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),

@@ -243,6 +243,19 @@ def _check(scenario: Scenario) -> None:
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
     check_envelope(scenario.commands, scenario.command)
+    _check_starts(scenario)
+
+
+def _check_starts(scenario: Scenario) -> None:
+    """Refuse what the flight would never come to."""
+    events = {"command": scenario.command, "tube.change": scenario.tube.change, "fault": scenario.fault}
+    for table, entries in events.items():
+        for index, entry in enumerate(entries):
+            if entry.start > 0.0 and entry.start >= scenario.duration:
+                raise ScenarioError(
+                    f"{table}[{index}].start = {entry.start:g} s: "
+                    f"expected a time before the flight's end, {scenario.duration:g} s"
+                )
 
 
 def _first_problem(error: ValidationError) -> str:
