@@ -19,10 +19,11 @@ Made by `python -m hsv.simulation.comparison > docs/comparison.md`; every row is
 `hsv simulate NAME --units paper` does. Errors are what altitude and velocity lack of, or have above, their command.
 
 ## Robust MPC and the tube
-The traditional robust MPC of the paper's section 5.2 is u = K x + u_r; decoupled vehicle, elevator effectiveness 0.9
-from 100 s. What it leaves of the altitude is the size of K: with the single K of the whole step a thousand feet, with
-the last gain of the nested family some twenty, and that one runs into the limits of the inputs at the step. The tube
-leaves the same few feet with either. (Under the tube the family has come to its last gain long before the fault.)
+The traditional robust MPC of the paper's section 5.2 is u = K x + u_r, without a notch filter; decoupled vehicle,
+elevator effectiveness 0.9 from 100 s. What it leaves of the altitude is the size of K: with the single K of the whole
+step a thousand feet, with the last gain of the nested family some twenty, and that one runs into the limits of the
+inputs at the step. The tube leaves the same few feet with either. (Under the tube the family has come to its last gain
+long before the fault.)
 
 {robust}
 ## Nominal laws
