@@ -20,8 +20,9 @@ def evidence(tmp_path_factory):
     return Evidence(tmp_path_factory.mktemp("evidence"))
 
 
-def finding(*values):
-    return Finding(tuple(Reading(f"reading {i}", value, "1", at_most=1.0) for i, value in enumerate(values)), "why")
+def finding(*values, leading=1):
+    readings = tuple(Reading(f"reading {i}", value, "1", at_most=1.0) for i, value in enumerate(values))
+    return Finding(readings, "why", leading)
 
 
 def test_there_are_twenty_claims_and_more_each_quoted_once():
@@ -35,7 +36,9 @@ def test_there_are_twenty_claims_and_more_each_quoted_once():
 def test_the_verdict_follows_from_the_readings():
     assert finding(0.5, 1.0).verdict is Verdict.HOLDS
     assert finding(0.5, 1.1).verdict is Verdict.CONDITIONS
-    assert finding(1.1, math.inf).verdict is Verdict.FAILS
+    assert finding(1.1, 0.5).verdict is Verdict.FAILS
+    assert finding(0.5, 1.1, 0.5, leading=2).verdict is Verdict.FAILS
+    assert finding(0.5, 0.5, 1.1, leading=2).verdict is Verdict.CONDITIONS
     assert finding(math.nan).verdict is Verdict.FAILS
     assert Reading("x", 1.0, "1", at_least=1.0).holds
     assert not Reading("x", 0.9, "1", at_least=1.0).holds

@@ -37,18 +37,23 @@ class Reading:
 
 @dataclass(frozen=True)
 class Finding:
-    """The readings of a claim, and why they come out as they do."""
+    """The readings of a claim, and why they come out as they do.
+
+    The first ``leading`` readings are the statement itself under the paper's own conditions, one a number it speaks of;
+    the others ask the same under further conditions.
+    """
 
     readings: tuple[Reading, ...]
     why: str
+    leading: int = 1
 
     @property
     def verdict(self) -> Verdict:
-        """Holds in all readings, in some, in none."""
+        """Holds everywhere; as stated but not under all further conditions; not as stated, whatever else holds."""
         kept = [reading.holds for reading in self.readings]
-        if all(kept):
-            return Verdict.HOLDS
-        return Verdict.CONDITIONS if any(kept) else Verdict.FAILS
+        if not all(kept[: self.leading]):
+            return Verdict.FAILS
+        return Verdict.HOLDS if all(kept) else Verdict.CONDITIONS
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,10 @@ from hsv.units import to_paper
 _HEADER = """# The paper's claims
 Made by `hsv claims --out docs/claims.md`, every number measured. A claim is quoted word for word and read in one or
 more ways, each a number with a threshold (±0.5° and the limits of the inputs are the paper's; it gives no others, the
-rest are ours): it **holds** in all readings, **holds under conditions** in some, and **does not hold** in none.
+rest are ours, with the reason beside them). The readings in bold are the statement itself, on the paper's own
+conditions; the others ask the same under further ones: other couplings, corners where the paper does not speak of them,
+stricter readings. A claim **holds** if all readings do, **holds under conditions** if those in bold do and another does
+not, and **does not hold** if one in bold does not, whatever the others say.
 *Corners*: all 1024 combinations of the bounds of the ten uncertain parameters, each flown, and the nominal vehicle. The
 *paper-like* coupling is meant where none is named ([assumptions](assumptions.md)).
 """
@@ -59,10 +62,9 @@ def _summary(judged: dict[str, list[Judged]]) -> str:
 def _claim(entry: Judged) -> str:
     claim, finding = entry.claim, entry.finding
     rows = ["| reading | measured | threshold | |", "| --- | ---: | --- | --- |"]
-    rows += [
-        f"| {_cell(r.what)} | {shown(r.value, r.unit)} | {condition(r)} | {'yes' if r.holds else 'no'} |"
-        for r in finding.readings
-    ]
+    for number, r in enumerate(finding.readings):
+        what = f"**{_cell(r.what)}**" if number < finding.leading else _cell(r.what)
+        rows.append(f"| {what} | {shown(r.value, r.unit)} | {condition(r)} | {'yes' if r.holds else 'no'} |")
     table = "\n".join(rows)
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
