@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hsv.control.notch_filter import NotchSection, discretise, series
 from hsv.lpv.discretisation import zero_order_hold
@@ -106,6 +107,25 @@ def worst_growth(
         for point in (START, TARGET)
         for share in EFFECTIVENESS
     )
+
+
+def stability_limit(growth: Callable[[float], float], along: Sequence[float]) -> float | None:
+    """Return where ``growth`` first reaches zero going ``along`` its argument, by root finding between the points.
+
+    Args:
+        growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
+        along: Values of the scalar, increasing or decreasing, so dense that no loss is over between two of them.
+
+    Returns:
+        The limit to 1e-6 of the interval it lies in; the first value if the loop is not stable there; ``None`` if it
+        is stable at all values.
+    """
+    before = None
+    for value in map(float, along):
+        if growth(value) >= 0.0:
+            return value if before is None else float(brentq(growth, before, value, xtol=1e-6 * abs(value - before)))
+        before = value
+    return None
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,30 @@
+import numpy as np
+import pytest
+
+from hsv.study.linear_loop import stability_limit
+from hsv.study.sensitivity.controllers import WITHOUT_NOTCH, growth
+from hsv.vehicle.parameters import vehicle_parameters
+
+
+def test_the_limit_of_stability_is_the_first_zero_on_the_way():
+    points = np.linspace(0.0, 3.0, 13)
+    assert stability_limit(lambda x: x - 1.1, points) == pytest.approx(1.1, abs=1e-6)
+    assert stability_limit(lambda x: (x - 1.1) * (2.4 - x), points) == pytest.approx(1.1, abs=1e-6)
+    assert stability_limit(lambda x: (1.1 - x) * (2.4 - x), points[6::-1]) == pytest.approx(1.1, abs=1e-6)
+
+
+def test_a_loop_lost_at_once_or_never_has_no_crossing():
+    assert stability_limit(lambda x: x + 1.0, [0.5, 1.0]) == 0.5
+    assert stability_limit(lambda x: -1.0, [0.5, 1.0]) is None
+
+
+def test_the_loop_changes_its_stability_at_the_limit():
+
+    derived = vehicle_parameters("derived")
+
+    def over_coupling(kappa: float) -> float:
+        return growth(WITHOUT_NOTCH, derived.with_coupling_scale(kappa))
+
+    limit = stability_limit(over_coupling, np.arange(0.0, 1.0, 0.1))
+    assert 0.2 < limit < 0.3
+    assert over_coupling(limit - 1e-3) < 0.0 < over_coupling(limit + 1e-3)
