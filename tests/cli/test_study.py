@@ -39,7 +39,26 @@ def test_a_study_that_is_none_is_named(hsv, words, message):
     assert ran.error.startswith(message)
 
 
-def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv):
-    ran = hsv("claims", "--out", "absent/claims.md")
+@pytest.mark.parametrize("words", [("figures", "--only", "9"), ("study", "coupling"), ("claims",)], ids=lambda w: w[0])
+@pytest.mark.parametrize("folder", ["file", "file/below", "/proc/absent"])
+def test_flights_that_could_not_be_kept_are_refused_before_they_are_flown(hsv, tmp_path, words, folder):
+    (tmp_path / "file").touch()
+    ran = hsv(*words, "--flights", folder)
     assert ran.code == 2
-    assert ran.error.startswith("out = 'absent/claims.md'")
+    assert ran.error == f"flights = {folder!r}: cannot be written, expected a folder or the name of a new one"
+
+
+@pytest.mark.parametrize("words", [("figures", "--only", "4"), ("study", "coupling")], ids=lambda w: w[0])
+@pytest.mark.parametrize("folder", ["file", "/proc/absent"])
+def test_a_folder_that_could_not_be_made_is_refused_before_anything_is_drawn(hsv, tmp_path, words, folder):
+    (tmp_path / "file").touch()
+    ran = hsv(*words, "--out", folder)
+    assert ran.code == 2
+    assert ran.error == f"out = {folder!r}: cannot be written, expected a folder or the name of a new one"
+
+
+@pytest.mark.parametrize("page", ["absent/claims.md", "/proc/claims.md", "."])
+def test_claims_refuse_a_page_that_could_not_be_written_before_they_fly(hsv, page):
+    ran = hsv("claims", "--out", page)
+    assert ran.code == 2
+    assert ran.error == f"out = {page!r}: cannot be written, expected a file in an existing folder"

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import check_target, console, errors, print_json
+from hsv.cli.output import console, errors, print_json
+from hsv.cli.targets import check_target
 
 if TYPE_CHECKING:
     from hsv.bench.figure import Figure

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsv.cli.options import FlightsOption, JsonOption
-from hsv.cli.output import check_target, console, print_json
+from hsv.cli.output import console, print_json
+from hsv.cli.targets import check_folder, check_target
 
 if TYPE_CHECKING:
     from hsv.study.claims.claim import Judged
@@ -33,6 +34,7 @@ def claims(
 
     if out:
         check_target(out, "out")
+    check_folder(flights, "flights")
     with stages() as progress:
         evidence = Evidence(flights, progress)
         judged = judge(evidence, progress)

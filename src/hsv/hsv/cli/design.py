@@ -9,7 +9,8 @@ import typer
 from rich.table import Table
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import check_target, console, print_json
+from hsv.cli.output import console, print_json
+from hsv.cli.targets import check_target
 
 if TYPE_CHECKING:
     from hsv.control.design_file import ControlDesign

@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import FlightsOption, JsonOption
 from hsv.cli.output import console, errors, print_json
+from hsv.cli.targets import check_folder
 
 
 def figures(
@@ -41,6 +42,8 @@ def figures(
     graph = graph_is_there()
     if not graph and any(figure.scenarios for figure in chosen):
         errors.print("no built ROS workspace is sourced: flown in this process, the same numbers bit for bit")
+    check_folder(out, "out")
+    check_folder(flights, "flights")
     out.mkdir(parents=True, exist_ok=True)
     written = []
     with stages() as progress, matplotlib.rc_context(RC):

@@ -10,7 +10,8 @@ import typer
 from typer.core import TyperGroup
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
-from hsv.cli.output import Units, check_target, console, errors, print_json, to_json
+from hsv.cli.output import Units, console, errors, print_json, to_json
+from hsv.cli.targets import check_target
 
 
 class _FlyByDefault(TyperGroup):

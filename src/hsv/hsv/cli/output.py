@@ -14,7 +14,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from hsv.errors import ParameterError
 from hsv.units import to_paper
 
 console = Console(highlight=False)
@@ -97,16 +96,6 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def check_target(path: Path, field: str) -> None:
-    """Refuse a file that could not be written, before any work is done for it.
-
-    Raises:
-        ParameterError: ``path`` is a folder, or lies in none.
-    """
-    if path.is_dir() or not path.parent.is_dir():
-        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a file in an existing folder")
 
 
 def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:

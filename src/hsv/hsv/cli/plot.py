@@ -8,8 +8,9 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption, UnitsOption
-from hsv.cli.output import Units, check_target, print_written
+from hsv.cli.output import Units, print_written
 from hsv.cli.shortcomings import warn_of_shortcomings
+from hsv.cli.targets import check_target
 
 
 def plot(

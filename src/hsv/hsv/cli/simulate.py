@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
-from hsv.cli.output import Units, check_target
+from hsv.cli.output import Units
+from hsv.cli.targets import check_target
 
 
 def simulate(

@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import FlightsOption, JsonOption
 from hsv.cli.output import console, print_json
+from hsv.cli.targets import check_folder
 
 
 def study(
@@ -33,6 +34,8 @@ def study(
         raise QuantityError(f"study = {name!r}: expected one of {', '.join(STUDIES)}")
     if not 1.0 <= coarseness <= 100.0:
         raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
+    check_folder(out, "out")
+    check_folder(flights, "flights")
     out.mkdir(parents=True, exist_ok=True)
     with stages() as progress, matplotlib.rc_context(RC):
         outcome = STUDIES[name].run(coarseness, flights, progress)
