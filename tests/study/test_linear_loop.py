@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from hsv.study.linear_loop import stability_limit
+from hsv.control.design_file import find_design, read_design
+from hsv.study.linear_loop import critical_coupling, stability_limit
 from hsv.study.sensitivity.controllers import WITHOUT_NOTCH, growth
 from hsv.vehicle.parameters import vehicle_parameters
 
@@ -19,7 +20,6 @@ def test_a_loop_lost_at_once_or_never_has_no_crossing():
 
 
 def test_the_loop_changes_its_stability_at_the_limit():
-
     derived = vehicle_parameters("derived")
 
     def over_coupling(kappa: float) -> float:
@@ -28,3 +28,9 @@ def test_the_loop_changes_its_stability_at_the_limit():
     limit = stability_limit(over_coupling, np.arange(0.0, 1.0, 0.1))
     assert 0.2 < limit < 0.3
     assert over_coupling(limit - 1e-3) < 0.0 < over_coupling(limit + 1e-3)
+
+
+def test_the_paper_like_coupling_is_just_short_of_the_critical_one():
+    baseline = read_design(find_design("baseline"))
+    assert critical_coupling(baseline.feedback_gain, (), baseline.period) == pytest.approx(0.2524, abs=5e-5)
+    assert critical_coupling(baseline.feedback_gain, baseline.notch, baseline.period) > 1.0

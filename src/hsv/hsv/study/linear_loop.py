@@ -12,7 +12,7 @@ from hsv.control.notch_filter import NotchSection, discretise, series
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.envelope import FOOT
-from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
 from hsv.vehicle.trim import trim
 
 START = (85500.0 * FOOT, 7900.0 * FOOT)
@@ -23,6 +23,9 @@ EFFECTIVENESS = (1.0, 0.9)
 """Of the elevator, before and after the fault."""
 
 PITCH_RATE, ELEVATOR = 4, 1
+
+COUPLING_SCALES = tuple(0.05 * step for step in range(26))
+"""kappa, times the derived coupling, between which the limit of stability is looked for."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +129,23 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float]) ->
             return value if before is None else float(brentq(growth, before, value, xtol=1e-6 * abs(value - before)))
         before = value
     return None
+
+
+def critical_coupling(feedback: np.ndarray, notch: Sequence[NotchSection], period: float) -> float | None:
+    """Return the scale kappa of the derived coupling at which the loop of the nominal vehicle stops being stable.
+
+    Args:
+        feedback: (2, 9), as for :func:`sampled_loop`, and so are ``notch`` and ``period``.
+        notch: Sections of the filter.
+        period: Control period (s).
+
+    Returns:
+        ``None`` if the loop is stable up to the last of :data:`COUPLING_SCALES`.
+    """
+    derived = vehicle_parameters("derived")
+    return stability_limit(
+        lambda kappa: worst_growth(derived.with_coupling_scale(kappa), feedback, notch, period), COUPLING_SCALES
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,69 @@
+"""Peaks of the elastic modes in the response of the pitch rate to the elevator, before and after a notch filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from hsv.control.notch_filter import NotchSection
+from hsv.lpv.frequency import bode
+from hsv.study.figures.bode import notch_response, pitch_rate_response
+from hsv.vehicle.parameters import vehicle_parameters
+
+WINDOWS = {"first": (14.0, 17.5), "second": (18.5, 21.0)}
+"""Between which frequencies (rad/s) the peak of each mode is, paper-like coupling, with and without a filter."""
+
+FREQUENCIES = np.linspace(10.0, 25.0, 15001)
+"""rad/s."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A local maximum of a response: where (rad/s) and how high (dB)."""
+
+    frequency: float
+    magnitude: float
+
+
+@dataclass(frozen=True)
+class PeakFall:
+    """The peak of a mode without the filter and what is left of it with the filter, ``None``: no local maximum."""
+
+    before: Peak
+    after: Peak | None
+
+    @property
+    def decibel(self) -> float:
+        """By how much the highest point falls, peak to peak, dB: the peak may move; infinite if none is left."""
+        return float("inf") if self.after is None else self.before.magnitude - self.after.magnitude
+
+
+def highest_peak(frequencies: np.ndarray, response: np.ndarray, low: float, high: float) -> Peak | None:
+    """Return the highest local maximum of a response (f) between two frequencies (rad/s), ``None`` without one.
+
+    A local maximum, not the largest value: at the edge of a window that is the flank of the other mode.
+    """
+    magnitude = bode(response)[0]
+    found = [i for i in find_peaks(magnitude)[0] if low < frequencies[i] < high]
+    if not found:
+        return None
+    top = max(found, key=lambda i: magnitude[i])
+    return Peak(float(frequencies[top]), float(magnitude[top]))
+
+
+def peak_falls(sections: Sequence[NotchSection]) -> dict[str, PeakFall]:
+    """Return what ``sections`` in series do to the peak of each mode, elevator to filtered pitch rate.
+
+    Continuous time, paper-like coupling, linearised where Case 1 starts.
+    """
+    plain = pitch_rate_response(vehicle_parameters("paper_like"), FREQUENCIES)
+    filtered = plain * notch_response(sections, FREQUENCIES)
+    falls = {}
+    for name, window in WINDOWS.items():
+        before = highest_peak(FREQUENCIES, plain, *window)
+        assert before is not None
+        falls[name] = PeakFall(before, highest_peak(FREQUENCIES, filtered, *window))
+    return falls
