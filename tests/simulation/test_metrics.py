@@ -33,7 +33,9 @@ def flight(duration=100.0, fault=None, **columns):
     for name, function in columns.items():
         array, column = places[name]
         array[:, column] = array[:, column] + function(time)
-    return FlightData(time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, saturated, fault)
+    return FlightData(
+        time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, saturated, np.zeros(len(time)), fault
+    )
 
 
 def test_exponential_response_has_the_textbook_times():

@@ -55,5 +55,6 @@ def flight_data(bag: Bag) -> FlightData:
         deviation=state_columns(nominal, "deviation.")[:steps],
         command=input_columns(command)[:steps],
         saturated=tube["saturated"][:steps],
+        gain_index=nominal["gain_index"][:steps],
         fault_start=acting[0] * 1e-9 if acting else None,
     )

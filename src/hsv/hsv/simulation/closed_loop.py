@@ -181,6 +181,7 @@ class Flight:
             deviation=h.deviation,
             command=h.command,
             saturated=h.command != h.u_unsaturated,
+            gain_index=h.gain_index,
             fault_start=self.fault_start,
         )
 

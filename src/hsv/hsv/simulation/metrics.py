@@ -58,7 +58,10 @@ METRICS = {
 
 @dataclass(frozen=True)
 class FlightData:
-    """What the metrics are made of, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2)."""
+    """What the metrics are made of, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2).
+
+    ``gain_index`` is the nominal gain in use, counted from the outermost of the family.
+    """
 
     time: np.ndarray
     state: np.ndarray
@@ -66,6 +69,7 @@ class FlightData:
     deviation: np.ndarray
     command: np.ndarray
     saturated: np.ndarray
+    gain_index: np.ndarray
     fault_start: float | None
     """Time of the first fault (s), ``None`` without one."""
 
