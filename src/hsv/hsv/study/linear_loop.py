@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -81,8 +82,7 @@ def sampled_loop(
     Raises:
         TrimError: No equilibrium there.
     """
-    equilibrium = trim(vehicle, *point)
-    A, B = zero_order_hold(*jacobian(equilibrium.state, equilibrium.input, vehicle), period)
+    A, B = _held(vehicle, point, period)
     A_s, B_s, C_s, D_s = series(discretise(notch, period))
     n, s = len(A), len(A_s)
     whole, inputs = np.zeros((n + s, n + s)), np.zeros((n + s, B.shape[1]))
@@ -92,6 +92,13 @@ def sampled_loop(
     gain = np.hstack((feedback, np.outer(feedback[:, PITCH_RATE], C_s)))
     gain[:, PITCH_RATE] *= D_s
     return SampledLoop(whole, inputs, gain, period)
+
+
+@lru_cache(maxsize=8192)
+def _held(vehicle: VehicleParameters, point: tuple[float, float], period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (9, 9) and B (9, 2) of the vehicle at trim under held inputs; kept, for many loops go around each."""
+    equilibrium = trim(vehicle, *point)
+    return zero_order_hold(*jacobian(equilibrium.state, equilibrium.input, vehicle), period)
 
 
 def worst_growth(
@@ -131,21 +138,29 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float]) ->
     return None
 
 
-def critical_coupling(feedback: np.ndarray, notch: Sequence[NotchSection], period: float) -> float | None:
-    """Return the scale kappa of the derived coupling at which the loop of the nominal vehicle stops being stable.
+def critical_coupling(
+    feedback: np.ndarray,
+    notch: Sequence[NotchSection],
+    period: float,
+    over: Sequence[Mapping[str, float]] = ({},),
+) -> float | None:
+    """Return the scale kappa of the derived coupling at which the loop stops being stable, of the first vehicle to.
 
     Args:
         feedback: (2, 9), as for :func:`sampled_loop`, and so are ``notch`` and ``period``.
         notch: Sections of the filter.
         period: Control period (s).
+        over: Relative changes of the vehicle's parameters; the nominal vehicle alone unless given.
 
     Returns:
-        ``None`` if the loop is stable up to the last of :data:`COUPLING_SCALES`.
+        ``None`` if every loop is stable up to the last of :data:`COUPLING_SCALES`.
     """
-    derived = vehicle_parameters("derived")
-    return stability_limit(
-        lambda kappa: worst_growth(derived.with_coupling_scale(kappa), feedback, notch, period), COUPLING_SCALES
-    )
+
+    def growth(kappa: float) -> float:
+        vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
+        return max(worst_growth(vehicle.perturbed(corner), feedback, notch, period) for corner in over)
+
+    return stability_limit(growth, COUPLING_SCALES)
 
 
 @dataclass(frozen=True)
