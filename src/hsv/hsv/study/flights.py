@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any
 
 import numpy as np
 
@@ -36,14 +35,15 @@ def graph_is_there() -> bool:
 
 
 class Flights:
-    """Flies scenarios once and keeps what came out under a digest of all it depends on.
+    """Flies scenarios once, by the nodes or in this process: the same numbers, bit for bit.
 
-    Where the graph is there a flight is a run of its nodes (all in one process: the same bytes as separate ones) and
-    is read from its bag. Elsewhere it is flown in process: the same numbers, bit for bit.
+    A run of the graph takes its time: its bag is kept under a digest of all it depends on, and found again by it. All
+    nodes run in one process, which gives the same bytes as separate ones. A flight in this process takes a moment, and
+    is flown whenever it is asked for.
     """
 
     def __init__(self, folder: Path, *, graph: bool, progress: Progress = lambda what, done, total: None) -> None:
-        """Keep flights in ``folder``; ``graph``: fly with the nodes."""
+        """Keep bags in ``folder``; ``graph``: fly with the nodes."""
         self._folder = folder
         self._graph = graph
         self._progress = progress
@@ -57,18 +57,15 @@ class Flights:
             RunError: A node failed.
         """
         if scenario not in self._flown:
-            self._flown[scenario] = self._kept(scenario)
+            self._flown[scenario] = self._from_graph(scenario) if self._graph else _in_process(scenario)
         return self._flown[scenario]
 
-    def _kept(self, scenario: str) -> FlightData:
-        self._folder.mkdir(parents=True, exist_ok=True)
-        target = self._folder / f"{scenario}_{flight_digest(scenario)[:DIGITS]}"
-        return self._from_graph(scenario, target) if self._graph else self._from_process(scenario, target)
-
-    def _from_graph(self, scenario: str, bag: Path) -> FlightData:
+    def _from_graph(self, scenario: str) -> FlightData:
         from hsv.recording.flight import flight_data
         from hsv.recording.reader import Bag
 
+        self._folder.mkdir(parents=True, exist_ok=True)
+        bag = self._folder / f"{scenario}_{flight_digest(scenario, graph=True)[:DIGITS]}"
         if bag.is_dir():
             try:
                 recorded = Bag(bag)
@@ -93,27 +90,8 @@ class Flights:
             shutil.rmtree(workplace)
         return flight_data(Bag(bag))
 
-    def _from_process(self, scenario: str, target: Path) -> FlightData:
-        path = target.with_name(target.name + ".npz")
-        if path.is_file():
-            with np.load(path) as kept:
-                return _unpacked(kept)
-        flight = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
-        # The stamps of a bag are whole nanoseconds.
-        flight = replace(flight, time=np.round(flight.time * 1e9) * 1e-9)
-        new = path.with_suffix(".tmp")
-        with new.open("wb") as stream:
-            np.savez_compressed(stream, **_packed(flight))
-        new.rename(path)
-        drop_older(path)
-        return flight
 
-
-def _packed(flight: FlightData) -> dict[str, Any]:
-    return {**vars(flight), "fault_start": np.nan if flight.fault_start is None else flight.fault_start}
-
-
-def _unpacked(kept: Any) -> FlightData:
-    fault_start = float(kept["fault_start"])
-    columns = {name: kept[name] for name in kept if name != "fault_start"}
-    return FlightData(**columns, fault_start=None if np.isnan(fault_start) else fault_start)
+def _in_process(scenario: str) -> FlightData:
+    flight = fly(assemble(flight_parameters(load_scenario(scenario)))).data()
+    # The stamps of a bag are whole nanoseconds.
+    return replace(flight, time=np.round(flight.time * 1e9) * 1e-9)
