@@ -22,6 +22,19 @@ def test_the_fall_is_from_peak_to_peak_though_the_peak_moves():
     assert first.decibel == pytest.approx(first.before.magnitude - first.after.magnitude)
     assert first.decibel == pytest.approx(19.4, abs=0.05)
     assert second.decibel == pytest.approx(6.7, abs=0.05)
+    assert (first.natural_frequency, second.natural_frequency) == pytest.approx((15.89, 19.47), abs=0.01)
+
+
+def test_a_filter_at_the_mode_itself_leaves_no_peak():
+    fall = peak_falls([NotchSection(15.89, 0.02, 15.89, 0.5)])["first"]
+    assert fall.after is None
+    assert fall.decibel == float("inf")
+
+
+def test_the_derived_coupling_has_its_peaks_elsewhere():
+    falls = peak_falls([], "derived")
+    assert falls["first"].before.frequency == pytest.approx(13.7, abs=0.05)
+    assert falls["second"].before.frequency == pytest.approx(18.8, abs=0.05)
 
 
 def test_no_filter_no_fall():

@@ -11,10 +11,14 @@ from scipy.signal import find_peaks
 from hsv.control.notch_filter import NotchSection
 from hsv.lpv.frequency import bode
 from hsv.study.figures.bode import notch_response, pitch_rate_response
+from hsv.study.linear_loop import START
+from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.modes import Mode, modes
 from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
 
-WINDOWS = {"first": (14.0, 17.5), "second": (18.5, 21.0)}
-"""Between which frequencies (rad/s) the peak of each mode is, paper-like coupling, with and without a filter."""
+WINDOW = 0.1
+"""The peak of a mode is the highest within this share of its natural frequency."""
 
 FREQUENCIES = np.linspace(10.0, 25.0, 15001)
 """rad/s."""
@@ -30,8 +34,12 @@ class Peak:
 
 @dataclass(frozen=True)
 class PeakFall:
-    """The peak of a mode without the filter and what is left of it with the filter, ``None``: no local maximum."""
+    """The peak of a mode without the filter and what is left of it with the filter, ``None``: no local maximum.
 
+    ``natural_frequency``: of the mode, rad/s; the peak is beside it, where what else answers adds to it.
+    """
+
+    natural_frequency: float
     before: Peak
     after: Peak | None
 
@@ -54,16 +62,25 @@ def highest_peak(frequencies: np.ndarray, response: np.ndarray, low: float, high
     return Peak(float(frequencies[top]), float(magnitude[top]))
 
 
-def peak_falls(sections: Sequence[NotchSection]) -> dict[str, PeakFall]:
+def elastic_modes(coupling: str) -> dict[str, Mode]:
+    """Return the two elastic modes of the coupled model, linearised where Case 1 starts."""
+    vehicle = vehicle_parameters(coupling)
+    point = trim(vehicle, *START)
+    second, first = modes(jacobian(point.state, point.input, vehicle)[0])[:2]
+    return {"first": first, "second": second}
+
+
+def peak_falls(sections: Sequence[NotchSection], coupling: str = "paper_like") -> dict[str, PeakFall]:
     """Return what ``sections`` in series do to the peak of each mode, elevator to filtered pitch rate.
 
-    Continuous time, paper-like coupling, linearised where Case 1 starts.
+    Continuous time, the vehicle of a named ``coupling`` linearised where Case 1 starts.
     """
-    plain = pitch_rate_response(vehicle_parameters("paper_like"), FREQUENCIES)
+    plain = pitch_rate_response(vehicle_parameters(coupling), FREQUENCIES)
     filtered = plain * notch_response(sections, FREQUENCIES)
     falls = {}
-    for name, window in WINDOWS.items():
+    for name, mode in elastic_modes(coupling).items():
+        window = ((1.0 - WINDOW) * mode.natural_frequency, (1.0 + WINDOW) * mode.natural_frequency)
         before = highest_peak(FREQUENCIES, plain, *window)
         assert before is not None
-        falls[name] = PeakFall(before, highest_peak(FREQUENCIES, filtered, *window))
+        falls[name] = PeakFall(mode.natural_frequency, before, highest_peak(FREQUENCIES, filtered, *window))
     return falls

@@ -1,0 +1,39 @@
+"""The lumped disturbance that acted in flights of a scenario, measured as the design measures its set W."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from hsv.control.design_file import ControlDesign
+from hsv.control.notch_filter import flown_sections
+from hsv.design.disturbance import CHANNELS
+from hsv.design.region import Corner, record
+from hsv.design.tube_problem import channel_model
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+
+def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.ndarray]:
+    """Return by channel of W the largest magnitude (flights) over each flight of ``scenario``, SI.
+
+    Args:
+        scenario: A shipped one under the tube law, with or without notch filter.
+        over: Relative changes of the vehicle's parameters, one flight each.
+    """
+    values = flight_parameters(load_scenario(scenario))
+    sections = flown_sections(values) if values["notch.enabled"] else ()
+    model = channel_model(replace(ControlDesign.from_parameters(values), notch=sections))
+    parts = assemble(values)
+
+    def largest(corner: Corner) -> np.ndarray:
+        return np.asarray(np.abs(model.signals(record(fly(parts.perturbed(corner)))).channels).max(axis=0))
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        rows = np.array(list(pool.map(largest, over)))
+    return {channel.name: column for channel, column in zip(CHANNELS, rows.T, strict=True)}
