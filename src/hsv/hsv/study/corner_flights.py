@@ -1,7 +1,8 @@
-"""A scenario flown with the nominal vehicle and at every corner of the parameter bounds, and what was measured."""
+"""A scenario flown by many vehicles, as by those at all corners of the parameter bounds, and what was measured."""
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +14,7 @@ import numpy as np
 
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.design_file import ControlDesign
-from hsv.design.region import Corner, corners
+from hsv.design.region import Corner
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
@@ -21,8 +22,8 @@ from hsv.study.measures import flight_measures
 from hsv.study.sources import DIGITS, digest_of, drop_older, file_bytes, flight_digest
 from hsv.vehicle.plant import FlightStatus, Plant
 
-_MEASURING = ("study/corner_flights.py", "study/measures.py", "campaign/tube_levels.py", "design/region.py")
-"""What is measured, and at which corners, hangs on these beside what the flight hangs on."""
+_MEASURING = ("study/corner_flights.py", "study/measures.py", "campaign/tube_levels.py")
+"""What is measured hangs on these beside what the flight hangs on."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -92,27 +93,35 @@ def fly_over(
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
 
 
-def corner_table(scenario: str, folder: Path, half_width: np.ndarray, progress: Progress) -> Table:
-    """Return the table of a shipped scenario over the nominal vehicle and all corners, flown once and kept.
+def corner_table(
+    scenario: str,
+    over: Sequence[Corner],
+    folder: Path,
+    half_width: np.ndarray,
+    progress: Progress,
+    changes: Sequence[tuple[str, Any]] = (),
+) -> Table:
+    """Return the table of a shipped scenario over vehicles, flown once and kept.
 
     Args:
         scenario: Its name.
+        over: Relative changes of the vehicle's parameters, one flight each.
         folder: Where tables are kept, under a digest of what they depend on.
         half_width: (5) as above.
         progress: Called with what is done.
+        changes: Flat parameters in place of the scenario's.
     """
-    digest = digest_of(
-        [flight_digest(scenario).encode(), half_width.tobytes(), *(file_bytes(module) for module in _MEASURING)]
-    )
-    path = folder / f"corners_{scenario}_{digest[:DIGITS]}.npz"
+    asked = json.dumps([list(map(dict, over)), changes]).encode()
+    modules = (file_bytes(module) for module in _MEASURING)
+    digest = digest_of([flight_digest(scenario).encode(), half_width.tobytes(), asked, *modules])
+    what = " ".join((scenario, *(f"{name}={value}" for name, value in changes)))
+    path = folder / f"{len(over)}_vehicles_{what.replace(' ', '_')}_{digest[:DIGITS]}.npz"
     if path.is_file():
         with np.load(path) as kept:
             return dict(kept)
-    over = corners()
-    what = f"corners of {scenario}"
-    progress(what, 0, len(over))
-    values = flight_parameters(load_scenario(scenario))
-    table = fly_over(values, over, half_width, lambda done: progress(what, done, len(over)))
+    progress(f"{what}, all vehicles", 0, len(over))
+    values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
+    table = fly_over(values, over, half_width, lambda done: progress(f"{what}, all vehicles", done, len(over)))
     folder.mkdir(parents=True, exist_ok=True)
     new = path.with_suffix(".tmp")
     with new.open("wb") as stream:

@@ -12,8 +12,11 @@ AFTER = 20.0
 RINGING = (10.0, 20.0)
 """Seconds after the fault between which what still moves is vibration."""
 
-SETTLED = 1e-3
-"""rad: an angle this close to its last value has settled."""
+SETTLED = 0.05
+"""Share of its largest distance from its last value within which an angle or the pitch rate counts as settled."""
+
+LAST = 1.0
+"""Seconds before the end, some periods of both modes: a rate above its decay level in them has not decayed."""
 
 
 def flight_measures(flight: FlightData, half_width: np.ndarray) -> dict[str, float]:
@@ -40,7 +43,16 @@ def flight_measures(flight: FlightData, half_width: np.ndarray) -> dict[str, flo
         values[f"elastic_coordinate_{mode}_span"] = float(np.ptp(flight.state[after, column]))
         values[f"elastic_rate_{mode}_span"] = float(np.ptp(flight.state[after, column + 1]))
         values[f"elastic_rate_{mode}_ringing"] = float(np.ptp(flight.state[ringing, column + 1]))
-    attitude = np.abs(flight.state[after, 2:4] - flight.state[-1, 2:4]).max(axis=1)
-    moving = np.flatnonzero(attitude > SETTLED)
-    values["attitude_settling_time"] = float(since[after][moving[-1]]) if len(moving) else 0.0
+    values["attitude_settling_time"] = _settling_time(since[after], flight.state[after, 2:4])
+    values["pitch_rate_settling_time"] = _settling_time(since[after], flight.state[after, 4:5])
+    for name in ("elastic_rate_1", "elastic_rate_2", "elastic"):
+        decay = values[f"{name}_decay_time"]
+        values[f"{name}_settling_time"] = decay if decay < since[-1] - LAST else np.inf
     return values
+
+
+def _settling_time(time: np.ndarray, states: np.ndarray) -> float:
+    """Return the last time (n) at which one of the states (n, m) is farther from its end than it may be."""
+    distance = np.abs(states - states[-1])
+    moving = np.flatnonzero(np.any(distance > SETTLED * distance.max(axis=0), axis=1))
+    return float(time[moving[-1]]) if len(moving) else 0.0

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
-from hsv.study.claims.evidence import Evidence
+if TYPE_CHECKING:
+    from hsv.study.claims.evidence import Evidence
 
 
 class Verdict(StrEnum):

@@ -1,8 +1,8 @@
-"""What claims are measured on: designs with their certificates, corner flights, and the sampled loop."""
+"""What claims are measured on: designs with their certificates, flights of many vehicles, and the sampled loop."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -11,9 +11,10 @@ import numpy as np
 
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
-from hsv.design.region import corners
+from hsv.design.region import Corner, corners
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
+from hsv.study.claims.spread import Spread
 from hsv.study.corner_flights import Table, corner_table, fly_over
 from hsv.study.figures.figure import Design
 from hsv.study.flights import Flights
@@ -26,15 +27,26 @@ Progress = Callable[[str, int, int], None]
 class Evidence:
     """Measured once, when first asked for."""
 
-    def __init__(self, folder: Path, progress: Progress = lambda what, done, total: None) -> None:
-        """Keep flights and corner tables in ``folder``."""
+    def __init__(
+        self,
+        folder: Path,
+        progress: Progress = lambda what, done, total: None,
+        over: Sequence[Corner] | None = None,
+    ) -> None:
+        """Keep tables in ``folder``; ``over``: the vehicles, the nominal one first, all corners unless given."""
         self._folder = folder
         self._progress = progress
+        self.over = corners() if over is None else over
         self.flights = Flights(folder, graph=False, progress=progress)
         self.design = cache(Design)
         self.corners = cache(self._corners)
         self.changed = cache(self._changed)
         self.growth = cache(self._growth)
+
+    @property
+    def vehicles(self) -> int:
+        """Number of vehicles that a table has: the nominal one and those at corners."""
+        return len(self.over)
 
     @cached_property
     def half_width(self) -> np.ndarray:
@@ -43,34 +55,48 @@ class Evidence:
         assert tube is not None
         return tube.half_width[:5]
 
-    def _corners(self, scenario: str) -> Table:
+    def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
         """Return what was measured on a scenario with the nominal vehicle (first) and at all corners."""
-        return corner_table(scenario, self._folder, self.half_width, self._progress)
+        return corner_table(scenario, self.over, self._folder, self.half_width, self._progress, changes)
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return what was measured on the nominal flight of a scenario with other parameters."""
         values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
-        return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
+        return self._flown(values)
+
+    def spread(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> Spread:
+        """Return the magnitude of one measure with the uncertain parameters of Case 1 and 2, nominal, at all corners.
+
+        The uncertain flight of ``case1_...`` is that of ``case1_uncertain_...``, and so for Case 2.
+        """
+        case, _, rest = scenario.partition("_")
+        uncertain = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
+        over = self.corners(scenario, *changes)[measure]
+        return Spread(abs(uncertain.get(measure, np.nan)), np.abs(over))
 
     def adjustable_step(self) -> dict[str, float]:
         """Return what was measured on the step of Case 1 with the adjustable design."""
         design = read_parameters(find_design("adjustable"))
-        values = {**design, **load_scenario("case1").parameters()}
+        return self._flown({**design, **load_scenario("case1").parameters()})
+
+    def _flown(self, values: dict[str, Any]) -> dict[str, float]:
         return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
 
-    def _growth(self, coupling: str, notch: tuple[NotchSection, ...], design: str = "baseline") -> np.ndarray:
-        """Return the largest real part (1025), 1/s, of the sampled loop's poles: nominal vehicle first, then corners.
+    def _growth(
+        self, coupling: str, notch: tuple[NotchSection, ...], design: str = "baseline", factor: float = 1.0
+    ) -> np.ndarray:
+        """Return the largest real part, 1/s, of the sampled loop's poles, by vehicle, the nominal one first.
 
-        The worst of both ends of the step, before and after the fault.
+        The worst of both ends of the step, before and after the fault; ``factor``: on the feedback, such as tau.
         """
-        flown, over, found = self.design(design).flown, corners(), []
+        flown, found = self.design(design).flown, []
         what = f"poles, {coupling} coupling, {'with' if notch else 'without'} notch"
-        for number, corner in enumerate(over):
+        for number, corner in enumerate(self.over):
             if number % 50 == 0:
-                self._progress(what, number, len(over))
+                self._progress(what, number, len(self.over))
             vehicle = vehicle_parameters(coupling).perturbed(corner)
-            found.append(worst_growth(vehicle, flown.feedback_gain, notch, flown.period))
-        self._progress(what, len(over), len(over))
+            found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period))
+        self._progress(what, len(self.over), len(self.over))
         return np.array(found)
 
 
