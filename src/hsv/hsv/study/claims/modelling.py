@@ -174,9 +174,9 @@ def _underdamped(evidence: Evidence) -> Finding:
             Reading("the same, second mode", second, "dB", at_least=RAISED),
         ),
         "Rise at the peaks of the coupled model over the decoupled one; 3 dB are twice the power, a damping ratio of "
-        f"0.05 a decay to about a half in two periods. Real parts {elastic[0].pole.real:.2f} and {elastic[1].pole.real:.2f} "
-        "1/s. The pole that dominates the open loop is another: the rigid body is unstable, "
-        f"{max(m.pole.real for m in rigid):+.2f} 1/s.",
+        f"0.05 a decay to about a half in two periods. Real parts {elastic[0].pole.real:.2f} and "
+        f"{elastic[1].pole.real:.2f} 1/s. The pole that dominates the open loop is another: the rigid body is "
+        f"unstable, {max(m.pole.real for m in rigid):+.2f} 1/s.",
         leading=3,
     )
 
