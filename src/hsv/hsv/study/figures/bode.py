@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MultipleLocator
 
 from hsv.control.notch_filter import NotchSection
 from hsv.lpv.frequency import bode, frequency_response
@@ -41,11 +42,20 @@ def peak(frequencies: np.ndarray, response: np.ndarray, low: float, high: float)
 
 
 def bode_lines(
-    magnitude: Axes, phase: Axes, frequencies: np.ndarray, response: np.ndarray, label: str, **style: Any
+    magnitude: Axes,
+    phase: Axes,
+    frequencies: np.ndarray,
+    response: np.ndarray,
+    label: str,
+    **style: Any,
 ) -> None:
-    """Draw a response (f) into a magnitude and a phase panel, phase from -180 deg at the lowest frequency on."""
+    """Draw a response (f) into a magnitude and a phase panel.
+
+    The phase at the lowest frequency is within half a turn of -270 deg, about which that of elevator to pitch rate is
+    from the slow modes to the elastic ones: all figures show the same branch.
+    """
     decibel, degree = bode(response)
-    degree = degree - 360.0 * np.round((degree[0] + 90.0) / 360.0)
+    degree = degree - 360.0 * np.round((degree[0] + 270.0) / 360.0)
     magnitude.semilogx(frequencies, decibel, label=label, **style)
     phase.semilogx(frequencies, degree, **style)
 
@@ -55,6 +65,7 @@ def label_bode(magnitude: Axes, phase: Axes, frequencies: np.ndarray) -> None:
     magnitude.set_ylabel("Magnitude (dB)")
     phase.set_ylabel("Phase (deg)")
     phase.set_xlabel("Frequency (rad/s)")
+    phase.yaxis.set_major_locator(MultipleLocator(45.0))
     for axis in (magnitude, phase):
         axis.set_xlim(frequencies[0], frequencies[-1])
         axis.grid(which="minor", linewidth=0.25, alpha=0.25)

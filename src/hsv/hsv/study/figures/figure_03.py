@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from hsv.control.notch_filter import NotchSection
-from hsv.lpv.frequency import bode
-from hsv.study.figures.bode import bode_lines, label_bode, notch_response, peak, pitch_rate_response
+from hsv.study.figures.bode import bode_lines, label_bode, notch_response, pitch_rate_response
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
+from hsv.study.figures.readings import peak_in_words
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED, letter, new_figure
+from hsv.study.mode_peaks import peak_falls
 from hsv.vehicle.parameters import vehicle_parameters
 
 FREQUENCIES = np.logspace(0.0, 2.0, 1500)
@@ -41,15 +42,13 @@ def draw(material: Material) -> Drawing:
     letter(grid[0])
     grid[0, 0].set_title(f"  effect of $\\omega_p$, $\\varepsilon_p$ = {section.pole_damping:g}", loc="right")
     grid[0, 1].set_title(f"  effect of $\\varepsilon_p$, $\\omega_p$ = {section.pole_frequency:g} rad/s", loc="right")
-    first = peak(FREQUENCIES, plain, 14.0, 17.5)
-    peaks = [float(bode(response)[0][first]) for response in (plain, plain * notch_response([section], FREQUENCIES))]
+    fall = peak_falls([section])["first"]
     lag = float(np.degrees(np.angle(notch_response([section], np.array([5.0]))[0])))
     return Drawing(
         figure,
         "Elevator to pitch rate after the filter, coupled model with the paper-like coupling where Case 1 starts; "
         f"zeros at {section.zero_frequency:g} rad/s with damping {section.zero_damping:g}.",
-        f"The peak of the first mode falls from {peaks[0]:.1f} dB to {peaks[1]:.1f} dB with the design's filter; "
-        "wider poles widen the notch.",
+        f"The peak of the first mode {peak_in_words(fall)}, with the design's filter; wider poles widen the notch.",
         f"The filter is not free of charge off its centre: at 5 rad/s it takes {-lag:.0f} deg of phase. With omega_p "
         "away from omega_z the gain above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %: one moves both "
         "together. The paper gives neither its zeros nor the channel it shows.",

@@ -7,6 +7,7 @@ import numpy as np
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import START
+from hsv.study.mode_peaks import elastic_modes
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import modes
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
@@ -19,15 +20,12 @@ def draw(material: Material) -> Drawing:
     """Draw all poles, and those near the origin closer, for both sets of coupling."""
     figure = new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
-    notes = {}
     for name, label, color, marker in SETS:
         vehicle = vehicle_parameters(name)
         poles = _poles(vehicle)
         for axis in (whole, near):
             axis.plot(poles.real, poles.imag, marker, color=color, markersize=7, markeredgewidth=1.4, label=label)
-        elastic = [mode for mode in modes(_matrix(vehicle)) if mode.natural_frequency > 10.0][::-1]
-        notes[name] = elastic
-        for mode in elastic:
+        for mode in elastic_modes(name).values():
             text = f"{mode.natural_frequency:.2f} rad/s, $\\zeta$ = {mode.damping_ratio:.4f}"
             right = name == "paper_like"
             whole.annotate(
@@ -40,12 +38,14 @@ def draw(material: Material) -> Drawing:
                 fontsize=8,
             )
     structural = vehicle_parameters("decoupled")
-    for omega in (structural.natural_frequency_1, structural.natural_frequency_2):
+    frequencies = (structural.natural_frequency_1, structural.natural_frequency_2)
+    for omega in frequencies:
         whole.axhline(omega, color=GREY, linewidth=0.5, linestyle=":")
         whole.text(2.55, omega + 0.3, f"structural {omega:g} rad/s", color=GREY, fontsize=7, ha="right")
     whole.set_xlim(-2.4, 2.6)
     near.set_xlim(-0.02, 0.02)
     near.set_ylim(-0.1, 0.1)
+    slow = [mode for mode in modes(_matrix(vehicle_parameters("paper_like"))) if mode.natural_frequency < 5.0]
     rigid = sorted((p for p in _poles(vehicle_parameters("paper_like")) if abs(p) < 5.0), key=lambda p: -abs(p.real))
     for pole in rigid[:2]:
         whole.annotate(
@@ -63,19 +63,19 @@ def draw(material: Material) -> Drawing:
     whole.legend(loc="center left", bbox_to_anchor=(0.0, 0.38))
     letter((whole, near))
     near.set_title("near the origin", loc="right")
-    like, derived = notes["paper_like"], notes["derived"]
+    like, derived = ([f"{m.natural_frequency:.2f}" for m in elastic_modes(name).values()] for name, *_ in SETS)
+    share = vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
     fast = max(pole.real for pole in rigid)
     return Drawing(
         figure,
         "Poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), both sets of inertial "
         "coupling.",
-        "Seven modes, five of the rigid body and two lightly damped pairs; with the paper-like coupling these are at "
-        f"{like[0].natural_frequency:.2f} and {like[1].natural_frequency:.2f} rad/s, almost the structural 16.02 and "
-        f"19.58 rad/s. The rigid body is unstable, {fast:+.2f} 1/s.",
-        f"With the coupling derived from a beam model they are at {derived[0].natural_frequency:.2f} and "
-        f"{derived[1].natural_frequency:.2f} rad/s, not almost structural: the paper's statement is what makes the "
-        "paper-like set a quarter of the derived one. The seven count the slow pair as two: as pairs the rigid body "
-        "has four modes.",
+        f"{len(rigid)} poles of the rigid body and {len(like)} lightly damped pairs, the paper's seven motion modes; "
+        f"with the paper-like coupling the pairs are at {' and '.join(like)} rad/s, almost the structural "
+        f"{' and '.join(f'{omega:g}' for omega in frequencies)} rad/s. The rigid body is unstable, {fast:+.2f} 1/s.",
+        f"With the coupling derived from a beam model they are at {' and '.join(derived)} rad/s, not almost "
+        f"structural: the paper's statement is what makes the paper-like set {share:g} times the derived one. The "
+        f"seven count the slow pair as two: the rigid body has {len(slow)} modes.",
     )
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
 
 from hsv.control.tube_set import TubeSet
 from hsv.simulation.metrics import FlightData
@@ -13,14 +17,36 @@ from hsv.study.figures.style import BLUE, GREEN, GREY, letter, new_figure
 from hsv.units import to_paper
 from hsv.vehicle.dynamics import N_RIGID
 
-INSTANTS = (100.2, 100.4, 100.6, 100.8, 101.0, 101.5, 102.0, 103.0, 104.0, 105.0, 106.0, 108.0)
-"""s; the same for both flights."""
+INSTANTS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+"""Seconds after the fault; the same for both flights."""
+
+SIZE = 120.0
+"""Points: about the side of a panel."""
+
+
+class Plane(NamedTuple):
+    """Two rigid states, axis label and SI unit of each; names of points go right (1) or left (-1) of their path."""
+
+    i: int
+    j: int
+    i_label: str
+    i_unit: str
+    j_label: str
+    j_unit: str
+    side: float
+
 
 PLANES = (
-    (0, 1, r"$e_h$ (ft)", "m", r"$e_V$ (ft/s)", "m/s"),
-    (2, 3, r"$e_\alpha$ (deg)", "rad", r"$e_\theta$ (deg)", "rad"),
-    (3, 4, r"$e_\theta$ (deg)", "rad", "$e_q$ (deg/s)", "rad/s"),
+    Plane(0, 1, r"$e_h$ (ft)", "m", r"$e_V$ (ft/s)", "m/s", -1.0),
+    Plane(2, 3, r"$e_\alpha$ (deg)", "rad", r"$e_\theta$ (deg)", "rad", 1.0),
+    Plane(3, 4, r"$e_\theta$ (deg)", "rad", "$e_q$ (deg/s)", "rad/s", -1.0),
 )
+
+
+def steps(flight: FlightData, instants: Sequence[float]) -> np.ndarray:
+    """Return the steps of a flight nearest to these seconds after its fault."""
+    assert flight.fault_start is not None
+    return np.abs(flight.time[:, None] - flight.fault_start - np.asarray(instants)).argmin(axis=0)
 
 
 def tube_error(flight: FlightData) -> np.ndarray:
@@ -39,39 +65,37 @@ def rigid_level(tube: TubeSet, error: np.ndarray) -> np.ndarray:
 
 
 def draw(material: Material) -> Drawing:
-    """Draw three planes of the set: whole, and about the states; below them the levels over time."""
+    """Draw three planes of the set, whole and about the states, there with instants; below, levels over time."""
     tube = material.design("baseline").flown.tube
     assert tube is not None
     flights = {
         "Tube-MPC without notch": (GREEN, "s", material.flights[case1.NO_NOTCH[0]]),
         "Tube-MPC with notch": (BLUE, "o", material.flights[case1.NOTCH[0]]),
     }
+    errors = [tube_error(flight)[steps(flight, INSTANTS)] for _, _, flight in flights.values()]
     figure = new_figure(7.4)
     grid = figure.subplots(3, 3)
     for (whole, near), plane in zip(grid[:2].T, PLANES, strict=True):
         for axis in (whole, near):
             _shadow(axis, tube, plane)
-        for label, (color, marker, flight) in flights.items():
-            points = tube_error(flight)[[round(t / 0.02) for t in INSTANTS]]
-            x, y = _scaled(points[:, plane[0]], plane[3]), _scaled(points[:, plane[1]], plane[5])
-            whole.plot(x, y, marker, color=color, markersize=2.5, markerfacecolor="none", markeredgewidth=0.7)
-            near.plot(
-                x, y, color=color, marker=marker, markersize=3.5, markerfacecolor="none", linewidth=0.6, label=label
-            )
-        near.autoscale_view()
-        _window(near, [tube_error(flight) for _, _, flight in flights.values()], plane)
-        whole.set_ylabel(plane[4])
-        near.set_ylabel(plane[4])
-        for axis in (whole, near):
-            axis.set_xlabel(plane[2])
+            axis.set_xlabel(plane.i_label)
+            axis.set_ylabel(plane.j_label)
+        for (color, marker, _), error in zip(flights.values(), errors, strict=True):
+            x, y = _scaled(error[:, plane.i], plane.i_unit), _scaled(error[:, plane.j], plane.j_unit)
+            style = {"color": color, "marker": marker, "markerfacecolor": "none"}
+            whole.plot(x, y, linestyle="", markersize=2.5, markeredgewidth=0.7, **style)
+            near.plot(x, y, markersize=3.5, linewidth=0.6, **style)
+        _window(near, errors, plane)
+        _name(near, x, y, plane.side)
     for axis in grid[2]:
         axis.remove()
     level = figure.add_subplot(grid[2, 0].get_gridspec()[2, :])
     worst = {}
-    for label, (color, _, flight) in flights.items():
+    for label, (color, marker, flight) in flights.items():
         values = rigid_level(tube, tube_error(flight))
         worst[label] = float(values.max())
-        level.plot(flight.time[::2], values[::2], color=color, linewidth=0.9, label=label)
+        level.plot(flight.time, values, color=color, linewidth=0.9)
+        level.plot([], [], color=color, marker=marker, markersize=3.5, markerfacecolor="none", label=label)
     level.plot([], [], color="black", linewidth=1.0, label="invariant set (level 1)")
     level.plot([], [], "+", color=GREY, label="its centre")
     level.set_yscale("log")
@@ -85,20 +109,21 @@ def draw(material: Material) -> Drawing:
     letter((*grid[0], level))
     for axis in grid[1]:
         axis.set_title("enlarged", loc="left")
-    closer, larger = _comparison(*(tube_error(flight) for _, _, flight in flights.values()))
+    closer = int(np.count_nonzero(np.abs(errors[1][:, 4]) < np.abs(errors[0][:, 4])))
+    sizes = [_size(flight) for _, _, flight in flights.values()]
     return Drawing(
         figure,
-        "Tube errors e = x - x_r - x_n with uncertain parameters at the same twelve instants after the fault, in "
-        "three planes of the certified ellipsoid (its shadows), and the level of the rigid errors in its shadow over "
-        "time: of their distance from the centre c, which lies where half of the lost elevator moves them, so that the "
-        "fault brings them nearer to it.",
+        f"Tube errors e = x - x_r - x_n with uncertain parameters at the same {len(INSTANTS)} instants, named by the "
+        "seconds since the fault where there is room, in three planes of the certified ellipsoid (its shadows), and "
+        "the level of the rigid errors in its shadow over time: of their distance from the centre c, which lies where "
+        "half of the lost elevator moves them, so that the fault brings them nearer to it.",
         f"The rigid errors stay inside, with the notch (worst level {worst['Tube-MPC with notch']:.2f}) and without "
         f"({worst['Tube-MPC without notch']:.2f}). Over the {len(INSTANTS)} instants the pitch-rate error with the "
         f"notch is the smaller one {closer} times.",
         "Closer to the nominal trajectory with the notch is true of the pitch rate, where the vibration shows (its "
-        f"root mean square over the 20 s after the fault is {larger:.2f} times as large without), and hardly of the "
-        "other states, which the lost elevator and the parameters move. The set is certified for the loop with the "
-        "notch; without it the picture is no proof.",
+        f"root mean square over the 20 s after the fault is {sizes[0] / sizes[1]:.2f} times as large without), "
+        "and hardly of the other states, which the lost elevator and the parameters move. The set is certified for the "
+        "loop with the notch; without it the picture is no proof.",
     )
 
 
@@ -106,31 +131,44 @@ def _scaled(values: np.ndarray, unit: str) -> np.ndarray:
     return values * to_paper(1.0, unit)[0]
 
 
-def _shadow(axis: Axes, tube: TubeSet, plane: tuple[int, int, str, str, str, str]) -> None:
-    i, j = plane[:2]
+def _shadow(axis: Axes, tube: TubeSet, plane: Plane) -> None:
+    i, j = plane.i, plane.j
     covariance = np.linalg.inv(tube.shape)[np.ix_([i, j], [i, j])]
     angle = np.linspace(0.0, 2.0 * np.pi, 400)
     circle = np.linalg.cholesky(covariance) @ np.vstack((np.cos(angle), np.sin(angle)))
-    x, y = _scaled(circle[0] + tube.centre[i], plane[3]), _scaled(circle[1] + tube.centre[j], plane[5])
+    x, y = _scaled(circle[0] + tube.centre[i], plane.i_unit), _scaled(circle[1] + tube.centre[j], plane.j_unit)
     axis.plot(x, y, color="black", linewidth=1.0)
     axis.fill(x, y, color=GREY, alpha=0.08, linewidth=0.0)
-    axis.plot(_scaled(tube.centre[i], plane[3]), _scaled(tube.centre[j], plane[5]), "+", color=GREY)
+    axis.plot(_scaled(tube.centre[i], plane.i_unit), _scaled(tube.centre[j], plane.j_unit), "+", color=GREY)
 
 
-def _window(axis: Axes, errors: list[np.ndarray], plane: tuple[int, int, str, str, str, str]) -> None:
-    rows = [round(t / 0.02) for t in INSTANTS]
-    for column, unit, setter in ((plane[0], plane[3], axis.set_xlim), (plane[1], plane[5], axis.set_ylim)):
-        values = _scaled(np.concatenate([error[rows, column] for error in errors]), unit)
-        margin = 0.12 * np.ptp(values)
+def _window(axis: Axes, errors: list[np.ndarray], plane: Plane) -> None:
+    for column, unit, setter in ((plane.i, plane.i_unit, axis.set_xlim), (plane.j, plane.j_unit, axis.set_ylim)):
+        values = _scaled(np.concatenate([error[:, column] for error in errors]), unit)
+        margin = 0.15 * np.ptp(values)
         setter(values.min() - margin, values.max() + margin)
 
 
-def _comparison(without: np.ndarray, with_notch: np.ndarray) -> tuple[int, float]:
-    rows = [round(t / 0.02) for t in INSTANTS]
-    closer = int(np.count_nonzero(np.abs(with_notch[rows, 4]) < np.abs(without[rows, 4])))
-    window = slice(round(100.0 / 0.02), round(120.0 / 0.02))
-    size = [float(np.sqrt(np.mean(error[window, 4] ** 2))) for error in (without, with_notch)]
-    return closer, size[0] / size[1]
+def _name(axis: Axes, x: np.ndarray, y: np.ndarray, side: float) -> None:
+    """Write beside the points of a path how long after the fault they are (s), where names have room."""
+    sizes = [SIZE / np.ptp(limits) for limits in (axis.get_xlim(), axis.get_ylim())]
+    points = np.column_stack((x, y)) * sizes
+    ahead = np.gradient(points, axis=0)
+    offsets = side * 11.0 * np.column_stack((ahead[:, 1], -ahead[:, 0])) / np.linalg.norm(ahead, axis=1)[:, None]
+    named: list[np.ndarray] = []
+    style: Any = {"fontsize": 7, "ha": "center", "va": "center"}
+    halo = [withStroke(linewidth=2.0, foreground="white")]
+    for since, right, up, offset, place in zip(INSTANTS, x, y, offsets, points + offsets, strict=True):
+        if all(np.any(np.abs(place - other) > (20.0, 9.0)) for other in named):
+            at, text = (right, up), (float(offset[0]), float(offset[1]))
+            axis.annotate(f"{since:g} s", at, text, textcoords="offset points", path_effects=halo, **style)
+            named.append(place)
+
+
+def _size(flight: FlightData) -> float:
+    """Return the root mean square of the pitch-rate error (rad/s) over the 20 s after the fault."""
+    window = slice(*steps(flight, (0.0, 20.0)))
+    return float(np.sqrt(np.mean(tube_error(flight)[window, 4] ** 2)))
 
 
 FIGURE = PaperFigure(

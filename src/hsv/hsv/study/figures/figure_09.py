@@ -8,31 +8,36 @@ import numpy as np
 
 from hsv.study.figures import case1
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
+from hsv.study.figures.readings import measured
 from hsv.study.figures.style import RED
 from hsv.study.figures.time_histories import ALTITUDE, VELOCITY, histories
+from hsv.vehicle.envelope import FOOT
+
+TOP = 86480.0
+"""ft: where the altitude panel ends, the single gain flies on."""
 
 
 def draw(material: Material) -> Drawing:
     """Draw altitude and velocity, with the altitude error of robust MPC on the axis and the single gain's off it."""
-    altitude = replace(ALTITUDE, limits=(85450.0, 86480.0))
-    velocity = replace(VELOCITY, limits=(7880.0, 8190.0))
+    altitude = replace(ALTITUDE, shown=(85450.0, TOP))
+    velocity = replace(VELOCITY, shown=(7880.0, 8190.0))
     figure = histories((altitude, velocity), case1.curves(material, single=True), reference=True, height=2.7)
     end = {
-        name: case1.measured(material, name, "altitude_end_error", "m")
+        name: measured(material, name, "altitude_end_error", "m")
         for name in (case1.NOTCH[0], case1.NO_NOTCH[0], case1.RMPC[0], case1.RMPC_SINGLE[0])
     }
     axis = figure.axes[0]
     single = material.flights[case1.RMPC_SINGLE[0]]
-    leaves = single.time[np.argmax((single.state[:, 0] / 0.3048 > 86470.0) & (single.time > 100.0))]
+    leaves = single.time[np.argmax(single.state[:, 0] > TOP * FOOT)]
     axis.annotate(
         f"{end[case1.RMPC_SINGLE[0]]:.0f} ft above the\ncommand at 200 s",
-        (leaves, 86470.0),
-        (leaves + 12.0, 86290.0),
+        (leaves, TOP - 10.0),
+        (leaves + 12.0, TOP - 190.0),
         color=RED,
         fontsize=8,
         arrowprops={"arrowstyle": "-", "color": RED, "linewidth": 0.5},
     )
-    velocity_off = case1.measured(material, case1.RMPC_SINGLE[0], "velocity_end_error", "m/s")
+    velocity_off = measured(material, case1.RMPC_SINGLE[0], "velocity_end_error", "m/s")
     return Drawing(
         figure,
         case1.CONDITIONS + "; its single gain of the whole step is shown beside it.",
@@ -40,7 +45,9 @@ def draw(material: Material) -> Drawing:
         f"and {end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
         "How far robust MPC ends off is the size of its gain, which the paper does not state: with the single gain of "
         f"(32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. The tube keeps a few "
-        "feet of error, because its law has no integral action.",
+        "feet of error, because its law has no integral action. Their velocity bends "
+        f"{case1.switches(material)}, where the nominal state enters the next smaller ellipsoid of the nested family "
+        "and the law takes its gain; the law of the paper has one gain and would not bend.",
     )
 
 

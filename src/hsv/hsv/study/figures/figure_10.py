@@ -6,14 +6,15 @@ import numpy as np
 
 from hsv.study.figures import case1
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
-from hsv.study.figures.time_histories import ATTITUDE, histories
+from hsv.study.figures.readings import measured
+from hsv.study.figures.time_histories import ATTITUDE, Zoom, histories
 
 
 def draw(material: Material) -> Drawing:
     """Draw angle of attack, pitch angle and pitch rate."""
-    figure = histories(ATTITUDE, case1.curves(material), zoom=(95.0, 125.0), height=2.1)
+    figure = histories(ATTITUDE, case1.curves(material), zoom=Zoom(95.0, 125.0), height=2.1)
     off = {
-        name: case1.measured(material, name, "post_fault_attitude_deviation", "rad")
+        name: measured(material, name, "post_fault_attitude_deviation", "rad")
         for name in (case1.NOTCH[0], case1.NO_NOTCH[0], case1.RMPC[0])
     }
     rates = {}

@@ -2,28 +2,35 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from hsv.study.figures import case1
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
-from hsv.study.figures.time_histories import INPUTS, histories
+from hsv.study.figures.readings import LIMITS, gain_switches, input_extremes, input_ranges, limited
+from hsv.study.figures.time_histories import INPUTS, Zoom, histories
+from hsv.vehicle.envelope import INPUT_MAXIMUM
 
 
 def draw(material: Material) -> Drawing:
     """Draw both inputs as commanded."""
-    figure = histories(INPUTS, case1.curves(material), zoom=(98.0, 118.0), height=2.3)
-
-    def ends(name: str, unit: str) -> list[float]:
-        return [case1.measured(material, case1.NOTCH[0], f"{name}_{end}", unit) for end in ("minimum", "maximum")]
-
-    fuel, elevator = ends("fuel_equivalence_ratio", "1"), ends("elevator_deflection", "rad")
-    limited = case1.measured(material, case1.NOTCH[0], "saturated_steps", "1")
+    figure = histories(INPUTS, case1.curves(material), zoom=Zoom(98.0, 118.0), height=2.3)
+    _, largest = input_extremes(material, case1.RMPC)
+    flight = material.flights[case1.NOTCH[0]]
+    steps = gain_switches(flight)
+    jumps = np.abs(flight.command[steps] - flight.command[steps - 1]).max(axis=0)
     return Drawing(
         figure,
-        case1.CONDITIONS + ".",
-        f"The inputs keep to their limits, 0 to 1.5 and -30 deg to 30 deg: with the notch {fuel[0]:.2f} to "
-        f"{fuel[1]:.2f} and {elevator[0]:.1f} deg to {elevator[1]:.1f} deg, {limited:.0f} "
-        "steps limited.",
-        "They are far from the limits, so the figure says little about how the law behaves at them. Without the notch "
-        "the elevator carries the vibration.",
+        case1.CONDITIONS + f". Limits: {LIMITS}, drawn where they are near.",
+        f"The inputs keep to their limits, {limited(material, case1.SCENARIOS)}. Fuel ratio "
+        "and elevator range, uncertain and nominal parameters together, with the notch "
+        f"over {input_ranges(material, case1.NOTCH)}, without it over {input_ranges(material, case1.NO_NOTCH)}, by "
+        f"robust MPC over {input_ranges(material, case1.RMPC)}.",
+        "The tubes are far from the limits, so the figure says little about how their law behaves at them; robust MPC "
+        f"is not: at the step it asks for {largest[0]:.2f} of {INPUT_MAXIMUM[0]:g} of fuel and for {largest[1]:.0f} "
+        f"deg of {np.degrees(INPUT_MAXIMUM[1]):.0f} deg of elevator. The teeth of the tubes' inputs "
+        f"{case1.switches(material)}, up to {jumps[0]:.2f} and {np.degrees(jumps[1]):.1f} deg high, are switches of "
+        "the nested family's gain: nearer to rest a tighter gain fits in the same bounds. The law of the paper has one "
+        "gain and none of them. Without the notch the elevator carries the vibration.",
     )
 
 

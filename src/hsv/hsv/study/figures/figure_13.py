@@ -6,11 +6,11 @@ import numpy as np
 
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.scenario import load_scenario
-from hsv.study.figures import case1
 from hsv.study.figures.bode import notch_response
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
+from hsv.study.figures.readings import measured
 from hsv.study.figures.style import BLUE, GREEN
-from hsv.study.figures.time_histories import ELASTIC, Curve, histories
+from hsv.study.figures.time_histories import ELASTIC, Curve, Zoom, histories
 
 FIRST_MODE = 15.89
 """rad/s, coupled, with the paper-like coupling."""
@@ -24,9 +24,9 @@ def draw(material: Material) -> Drawing:
         Curve("Tube-MPC without notch", GREEN, material.flights[WITHOUT]),
         Curve("Tube-MPC with notch for the second mode", BLUE, material.flights[WITH]),
     ]
-    figure = histories((ELASTIC[1], ELASTIC[3]), curves, zoom=(98.0, 128.0), height=2.3)
+    figure = histories((ELASTIC[1], ELASTIC[3]), curves, zoom=Zoom(99.0, 107.0), height=2.3)
     first, second = (
-        [case1.measured(material, name, f"elastic_rate_{mode}_decay_time", "s") for name in (WITHOUT, WITH)]
+        [measured(material, name, f"elastic_rate_{mode}_decay_time", "s") for name in (WITHOUT, WITH)]
         for mode in (1, 2)
     )
     filter_ = assemble(flight_parameters(load_scenario(WITH))).notch_filter

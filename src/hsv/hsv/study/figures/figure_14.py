@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 from hsv.study.figures import case2
-from hsv.study.figures.case1 import measured
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
-from hsv.study.figures.time_histories import ALTITUDE, VELOCITY, histories
+from hsv.study.figures.readings import measured
+from hsv.study.figures.time_histories import ALTITUDE, VELOCITY, Zoom, histories
 
 
 def draw(material: Material) -> Drawing:
     """Draw altitude and velocity along the ramp."""
-    figure = histories((ALTITUDE, VELOCITY), case2.curves(material), zoom=(78.0, 130.0), reference=True, height=2.6)
+    closer = Zoom(78.0, 130.0, "end of the ramp, and the fault")
+    figure = histories((ALTITUDE, VELOCITY), case2.curves(material), zoom=closer, reference=True, height=2.6)
     names = (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])
     lag = [measured(material, name, "velocity_integral_absolute_error", "m") for name in names]
     largest = [measured(material, name, "altitude_error_maximum", "m") for name in names]
     end = measured(material, names[0], "altitude_end_error", "m")
     return Drawing(
         figure,
-        case2.CONDITIONS + ". Right: the end of the ramp and the fault.",
+        case2.CONDITIONS + ".",
         f"The ramp is tracked, at most {largest[0]:.0f} ft off and {end:.1f} ft at the end, through the fault.",
         "The paper says that the adjustable scheme responds faster in velocity. Along a ramp nothing of it shows: the "
         f"integral of the velocity error is {lag[0]:.0f} ft with tau = 0.8, {lag[1]:.0f} ft with tau = 1 and "
         f"{lag[2]:.0f} ft with the baseline. The relaxed bounds of K' make velocity faster on a step; the ramp does "
-        "not need "
-        "them. The length of the ramp is ours, the paper gives none.",
+        "not need them. The length of the ramp is ours, the paper gives none.",
     )
 
 

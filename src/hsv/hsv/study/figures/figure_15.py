@@ -6,14 +6,14 @@ import numpy as np
 
 from hsv.simulation.metrics import FlightData
 from hsv.study.figures import case2
-from hsv.study.figures.case1 import measured
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
-from hsv.study.figures.time_histories import ATTITUDE, histories
+from hsv.study.figures.readings import measured
+from hsv.study.figures.time_histories import ATTITUDE, Zoom, histories
 
 
 def draw(material: Material) -> Drawing:
     """Draw angle of attack, pitch angle and pitch rate."""
-    figure = histories(ATTITUDE, case2.curves(material), zoom=(95.0, 125.0), height=2.1)
+    figure = histories(ATTITUDE, case2.curves(material), zoom=Zoom(95.0, 125.0), height=2.1)
     names = (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])
     off = [measured(material, name, "post_fault_attitude_deviation", "rad") for name in names]
     flight = material.flights[names[0]]

@@ -1,10 +1,10 @@
-"""Panels over time: several controllers laid over one another, uncertain parameters thick, nominal ones thin."""
+"""Panels over time: several controllers laid over one another, with uncertain and with nominal parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,9 +14,19 @@ from matplotlib.lines import Line2D
 from hsv.simulation.metrics import FlightData
 from hsv.study.figures.style import GREY, letter, new_figure
 from hsv.units import to_paper
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 
-_EVERY = 2
-"""Samples from one drawn point to the next: eight points to a period of the second elastic mode."""
+_FAULT: Any = {"color": GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
+_LIMIT: Any = {"color": "black", "linewidth": 0.7, "linestyle": (0, (1, 1.5))}
+_COMMAND: Any = {"color": "black", "linewidth": 0.9, "linestyle": ":"}
+_THIN = 0.5
+"""Width of the lines of nominal flights."""
+
+_NEAR = 1.0 / 3.0
+"""Share of a panel's range beyond its curves within which a limit is drawn; farther ones would flatten them."""
+
+_OFF = 0.03
+"""Share of a panel's range that is left between a limit and the panel's frame."""
 
 
 @dataclass(frozen=True)
@@ -26,8 +36,10 @@ class Panel:
     label: str
     unit: str
     value: Callable[[FlightData], np.ndarray]
-    limits: tuple[float, float] | None = None
-    """Of the axis, in the paper's unit, where something runs out of it."""
+    shown: tuple[float, float] | None = None
+    """Range of the axis, in the paper's unit, where something runs out of it."""
+    limits: tuple[float, ...] = ()
+    """What the quantity may not exceed, SI."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +51,14 @@ class Curve:
     flight: FlightData
     nominal: FlightData | None = None
     width: float = 1.1
+
+
+class Zoom(NamedTuple):
+    """A closer look between two times (s)."""
+
+    start: float
+    end: float
+    title: str = "about the fault"
 
 
 def column(index: int) -> Callable[[FlightData], np.ndarray]:
@@ -64,7 +84,10 @@ ELASTIC = (
     Panel(r"$\eta_2$ (slug$^{1/2}$ ft)", "kg^0.5 m", column(7)),
     Panel(r"$\dot\eta_2$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s", column(8)),
 )
-INPUTS = (Panel(r"$\Phi$", "1", command(0)), Panel(r"$\delta_e$ (deg)", "rad", command(1)))
+INPUTS = tuple(
+    Panel(label, unit, command(i), limits=(float(INPUT_MINIMUM[i]), float(INPUT_MAXIMUM[i])))
+    for i, (label, unit) in enumerate(((r"$\Phi$", "1"), (r"$\delta_e$ (deg)", "rad")))
+)
 
 
 def in_paper_units(panel: Panel, flight: FlightData) -> np.ndarray:
@@ -76,64 +99,108 @@ def histories(
     panels: Sequence[Panel],
     curves: Sequence[Curve],
     *,
-    zoom: tuple[float, float] | None = None,
+    zoom: Zoom | None = None,
     reference: bool = False,
+    nominal_apart: bool = False,
     height: float = 2.0,
 ) -> Figure:
-    """Return one row a panel; beside it, with ``zoom`` (s), the same between two times.
+    """Return one row a panel, over the whole flight and beside it closer; every sample of a flight is drawn.
 
     Args:
         panels: What to show.
         curves: Whom to show, the last one on top.
-        zoom: Times from and to which a second column looks closer.
+        zoom: Where a last column looks closer.
         reference: Whether the panels are altitude and velocity, with their commands.
+        nominal_apart: Give nominal flights a column of their own, where they would hide behind vibration; otherwise
+            they are thin lines on top.
         height: Of a row, inches.
     """
+    columns = _columns(zoom, nominal_apart)
     figure = new_figure(height * len(panels) + 0.5)
-    grid = figure.subplots(len(panels), 2 if zoom else 1, squeeze=False, width_ratios=(1.7, 1) if zoom else None)
+    ratios = [column.width for column in columns]
+    grid = figure.subplots(len(panels), len(columns), squeeze=False, width_ratios=ratios)
+    limited = False
     for row, panel in zip(grid, panels, strict=True):
-        for axis, window in zip(row, (None, zoom), strict=False):
-            _panel(axis, panel, curves, window, reference)
+        if nominal_apart:
+            row[1].sharey(row[0])
+        for axis, column in zip(row, columns, strict=True):
+            limited |= _panel(axis, panel, curves, column, reference)
+        row[0].set_ylabel(panel.label)
     letter(grid[:, 0])
-    if zoom:
-        grid[0, 1].set_title("about the fault", loc="left")
+    for axis, column in zip(grid[0], columns, strict=True):
+        axis.set_title(column.title, loc="center")
     for axis in grid[-1]:
         axis.set_xlabel("Time (s)")
-    handles = _legend(curves, reference)
+    handles = _legend(curves, reference, thin=not nominal_apart, limited=limited)
     figure.legend(handles=handles, loc="outside upper center", ncols=min(3, len(handles)), frameon=False)
     return figure
 
 
-def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], window: tuple[float, float] | None, ref: bool) -> None:
+class _Column(NamedTuple):
+    """What a column shows: flights with uncertain, with nominal parameters or both, between which times."""
+
+    title: str
+    width: float
+    window: Zoom | None
+    uncertain: bool
+    nominal: bool
+
+
+def _columns(zoom: Zoom | None, nominal_apart: bool) -> list[_Column]:
+    if not nominal_apart:
+        whole = [_Column("", 1.7, None, True, True)]
+    else:
+        whole = [
+            _Column("uncertain parameters", 1.3, None, True, False),
+            _Column("nominal parameters", 1.3, None, False, True),
+        ]
+    closer = [_Column(zoom.title, 1.0, zoom, True, not nominal_apart)] if zoom else []
+    return whole + closer
+
+
+def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], column: _Column, reference: bool) -> bool:
+    """Draw a panel; return whether a limit is near enough to be in it."""
     for curve in curves:
-        if curve.nominal is not None:
-            _line(axis, panel, curve.nominal, window, color=curve.color, linewidth=0.5, alpha=0.6)
+        if column.uncertain:
+            _line(axis, panel, curve.flight, column.window, color=curve.color, linewidth=curve.width)
+        elif curve.nominal is not None:
+            _line(axis, panel, curve.nominal, column.window, color=curve.color, linewidth=curve.width)
     for curve in curves:
-        _line(axis, panel, curve.flight, window, color=curve.color, linewidth=curve.width)
+        if column.uncertain and column.nominal and curve.nominal is not None:
+            _line(axis, panel, curve.nominal, column.window, color=curve.color, linewidth=_THIN)
     first = curves[0].flight
-    if ref:
-        target = FlightData(**{**vars(first), "state": first.reference})
-        _line(axis, panel, target, window, color="black", linewidth=0.9, linestyle=":")
+    if reference:
+        _line(axis, panel, replace(first, state=first.reference), column.window, **_COMMAND)
     if first.fault_start is not None:
-        axis.axvline(first.fault_start, color=GREY, linewidth=0.6, linestyle=(0, (4, 3)))
-    axis.set_xlim(window or (0.0, max(curve.flight.time[-1] for curve in curves)))
-    if panel.limits and window is None:
-        axis.set_ylim(panel.limits)
-    if window is None:
-        axis.set_ylabel(panel.label)
+        axis.axvline(first.fault_start, **_FAULT)
+    (low, high), limits = axis.get_ylim(), [to_paper(limit, panel.unit)[0] for limit in panel.limits]
+    margin = _NEAR * (high - low)
+    near = [limit for limit in limits if column.window is None and low - margin <= limit <= high + margin]
+    for limit in near:
+        axis.axhline(limit, **_LIMIT)
+    if near:  # off the panel's frame
+        axis.set_ylim(min(low, min(near) - _OFF * (high - low)), max(high, max(near) + _OFF * (high - low)))
+    if column.window:
+        axis.set_xlim(column.window.start, column.window.end)
+    else:
+        axis.set_xlim(0.0, max(curve.flight.time[-1] for curve in curves))
+    if panel.shown and column.window is None:
+        axis.set_ylim(panel.shown)
+    return bool(near)
 
 
-def _line(axis: Axes, panel: Panel, flight: FlightData, window: tuple[float, float] | None, **style: Any) -> None:
-    low, high = window or (-np.inf, np.inf)
-    shown = np.flatnonzero((flight.time >= low) & (flight.time <= high))[::_EVERY]
-    axis.plot(flight.time[shown], in_paper_units(panel, flight)[shown], **style)
+def _line(axis: Axes, panel: Panel, flight: FlightData, window: Zoom | None, **style: Any) -> None:
+    inside = slice(None) if window is None else (flight.time >= window.start) & (flight.time <= window.end)
+    axis.plot(flight.time[inside], in_paper_units(panel, flight)[inside], **style)
 
 
-def _legend(curves: Sequence[Curve], reference: bool) -> list[Line2D]:
-    handles = [Line2D([], [], color="black", linestyle=":", linewidth=0.9, label="command")] if reference else []
+def _legend(curves: Sequence[Curve], reference: bool, *, thin: bool, limited: bool) -> list[Line2D]:
+    handles = [Line2D([], [], label="command", **_COMMAND)] if reference else []
     handles += [Line2D([], [], color=c.color, linewidth=c.width, label=c.label) for c in curves]
-    if any(curve.nominal is not None for curve in curves):
-        handles.append(Line2D([], [], color=GREY, linewidth=0.5, label="thin: nominal parameters"))
+    if thin and any(curve.nominal is not None for curve in curves):
+        handles.append(Line2D([], [], color=GREY, linewidth=_THIN, label="thin: nominal parameters"))
     if curves[0].flight.fault_start is not None:
-        handles.append(Line2D([], [], color=GREY, linewidth=0.6, linestyle=(0, (4, 3)), label="elevator fault"))
+        handles.append(Line2D([], [], label="elevator fault", **_FAULT))
+    if limited:
+        handles.append(Line2D([], [], label="limit of the input", **_LIMIT))
     return handles

@@ -1,0 +1,63 @@
+"""What the remarks on the figures say of flights, measured on those that are drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hsv.simulation.metrics import FlightData, flight_metrics
+from hsv.study.figures.figure import Material
+from hsv.study.mode_peaks import PeakFall
+from hsv.units import to_paper
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+
+LIMITS = (
+    f"{INPUT_MINIMUM[0]:g} to {INPUT_MAXIMUM[0]:g} and {np.degrees(INPUT_MINIMUM[1]):g} deg to "
+    f"{np.degrees(INPUT_MAXIMUM[1]):g} deg"
+)
+"""Of both inputs."""
+
+
+def measured(material: Material, scenario: str, metric: str, unit: str) -> float:
+    """Return a metric of a flight in the paper's unit."""
+    return to_paper(flight_metrics(material.flights[scenario])[metric], unit)[0]
+
+
+def input_extremes(material: Material, scenarios: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the least and the largest commands (2) of several flights: fuel ratio, elevator in deg."""
+    commands = np.concatenate([material.flights[scenario].command for scenario in scenarios])
+    commands[:, 1] = np.degrees(commands[:, 1])
+    return commands.min(axis=0), commands.max(axis=0)
+
+
+def input_ranges(material: Material, scenarios: Sequence[str]) -> str:
+    """Return the ranges of both commands over several flights, in words."""
+    least, largest = input_extremes(material, scenarios)
+    return f"{least[0]:.2f} to {largest[0]:.2f} and {least[1]:.1f} deg to {largest[1]:.1f} deg"
+
+
+def limited(material: Material, scenarios: Sequence[str]) -> str:
+    """Return in how many steps of several flights a command was limited, in words."""
+    steps = sum(int(np.any(material.flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
+    return f"{steps or 'no'} step{'' if steps == 1 else 's'} of the {len(scenarios)} flights limited"
+
+
+def peak_in_words(fall: PeakFall) -> str:
+    """Return from where to where a filter takes the peak of a mode, in words."""
+    start = f"falls from {fall.before.magnitude:.1f} dB at {fall.before.frequency:.2f} rad/s"
+    if fall.after is None:
+        return f"{start}, none is left"
+    end = f"to {fall.after.magnitude:.1f} dB at {fall.after.frequency:.2f} rad/s"
+    return f"{start} {end}, by {fall.decibel:.1f} dB peak to peak"
+
+
+def gain_switches(flight: FlightData) -> np.ndarray:
+    """Return the steps (s) in which the nominal law takes another gain of its nested family than in the step before."""
+    return np.flatnonzero(np.diff(flight.gain_index)) + 1
+
+
+def in_words(values: Sequence[float] | np.ndarray, pattern: str = ".0f") -> str:
+    """Return numbers as a list in words: 1, 2 and 3."""
+    texts = [format(value, pattern) for value in values]
+    return f"{', '.join(texts[:-1])} and {texts[-1]}" if len(texts) > 1 else "".join(texts)
