@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hsv.cli.claims import _as_json
-from hsv.study.claims import modelling, notch
+from hsv.study.claims import modelling
 from hsv.study.claims.catalogue import GROUPS
 from hsv.study.claims.claim import Finding, Judged, Reading, Verdict
 from hsv.study.claims.evidence import Evidence, nominal, worst
@@ -75,16 +75,3 @@ def test_claims_on_the_model_are_measured(claim, evidence):
     assert result.readings
     json.dumps(_as_json("model", Judged(claim, result)))
     assert all(math.isfinite(reading.value) for reading in result.readings)
-
-
-def test_one_section_takes_out_the_first_mode_and_lessens_the_second(evidence):
-    fall = notch.reductions(evidence)
-    assert fall["first"] > 20.0
-    assert 5.0 < fall["second"] < 10.0
-
-
-def test_the_notch_raises_the_smallest_margin_and_lowers_that_of_the_rigid_body(evidence):
-    [claim] = [claim for claim in notch.CLAIMS if claim.name == "phase margin"]
-    smallest, rigid = (np.degrees(reading.value) for reading in claim.measure(evidence).readings)
-    assert smallest > 30.0
-    assert rigid < -10.0

@@ -55,9 +55,10 @@ class SampledLoop:
     def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
         """Return L (f), the response of the loop broken at the elevator, the other input closed; -1 is critical."""
         A = self.A + np.outer(self.B[:, 1 - ELEVATOR], self.gain[1 - ELEVATOR])
+        poles, modes = np.linalg.eig(A)
+        residues = (self.gain[ELEVATOR] @ modes) * np.linalg.solve(modes, self.B[:, ELEVATOR])
         z = np.exp(1j * np.asarray(frequencies, float) * self.period)
-        states = np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, self.B[:, ELEVATOR, None].astype(complex))
-        return np.asarray(-(self.gain[ELEVATOR] @ states[:, :, 0].T))
+        return np.asarray(-(residues / (z[:, None] - poles)).sum(axis=1))
 
 
 def sampled_loop(

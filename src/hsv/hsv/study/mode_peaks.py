@@ -20,7 +20,7 @@ from hsv.vehicle.trim import trim
 WINDOW = 0.1
 """The peak of a mode is the highest within this share of its natural frequency."""
 
-FREQUENCIES = np.linspace(10.0, 25.0, 15001)
+FREQUENCIES = np.geomspace(10.0, 25.0, 15001)
 """rad/s."""
 
 

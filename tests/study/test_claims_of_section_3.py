@@ -1,0 +1,96 @@
+import math
+
+import numpy as np
+import pytest
+
+from hsv.study.claims import controller, notch, notch_loop
+from hsv.study.claims.claim import Verdict
+from hsv.study.claims.evidence import Evidence
+from hsv.vehicle.parameters import vehicle_parameters
+
+CORNERS = [
+    {},
+    {"mass": 0.1, "moment_of_inertia": -0.1},
+    {"mass": -0.1, "moment_of_inertia": 0.1},
+]
+CLAIMS = {claim.name: claim for claim in (*controller.CLAIMS, *notch.CLAIMS)}
+
+
+@pytest.fixture(scope="module")
+def evidence(tmp_path_factory):
+    return Evidence(tmp_path_factory.mktemp("evidence"), over=CORNERS)
+
+
+@pytest.fixture(scope="module")
+def findings(evidence):
+    return {name: claim.measure(evidence) for name, claim in CLAIMS.items()}
+
+
+def values(finding):
+    return {reading.what: reading.value for reading in finding.readings}
+
+
+def test_every_claim_is_measured(findings):
+    for name, finding in findings.items():
+        assert 1 <= finding.leading <= len(finding.readings), name
+        assert not any(math.isnan(reading.value) for reading in finding.readings), name
+
+
+def test_what_loses_a_step_s_share_of_its_level_decreases():
+    A = np.array([[[0.5, 0.0], [0.0, 0.5]], [[0.0, 0.9], [0.0, 0.0]]])
+    B = np.zeros((2, 2, 1))
+    assert controller.kept_of_level(A, B, np.zeros((1, 2)), np.eye(2)) == pytest.approx(0.81)
+    # The same map seen in another metric grows: a shape decides, not the poles alone.
+    assert controller.kept_of_level(A, B, np.zeros((1, 2)), np.diag([4.0, 1.0])) > 1.0
+
+
+def test_peaks_fall_but_are_not_eliminated(findings):
+    finding = findings["peaks eliminated"]
+    assert finding.verdict is Verdict.FAILS
+    first, second, *centred = (reading.value for reading in finding.readings)
+    assert first == pytest.approx(19.4, abs=0.1)
+    assert second == pytest.approx(6.7, abs=0.1)
+    assert centred == [math.inf, math.inf]
+    assert findings["peak suppressed"].verdict is Verdict.HOLDS
+
+
+def test_stability_without_the_notch_hangs_on_a_hundredth_of_the_coupling(findings):
+    finding = findings["stable without the notch"]
+    assert finding.verdict is Verdict.CONDITIONS
+    assert finding.readings[0].holds
+    assert values(finding)["critical coupling over the paper-like one"] == pytest.approx(1.0095, abs=1e-3)
+    assert "0.2524" in finding.why
+
+
+def test_the_notch_raises_the_smallest_margin_and_lowers_that_of_the_rigid_body(findings):
+    finding = findings["phase margin"]
+    assert np.degrees(finding.readings[0].value) > 30.0
+    assert np.degrees(finding.readings[-1].value) < -10.0
+
+
+def test_a_loop_that_is_not_stable_has_no_margin(evidence):
+    assert min(margin.phase for margin in notch_loop.margins(evidence, ())) > 0.0
+    assert max(margin.phase for margin in notch_loop.margins(evidence, (), vehicle_parameters("derived"))) < 0.0
+
+
+def test_the_modes_act_through_the_pitch_rate_and_are_not_acted_on_by_it(findings):
+    onto_rigid, answer, onto_elastic = (r.value for r in findings["coupling in the pitch rate"].readings)
+    assert onto_rigid == pytest.approx(1.0)
+    assert 0.9 < answer < 1.0
+    assert onto_elastic == pytest.approx(0.0)
+
+
+def test_filtering_takes_vibration_and_not_parameters_out_of_the_disturbance(findings):
+    pitch, bound, acceleration, _ = (r.value for r in findings["filtering reduces uncertainty"].readings)
+    assert bound <= pitch < 0.9
+    assert acceleration == pytest.approx(1.0, abs=0.01)
+
+
+def test_neither_set_is_symmetric_about_the_origin(findings):
+    one_sided, shifted = (reading.value for reading in findings["symmetric sets"].readings)
+    assert one_sided == pytest.approx(1.0)
+    assert 0.1 < shifted < 1.0
+
+
+def test_the_lyapunov_function_decreases_at_every_vertex_and_in_flight(findings):
+    assert findings["the Lyapunov function decreases"].verdict is Verdict.HOLDS
