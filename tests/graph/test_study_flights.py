@@ -28,7 +28,7 @@ def test_a_flight_of_the_graph_is_kept_as_its_bag_and_flown_again_where_that_is_
     recorded = file.read_bytes()
     again, in_process = Flights(kept.parent, graph=True)[SHORT], Flights(tmp_path, graph=False)[SHORT]
     assert file.read_bytes() == recorded
-    for name in ("time", "state", "reference", "deviation", "command", "saturated"):
+    for name in ("time", "state", "reference", "deviation", "command", "saturated", "gain_index"):
         assert np.array_equal(getattr(flown, name), getattr(in_process, name)), name
         assert np.array_equal(getattr(again, name), getattr(in_process, name)), name
 

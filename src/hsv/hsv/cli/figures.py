@@ -21,7 +21,7 @@ def figures(
     """Draw the paper's figures from this project's designs and flights, to be laid beside the paper's.
 
     The flights are runs of the graph, recorded to bags that are kept and found again while nothing that they depend on
-    changes. Without the nodes they are flown in this process: the same numbers.
+    changes, the nodes and their messages included. Without the nodes they are flown in this process: the same numbers.
 
     Example: hsv figures --only 9 --only 11 --out figures
     """
@@ -39,11 +39,11 @@ def figures(
         if number not in FIGURES:
             raise QuantityError(f"only = {number}: expected one of {', '.join(map(str, FIGURES))}")
     chosen = [figure for number, figure in FIGURES.items() if not only or number in only]
+    check_folder(out, "out")
+    check_folder(flights, "flights")
     graph = graph_is_there()
     if not graph and any(figure.scenarios for figure in chosen):
         errors.print("no built ROS workspace is sourced: flown in this process, the same numbers bit for bit")
-    check_folder(out, "out")
-    check_folder(flights, "flights")
     out.mkdir(parents=True, exist_ok=True)
     written = []
     with stages() as progress, matplotlib.rc_context(RC):

@@ -35,12 +35,6 @@ def pitch_rate_response(vehicle: VehicleParameters, frequencies: np.ndarray) -> 
     return frequency_response(A, B, frequencies)[:, PITCH_RATE, ELEVATOR]
 
 
-def peak(frequencies: np.ndarray, response: np.ndarray, low: float, high: float) -> int:
-    """Return the index of the largest magnitude of a response (f) between two frequencies (rad/s)."""
-    inside = np.flatnonzero((low < frequencies) & (frequencies < high))
-    return int(inside[np.argmax(np.abs(response[inside]))])
-
-
 def bode_lines(
     magnitude: Axes,
     phase: Axes,

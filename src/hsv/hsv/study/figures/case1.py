@@ -16,12 +16,15 @@ RMPC_SINGLE = ("case1_uncertain_rmpc", "case1_rmpc")
 SCENARIOS = (*NOTCH, *NO_NOTCH, *RMPC)
 """Of Figures 10 to 12."""
 
-CONDITIONS = (
-    "Uncertain parameters as in `case1_uncertain` (mass +5 %, moment of inertia -5 %, the rest at half its bound), "
-    "elevator effectiveness 0.9 from 100 s; thin: nominal parameters. Robust MPC flies the decoupled model without "
-    "tube and notch filter, as in the paper, with the fourth gain of the family, the tightest that survives the step "
-    "with these parameters"
-)
+
+def conditions(nominal: str = "thin") -> str:
+    """Return what is flown, in words; ``nominal``: where the flights with nominal parameters are seen."""
+    return (
+        "Uncertain parameters as in `case1_uncertain` (mass +5 %, moment of inertia -5 %, the rest at half its bound), "
+        f"elevator effectiveness 0.9 from 100 s; {nominal}: nominal parameters. Robust MPC flies the decoupled model "
+        "without tube and notch filter, as in the paper, with the fourth gain of the family, the tightest that "
+        "survives the step with these parameters"
+    )
 
 
 def curves(material: Material, *, single: bool = False, vibrating: bool = False) -> list[Curve]:

@@ -13,11 +13,14 @@ BASELINE = ("case2_uncertain_baseline", "case2_baseline")
 
 SCENARIOS = (*ADJUSTABLE, *WHOLE, *BASELINE)
 
-CONDITIONS = (
-    "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator effectiveness "
-    "0.9 from 100 s; thin: nominal parameters. The adjustable design at the paper's tau = 0.8 and at 1, and the "
-    "baseline design on the same ramp"
-)
+
+def conditions(nominal: str = "thin") -> str:
+    """Return what is flown, in words; ``nominal``: where the flights with nominal parameters are seen."""
+    return (
+        "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator "
+        f"effectiveness 0.9 from 100 s; {nominal}: nominal parameters. The adjustable design at the paper's tau = 0.8 "
+        "and at 1, and the baseline design on the same ramp"
+    )
 
 
 def curves(material: Material) -> list[Curve]:

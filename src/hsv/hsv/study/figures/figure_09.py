@@ -40,7 +40,7 @@ def draw(material: Material) -> Drawing:
     velocity_off = measured(material, case1.RMPC_SINGLE[0], "velocity_end_error", "m/s")
     return Drawing(
         figure,
-        case1.CONDITIONS + "; its single gain of the whole step is shown beside it.",
+        case1.conditions() + "; its single gain of the whole step is shown beside it.",
         f"Both tubes track through the fault, {end[case1.NOTCH[0]]:.1f} ft from the command at 200 s with the notch "
         f"and {end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
         "How far robust MPC ends off is the size of its gain, which the paper does not state: with the single gain of "

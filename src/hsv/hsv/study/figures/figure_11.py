@@ -30,7 +30,7 @@ def draw(material: Material) -> Drawing:
     bursts = [_largest(flight, flight.time[step]) for step in gain_switches(flight)]
     return Drawing(
         figure,
-        case1.CONDITIONS.replace("; thin: nominal parameters", "") + ". Middle column: nominal parameters.",
+        case1.conditions("middle column") + ".",
         f"The coordinates vibrate at the fault and return to rest; with the notch within {decay[case1.NOTCH[0]]:.1f} "
         f"s (5 % of the peak of their rates; nominal parameters {decay[case1.NOTCH[1]]:.1f} s), without it they still "
         f"ring at the end, {decay[case1.NO_NOTCH[0]]:.0f} s later (nominal {decay[case1.NO_NOTCH[1]]:.0f} s).",

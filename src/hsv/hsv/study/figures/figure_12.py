@@ -20,7 +20,7 @@ def draw(material: Material) -> Drawing:
     jumps = np.abs(flight.command[steps] - flight.command[steps - 1]).max(axis=0)
     return Drawing(
         figure,
-        case1.CONDITIONS + f". Limits: {LIMITS}, drawn where they are near.",
+        case1.conditions() + f". Limits: {LIMITS}, drawn where they are near.",
         f"The inputs keep to their limits, {limited(material, case1.SCENARIOS)}. Fuel ratio "
         "and elevator range, uncertain and nominal parameters together, with the notch "
         f"over {input_ranges(material, case1.NOTCH)}, without it over {input_ranges(material, case1.NO_NOTCH)}, by "

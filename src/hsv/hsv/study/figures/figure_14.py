@@ -18,7 +18,7 @@ def draw(material: Material) -> Drawing:
     end = measured(material, names[0], "altitude_end_error", "m")
     return Drawing(
         figure,
-        case2.CONDITIONS + ".",
+        case2.conditions() + ".",
         f"The ramp is tracked, at most {largest[0]:.0f} ft off and {end:.1f} ft at the end, through the fault.",
         "The paper says that the adjustable scheme responds faster in velocity. Along a ramp nothing of it shows: the "
         f"integral of the velocity error is {lag[0]:.0f} ft with tau = 0.8, {lag[1]:.0f} ft with tau = 1 and "

@@ -20,7 +20,7 @@ def draw(material: Material) -> Drawing:
     moved = [_moved(flight, start) for start in (20.0, 80.0)]
     return Drawing(
         figure,
-        case2.CONDITIONS + ".",
+        case2.conditions() + ".",
         f"Attitude moves by {off[0]:.2f} deg at the fault and settles.",
         f"With the whole feedback it moves less, {off[1]:.2f} deg, as with the baseline, {off[2]:.2f} deg: this is "
         f"what tau = 0.8 costs. As the ramp begins and ends attitude moves too, by {moved[0]:.2f} deg and "

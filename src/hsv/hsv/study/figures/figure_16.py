@@ -16,7 +16,7 @@ def draw(material: Material) -> Drawing:
     nominal = [measured(material, name, "elastic_decay_time", "s") for name in (case2.ADJUSTABLE[1], case2.WHOLE[1])]
     return Drawing(
         figure,
-        case2.CONDITIONS.replace("; thin: nominal parameters", "") + ". Middle column: nominal parameters.",
+        case2.conditions("middle column") + ".",
         f"The coordinates vibrate at the fault and are at rest after {decay[0]:.1f} s (both rates within 5 % of "
         "their peak).",
         f"So they are with tau = 1 ({decay[1]:.1f} s) and with the baseline ({decay[2]:.1f} s): all three fly the "

@@ -16,7 +16,7 @@ def draw(material: Material) -> Drawing:
     peaks = [_answer(material, name) for name in (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])]
     return Drawing(
         figure,
-        case2.CONDITIONS + f". Limits: {LIMITS}, beyond what is drawn.",
+        case2.conditions() + f". Limits: {LIMITS}, beyond what is drawn.",
         f"The inputs stay within a reasonable range, {limited(material, case2.SCENARIOS)}. Fuel ratio "
         "and elevator range, uncertain and nominal parameters together, "
         f"with tau = 0.8 over {input_ranges(material, case2.ADJUSTABLE)}, with tau = 1 over "

@@ -40,7 +40,7 @@ def input_ranges(material: Material, scenarios: Sequence[str]) -> str:
 def limited(material: Material, scenarios: Sequence[str]) -> str:
     """Return in how many steps of several flights a command was limited, in words."""
     steps = sum(int(np.any(material.flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
-    return f"{steps or 'no'} step{'' if steps == 1 else 's'} of the {len(scenarios)} flights limited"
+    return f"limited in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
 
 
 def peak_in_words(fall: PeakFall) -> str:
