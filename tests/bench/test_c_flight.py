@@ -5,7 +5,7 @@ from flights import components
 
 from hsv.bench.c_flight import FLAGS, CFlight, largest_difference
 from hsv.errors import RunError
-from hsv.simulation.closed_loop import fly
+from hsv.simulation.closed_loop import History, fly
 
 TOLERANCE = 1e-12
 """Relative; zero where the C library's functions and those of the compiled loop are the same."""
@@ -42,6 +42,17 @@ def test_another_flight_is_seen():
     parts, other = components(duration=110.0), components(duration=110.0, fault__values=[0.9000001])
     assert largest_difference(fly(parts).history, CFlight(other).fly()) > 1e-9
     assert largest_difference(fly(parts).history, CFlight(components(duration=100.0)).fly()) == float("inf")
+
+
+def test_what_is_no_number_or_another_zero_is_a_difference():
+    zeros, others = History.empty(2), History.empty(2)
+    for column in (*zeros, *others):
+        column[:] = 0.0
+    assert largest_difference(zeros, others) == 0.0
+    others.state[1, 3] = -0.0
+    assert 0.0 < largest_difference(zeros, others) < 1e-300
+    others.state[1, 3] = float("nan")
+    assert largest_difference(zeros, others) == float("inf")
 
 
 @needs_compiler

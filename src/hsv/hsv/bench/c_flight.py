@@ -166,11 +166,20 @@ def _compiled(folder: Path, flags: Sequence[str]) -> Path:
 
 
 def largest_difference(a: History, b: History) -> float:
-    """Return the largest |a - b| / max(1, |a|, |b|) over two histories, 0 where all bits agree; infinity by length."""
+    """Return the largest |a - b| / max(1, |a|, |b|) over two histories, 0 where all bits agree.
+
+    Infinity where they differ in length, or one has a number where the other has none.
+    """
     largest = 0.0
     for x, y in zip(a, b, strict=True):
         if x.shape != y.shape:
             return float("inf")
+        if x.tobytes() == y.tobytes():
+            continue
         scale = np.maximum(1.0, np.maximum(np.abs(x), np.abs(y)))
-        largest = max(largest, float(np.max(np.abs(x - y) / scale)))
+        difference = np.abs(x - y) / scale
+        # Zeros of either sign differ, too.
+        largest = max(
+            largest, np.nextafter(0.0, 1.0), float(np.max(np.where(np.isnan(difference), np.inf, difference)))
+        )
     return largest

@@ -12,7 +12,6 @@ from hsv.errors import RunError
 from hsv.graph.description import COMPOSED
 from hsv.graph.launcher import Launcher
 from hsv.graph.preparation import prepare
-from hsv.simulation.scenario import load_scenario, scenario_text
 
 _PERIOD = 0.02
 
@@ -25,12 +24,10 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
     """
     times: dict[int, float] = {}
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
-        path = Path(folder, "case1.toml")
-        whole = load_scenario("case1").duration
-        path.write_text(scenario_text("case1").replace(f'duration = "{whole:g} s"', f'duration = "{duration:g} s"'))
-        prepared = prepare(str(path), bag=Path(folder, "bag"))
+        prepared = prepare("case1", bag=Path(folder, "bag"))
         nodes = (COMPOSED,) if composed else prepared.nodes
         arguments = [word for file in prepared.parameter_files for word in ("--params-file", str(file))]
+        arguments += ["-p", f"duration:={float(duration)}"]
 
         def on_step(step: int) -> None:
             times[step] = time.perf_counter()
