@@ -7,9 +7,9 @@ import pytest
 from hsv.cli.claims import _as_json
 from hsv.study.claims import modelling
 from hsv.study.claims.catalogue import GROUPS
-from hsv.study.claims.claim import Finding, Judged, Reading, Verdict
+from hsv.study.claims.claim import Finding, Judged, Reading, Verdict, shown
 from hsv.study.claims.evidence import Evidence, nominal, worst
-from hsv.study.claims.page import condition, page, shown
+from hsv.study.claims.page import page
 from hsv.study.claims.ranking import METRICS, Rank
 
 CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
@@ -47,10 +47,11 @@ def test_the_verdict_follows_from_the_readings():
 def test_numbers_are_shown_in_the_paper_s_units():
     assert shown(0.3048, "m") == "1 ft"
     assert shown(math.pi / 360.0, "rad") == "0.5 deg"
-    assert shown(math.inf, "s") == "unbounded"
+    assert shown(math.inf, "s") == "not by the end"
+    assert shown(math.inf, "1") == "unbounded"
     assert shown(math.nan, "s") == "not defined"
-    assert condition(Reading("x", 0.0, "rad", at_most=math.pi / 360.0)) == "at most 0.5 deg"
-    assert condition(Reading("x", 0.0, "dB", at_least=20.0)) == "at least 20 dB"
+    assert Reading("x", 0.0, "rad", at_most=math.pi / 360.0).threshold == "at most 0.5 deg"
+    assert Reading("x", 0.0, "dB", at_least=20.0).threshold == "at least 20 dB"
 
 
 def test_a_lost_flight_has_no_worst_value():

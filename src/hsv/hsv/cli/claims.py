@@ -13,16 +13,19 @@ from hsv.cli.targets import check_folder, check_target
 
 if TYPE_CHECKING:
     from hsv.study.claims.claim import Judged
+    from hsv.study.claims.ranking import Rank
 
 
 def claims(
     out: Annotated[Path | None, typer.Option(help="Also write the page of all claims here, in Markdown.")] = None,
     flights: FlightsOption = Path("bags/study"),
+    verbose: Annotated[bool, typer.Option("--verbose", help="Print quotes, readings and reasons, too.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Measure every checkable statement of the paper, nominal and at all corners of the parameters, and judge it.
 
-    The first time takes some minutes: eight scenarios are flown by 1025 vehicles each. What was flown is kept.
+    The first time takes some minutes: a dozen scenarios and more are flown by 1025 vehicles each. What was flown is
+    kept.
 
     Example: hsv claims --out docs/claims.md
     """
@@ -48,8 +51,9 @@ def claims(
                 "ranking": {metric: {name: vars(rank) for name, rank in row.items()} for metric, row in ranks.items()},
             }
         )
-    else:
-        _print(judged)
+        return
+    _print_claims(judged, verbose)
+    _print_ranking(ranks)
 
 
 def _as_json(group: str, entry: Judged) -> dict[str, Any]:
@@ -64,21 +68,76 @@ def _as_json(group: str, entry: Judged) -> dict[str, Any]:
     }
 
 
-def _print(judged: dict[str, list[Judged]]) -> None:
+def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
+    from rich.markup import escape
+    from rich.padding import Padding
     from rich.table import Table
 
-    from hsv.study.claims.page import condition, shown
+    from hsv.study.claims.page import tally
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("claim", "where", "reading", "measured", "threshold", "verdict"):
-        table.add_column(heading, justify="right" if heading == "measured" else "left")
-    for entries in judged.values():
+    for group, entries in judged.items():
+        console.print(f"[bold]{group}[/]")
+        if verbose:
+            for entry in entries:
+                console.print(f"  [bold]{escape(entry.claim.name)}[/] ({entry.claim.location}): {_verdict(entry)}")
+                console.print(Padding(f'"{escape(entry.claim.quote)}"', (0, 0, 0, 4)))
+                for number, reading in enumerate(entry.finding.readings):
+                    mark = "*" if number < entry.finding.leading else " "
+                    said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}: {reading.measured}"
+                    console.print(Padding(escape(f"{said} ({reading.threshold})"), (0, 0, 0, 4)))
+                console.print(Padding(escape(entry.finding.why), (0, 0, 1, 4)))
+            continue
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for width in (_NAME, _LOCATION, None):
+            table.add_column(width=width, no_wrap=True)
         for entry in entries:
-            cells = [entry.claim.name, entry.claim.location]
-            verdict = f"[bold]{entry.finding.verdict}[/]"
-            for reading in entry.finding.readings:
-                style = "" if reading.holds else "[red]"
-                measured = f"{style}{shown(reading.value, reading.unit)}"
-                table.add_row(*cells, reading.what, measured, condition(reading), verdict)
-                cells, verdict = ["", ""], ""
+            table.add_row(escape(entry.claim.name), _shorter(entry.claim.location), _verdict(entry))
+        console.print(table)
+    if verbose:
+        console.print("* the statement itself; the others ask for the same under further conditions")
+    console.print(f"[bold]{tally(judged)}[/]\n")
+
+
+_NAME, _LOCATION = 43, 12
+"""Columns of the names and locations: with the longest verdict less than the 80 of a terminal."""
+
+
+def _shorter(location: str) -> str:
+    return location.rpartition(", ")[2].replace("Figures", "Fig.").replace("Figure", "Fig.").replace(" and ", ", ")
+
+
+def _verdict(entry: Judged) -> str:
+    from hsv.study.claims.claim import Verdict
+
+    colours = {Verdict.HOLDS: "green", Verdict.CONDITIONS: "yellow", Verdict.FAILS: "red"}
+    return f"[{colours[entry.finding.verdict]}]{entry.finding.verdict}[/]"
+
+
+def _print_ranking(ranks: dict[str, dict[str, Rank]]) -> None:
+    from rich.table import Table
+
+    from hsv.study.claims.page import mean_places
+    from hsv.study.claims.ranking import METRICS
+    from hsv.units import to_paper
+
+    places = mean_places(ranks)
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("Case 1, smaller is better", width=31)
+    table.add_column("", no_wrap=True)
+    for name in places:
+        table.add_column(name, justify="right", min_width=8)
+    for metric, row in ranks.items():
+        what, unit = METRICS[metric]
+        said = f"{what}, {to_paper(0.0, unit)[1]}".removesuffix(", 1")
+        table.add_row(said, "nominal\nworst", *("\n".join(_ranked(rank, unit)) for rank in row.values()))
+    table.add_row("mean place", "nominal\nworst", *("\n".join(f"{p:.1f}" for p in pair) for pair in places.values()))
     console.print(table)
+
+
+def _ranked(rank: Rank, unit: str) -> list[str]:
+    """Return both numbers of a rank in the paper's unit, bold where it is the best."""
+    from hsv.units import to_paper
+
+    both = ((rank.nominal, rank.nominal_place), (rank.worst, rank.worst_place))
+    numbers = [(f"{to_paper(value, unit)[0]:.3g}", place) for value, place in both]
+    return [f"[bold]{number}[/]" if place == 1 else number for number, place in numbers]

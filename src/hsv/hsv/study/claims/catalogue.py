@@ -1,10 +1,21 @@
-"""All claims, in the order of the paper, and judging them."""
+"""All claims, by part of the paper and topic, and judging them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from hsv.study.claims import adjustable, controller, modelling, notch, simulation
+from hsv.study.claims import (
+    adjustable,
+    attitude,
+    case2,
+    codesign,
+    controller,
+    elastic,
+    inputs,
+    modelling,
+    notch,
+    tracking,
+)
 from hsv.study.claims.claim import Claim, Judged
 from hsv.study.claims.evidence import Evidence
 
@@ -12,8 +23,9 @@ GROUPS: dict[str, tuple[Claim, ...]] = {
     "Polytopic model and disturbances": modelling.CLAIMS,
     "Baseline controller": controller.CLAIMS,
     "Notch filter": notch.CLAIMS,
-    "Case 1": simulation.CLAIMS,
-    "Adjustable controller and Case 2": adjustable.CLAIMS,
+    "Case 1": (*tracking.CLAIMS, *attitude.CLAIMS, *elastic.CLAIMS, *inputs.CASE_1),
+    "Adjustable controller": (*codesign.CLAIMS, *adjustable.CLAIMS),
+    "Case 2": (*case2.CLAIMS, *inputs.CASE_2),
 }
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING
+
+from hsv.units import to_paper
 
 if TYPE_CHECKING:
     from hsv.study.claims.evidence import Evidence
@@ -19,6 +22,14 @@ class Verdict(StrEnum):
     FAILS = "does not hold"
 
 
+def shown(value: float, unit: str) -> str:
+    """Return a number (SI) in the paper's unit, with the unit; a time that is infinite lies beyond the flight."""
+    if not math.isfinite(value):
+        return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
+    number, name = to_paper(value, unit)
+    return f"{number:.4g}" + ("" if name == "1" else f" {name}")
+
+
 @dataclass(frozen=True)
 class Reading:
     """One way to read a claim: a number (SI) that is to be at most, or at least, a threshold."""
@@ -28,6 +39,19 @@ class Reading:
     unit: str
     at_most: float | None = None
     at_least: float | None = None
+
+    @property
+    def measured(self) -> str:
+        """The number in the paper's unit."""
+        return shown(self.value, self.unit)
+
+    @property
+    def threshold(self) -> str:
+        """The threshold in words."""
+        if self.at_most is not None:
+            return f"at most {shown(self.at_most, self.unit)}"
+        assert self.at_least is not None
+        return f"at least {shown(self.at_least, self.unit)}"
 
     @property
     def holds(self) -> bool:

@@ -43,7 +43,7 @@ class Spread:
         at_least: float | None = None,
         first: Literal["uncertain", "nominal"] = "uncertain",
     ) -> tuple[Reading, Reading, Reading]:
-        """Return the number with uncertain parameters, nominal, and of the vehicle nearest to the threshold or beyond.
+        """Return the number with uncertain parameters, nominal, and of the vehicle least in favour of the claim.
 
         Args:
             what: Is read.
@@ -56,5 +56,6 @@ class Spread:
         one, other = ("uncertain parameters", self.uncertain), ("nominal vehicle", self.nominal)
         if first == "nominal":
             one, other = other, one
-        rows = ((f"{what}, {one[0]}", one[1]), (f"the same, {other[0]}", other[1]), ("the same, worst corner", extreme))
-        return tuple(Reading(text, value, unit, at_most, at_least) for text, value in rows)  # type: ignore[return-value]
+        rows = (one, other, ("worst corner", extreme))
+        a, b, c = (Reading(f"{what}, {vehicle}", value, unit, at_most, at_least) for vehicle, value in rows)
+        return a, b, c
