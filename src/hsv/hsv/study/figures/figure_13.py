@@ -11,9 +11,7 @@ from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import measured
 from hsv.study.figures.style import BLUE, GREEN
 from hsv.study.figures.time_histories import ELASTIC, Curve, Zoom, histories
-
-FIRST_MODE = 15.89
-"""rad/s, coupled, with the paper-like coupling."""
+from hsv.study.mode_peaks import elastic_modes
 
 WITH, WITHOUT = "case1_second_mode_notch", "case1_no_notch"
 
@@ -29,12 +27,14 @@ def draw(material: Material) -> Drawing:
         [measured(material, name, f"elastic_rate_{mode}_decay_time", "s") for name in (WITHOUT, WITH)]
         for mode in (1, 2)
     )
+    modes = elastic_modes("paper_like")
     filter_ = assemble(flight_parameters(load_scenario(WITH))).notch_filter
-    passed = abs(notch_response(filter_.sections, np.array([FIRST_MODE]))[0])
+    passed = abs(notch_response(filter_.sections, np.array([modes["first"].natural_frequency]))[0])
     return Drawing(
         figure,
-        'Nominal parameters, as we read the paper\'s "nominal system", with the fault; notch at 19.47 rad/s, the '
-        "second coupled mode.",
+        'Nominal parameters, as we read the paper\'s "nominal system", with the fault; notch at '
+        f"{filter_.sections[0].zero_frequency:g} rad/s, the second coupled mode is at "
+        f"{modes['second'].natural_frequency:.2f} rad/s.",
         f"The second rate decays in {second[1]:.1f} s instead of {second[0]:.1f} s.",
         f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, more than the slight effect the "
         f"paper sees: a filter with poles this wide passes only {100.0 * passed:.0f} % of the pitch rate at the first "

@@ -18,13 +18,16 @@ def draw(material: Material) -> Drawing:
     off = [measured(material, name, "post_fault_attitude_deviation", "rad") for name in names]
     flight = material.flights[names[0]]
     moved = [_moved(flight, start) for start in (20.0, 80.0)]
+    rates = [_rate(material.flights[name]) for name in names]
     return Drawing(
         figure,
         case2.conditions() + ".",
         f"Attitude moves by {off[0]:.2f} deg at the fault and settles.",
         f"With the whole feedback it moves less, {off[1]:.2f} deg, as with the baseline, {off[2]:.2f} deg: this is "
         f"what tau = 0.8 costs. As the ramp begins and ends attitude moves too, by {moved[0]:.2f} deg and "
-        f"{moved[1]:.2f} deg: the reference's climb sets in and ends within one step.",
+        f"{moved[1]:.2f} deg: the reference's climb sets in and ends within one step. The baseline pitches faster "
+        f"then, {rates[2]:.2f} deg/s at most, the adjustable design {rates[0]:.2f} deg/s with tau = 0.8 and "
+        f"{rates[1]:.2f} deg/s with tau = 1.",
     )
 
 
@@ -33,6 +36,12 @@ def _moved(flight: FlightData, start: float) -> float:
     window = (flight.time >= start) & (flight.time <= start + 5.0)
     attitude = flight.state[window, 2:4]
     return float(np.degrees(np.abs(attitude - attitude[0]).max()))
+
+
+def _rate(flight: FlightData) -> float:
+    """Return the largest pitch rate (deg/s) as the ramp begins and ends."""
+    ends = np.minimum(np.abs(flight.time - 22.5), np.abs(flight.time - 82.5)) <= 2.5
+    return float(np.degrees(np.abs(flight.state[ends, 4]).max()))
 
 
 FIGURE = PaperFigure(15, "States in Case 2. (a) Attack angle. (b) Pitch angle. (c) Pitch rate.", draw, case2.SCENARIOS)
