@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, errors, print_json
@@ -45,7 +46,7 @@ def bench(
     chosen = [name for name in available if not only or name in only]
     measured_on = machine()
     if warning := busy():
-        errors.print(f"[yellow]{warning}[/]", soft_wrap=True)
+        errors.print(warning, style="yellow", soft_wrap=True)
     figures: list[Figure] = []
     skipped: dict[str, str] = {}
     with stages() as progress:
@@ -65,7 +66,7 @@ def bench(
     else:
         _print(figures)
         for name, reason in skipped.items():
-            errors.print(f"{name}: not measured: {reason}", markup=False, soft_wrap=True)
+            errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
     if page:
         page.write(measured_on, figures, skipped)
 
@@ -98,6 +99,5 @@ def _print(figures: list[Figure]) -> None:
         table.add_column(heading, justify="left" if heading in ("what", "against", "promise") else "right")
     for figure in figures:
         row = cells(figure)
-        style = "[bold red]" if "WORSE" in row[-1] else ""
-        table.add_row(*row[:-1], f"{style}{row[-1]}")
+        table.add_row(*row[:-1], Text(row[-1], "bold red" if "WORSE" in row[-1] else ""))
     console.print(table)

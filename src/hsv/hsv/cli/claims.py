@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from hsv.cli.options import FlightsOption, JsonOption
 from hsv.cli.output import console, print_json
@@ -69,33 +70,33 @@ def _as_json(group: str, entry: Judged) -> dict[str, Any]:
 
 
 def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
-    from rich.markup import escape
     from rich.padding import Padding
     from rich.table import Table
 
     from hsv.study.claims.page import tally
 
     for group, entries in judged.items():
-        console.print(f"[bold]{group}[/]")
+        console.print(group, style="bold")
         if verbose:
             for entry in entries:
-                console.print(f"  [bold]{escape(entry.claim.name)}[/] ({entry.claim.location}): {_verdict(entry)}")
-                console.print(Padding(f'"{escape(entry.claim.quote)}"', (0, 0, 0, 4)))
+                name, where = (f"  {entry.claim.name}", "bold"), f" ({entry.claim.location}): "
+                console.print(Text.assemble(name, where, _verdict(entry)))
+                console.print(Padding(f'"{entry.claim.quote}"', (0, 0, 0, 4)))
                 for number, reading in enumerate(entry.finding.readings):
                     mark = "*" if number < entry.finding.leading else " "
                     said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}: {reading.measured}"
-                    console.print(Padding(escape(f"{said} ({reading.threshold})"), (0, 0, 0, 4)))
-                console.print(Padding(escape(entry.finding.why), (0, 0, 1, 4)))
+                    console.print(Padding(f"{said} ({reading.threshold})", (0, 0, 0, 4)))
+                console.print(Padding(entry.finding.why, (0, 0, 1, 4)))
             continue
         table = Table(box=None, pad_edge=False, show_header=False)
         for width in (_NAME, _LOCATION, None):
             table.add_column(width=width, no_wrap=True)
         for entry in entries:
-            table.add_row(escape(entry.claim.name), _shorter(entry.claim.location), _verdict(entry))
+            table.add_row(entry.claim.name, _shorter(entry.claim.location), _verdict(entry))
         console.print(table)
     if verbose:
         console.print("* the statement itself; the others ask for the same under further conditions")
-    console.print(f"[bold]{tally(judged)}[/]\n")
+    console.print(f"{tally(judged)}\n", style="bold")
 
 
 _NAME, _LOCATION = 43, 12
@@ -106,11 +107,11 @@ def _shorter(location: str) -> str:
     return location.rpartition(", ")[2].replace("Figures", "Fig.").replace("Figure", "Fig.").replace(" and ", ", ")
 
 
-def _verdict(entry: Judged) -> str:
+def _verdict(entry: Judged) -> Text:
     from hsv.study.claims.claim import Verdict
 
     colours = {Verdict.HOLDS: "green", Verdict.CONDITIONS: "yellow", Verdict.FAILS: "red"}
-    return f"[{colours[entry.finding.verdict]}]{entry.finding.verdict}[/]"
+    return Text(str(entry.finding.verdict), colours[entry.finding.verdict])
 
 
 def _print_ranking(ranks: dict[str, dict[str, Rank]]) -> None:
@@ -129,15 +130,15 @@ def _print_ranking(ranks: dict[str, dict[str, Rank]]) -> None:
     for metric, row in ranks.items():
         what, unit = METRICS[metric]
         said = f"{what}, {to_paper(0.0, unit)[1]}".removesuffix(", 1")
-        table.add_row(said, "nominal\nworst", *("\n".join(_ranked(rank, unit)) for rank in row.values()))
+        table.add_row(said, "nominal\nworst", *(Text("\n").join(_ranked(rank, unit)) for rank in row.values()))
     table.add_row("mean place", "nominal\nworst", *("\n".join(f"{p:.1f}" for p in pair) for pair in places.values()))
     console.print(table)
 
 
-def _ranked(rank: Rank, unit: str) -> list[str]:
+def _ranked(rank: Rank, unit: str) -> list[Text]:
     """Return both numbers of a rank in the paper's unit, bold where it is the best."""
     from hsv.units import to_paper
 
     both = ((rank.nominal, rank.nominal_place), (rank.worst, rank.worst_place))
     numbers = [(f"{to_paper(value, unit)[0]:.3g}", place) for value, place in both]
-    return [f"[bold]{number}[/]" if place == 1 else number for number, place in numbers]
+    return [Text(number, "bold" if place == 1 else "") for number, place in numbers]

@@ -66,7 +66,7 @@ def design(
         console.print(_table(rows))
         for row in rows:
             if row.note:
-                console.print(f"{row.name}: {row.note}", markup=False)
+                console.print(f"{row.name}: {row.note}")
 
 
 def _factors(text: str) -> list[float]:

@@ -65,7 +65,7 @@ def _print(description: dict[str, Any]) -> None:
         "tube": _tube(description["tube"]),
     }
     for key, value in heading.items():
-        console.print(f"{key:12} {value}", soft_wrap=True, markup=False)
+        console.print(f"{key:12} {value}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for column in ("topic", "type", "messages", "rate Hz"):
         table.add_column(column, justify="right" if column in ("messages", "rate Hz") else "left")

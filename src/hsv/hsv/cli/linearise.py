@@ -91,7 +91,7 @@ def linearise(
     from rich.table import Table
 
     # Nine columns need more room than some terminals have: a wrapped line is better than a cut number.
-    wide = Console(highlight=False, width=max(console.width, 130))
+    wide = Console(highlight=False, markup=False, width=max(console.width, 130))
     for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
         title = f"{name} ({UNIT_SYSTEMS[units]})"
         table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")

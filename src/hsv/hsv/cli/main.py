@@ -16,7 +16,7 @@ from hsv.cli.figures import figures
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.montecarlo import montecarlo
-from hsv.cli.output import errors
+from hsv.cli.output import report_error
 from hsv.cli.play import play
 from hsv.cli.plot import plot
 from hsv.cli.recover import recover
@@ -92,7 +92,7 @@ def _usage(error: Any) -> str:
 
 
 def _fail(problem: object, code: int) -> None:
-    errors.print(f"[bold red]hsv: error:[/] {str(problem).replace('[', chr(92) + '[')}", soft_wrap=True)
+    report_error(problem)
     sys.exit(code)
 
 

@@ -181,7 +181,7 @@ def replay(
         if repeated.bag:
             console.print(f"bag     {repeated.bag}", soft_wrap=True)
         if not differing:
-            console.print("[green]identical to the campaign's flight in every bit[/]")
+            console.print("identical to the campaign's flight in every bit", style="green")
     if differing:
         name = differing[0]
         raise RunError(

@@ -11,13 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from hsv.units import to_paper
 
-console = Console(highlight=False)
-errors = Console(stderr=True, highlight=False)
+# Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
+console = Console(highlight=False, markup=False, emoji=False)
+errors = Console(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 class Units(StrEnum):
@@ -73,7 +74,17 @@ def to_json(quantities: Mapping[str, Quantity], units: Units) -> dict[str, float
 
 def warn(text: str) -> None:
     """Print a warning on one line of standard error."""
-    errors.print(f"[bold yellow]hsv: warning:[/] {escape(text)}", soft_wrap=True)
+    errors.print(Text.assemble(("hsv: warning:", "bold yellow"), f" {text}"), soft_wrap=True)
+
+
+def report_error(problem: object) -> None:
+    """Print an error on standard error, a single line if ``problem`` is one."""
+    errors.print(Text.assemble(("hsv: error:", "bold red"), f" {problem}"), soft_wrap=True)
+
+
+def report_line(node: str, text: str) -> None:
+    """Print on standard error what a node said."""
+    errors.print(Text.assemble((f"{node}:", "dim"), f" {text}"), soft_wrap=True)
 
 
 def print_written(paths: Sequence[Path], as_json: bool) -> None:
@@ -82,7 +93,7 @@ def print_written(paths: Sequence[Path], as_json: bool) -> None:
         print_json({"written": [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths]})
         return
     for path in paths:
-        console.print(f"written {path}", soft_wrap=True, markup=False)
+        console.print(f"written {path}", soft_wrap=True)
 
 
 def print_json(values: Mapping[str, Any]) -> None:

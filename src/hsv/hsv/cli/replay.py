@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
@@ -83,12 +84,12 @@ def _print(result: ProcessComparison) -> None:
     padding = sum(topic.different_padding for topic in result.topics)
     if result.identical:
         remark = f" but the padding of {padding}" if padding else ""
-        console.print(f"{line}[green]identical in every byte{remark}[/]", soft_wrap=True)
+        console.print(Text.assemble(line, (f"identical in every byte{remark}", "green")), soft_wrap=True)
         return
     different = sum(topic.different_bytes for topic in result.topics) - padding
     if not result.passed:
         first = min((t.first for t in result.topics if t.first), key=lambda d: d.step)
-        console.print(f"{line}[bold red]differ[/]", f"{first}", soft_wrap=True, markup=True)
+        console.print(Text.assemble(line, ("differ", "bold red"), f" {first}"), soft_wrap=True)
         return
     largest = [(value, t.topic, name) for t in result.topics for name, value in t.largest.items()]
     if largest:

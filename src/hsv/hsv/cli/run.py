@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
-from hsv.cli.output import Units, errors
+from hsv.cli.output import Units, report_line
 
 
 def run(
@@ -49,7 +49,7 @@ def run(
 
     def line(node: str, text: str) -> None:
         if verbose or " [WARN] " in text:
-            errors.print(f"[dim]{node}:[/] {text}", markup=True, soft_wrap=True)
+            report_line(node, text)
 
     with flight_bar(loaded.name, loaded.duration, prepared.steps) as show:
 

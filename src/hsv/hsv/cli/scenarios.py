@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from rich.text import Text
+
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, print_json
 
@@ -19,4 +21,4 @@ def scenarios(json: JsonOption = False) -> None:
         return
     width = max(map(len, titles))
     for name, title in titles.items():
-        console.print(f"[bold]{name:{width}}[/]  {title}")
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))

@@ -46,5 +46,5 @@ def study(
         print_json({"study": name, "findings": list(outcome.findings), "strips": outcome.strips})
         return
     for finding in outcome.findings:
-        console.print(f"- {finding}", soft_wrap=True, markup=False)
+        console.print(f"- {finding}", soft_wrap=True)
     console.print(f"written {', '.join(map(str, (*written, target)))}", soft_wrap=True)

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, errors, print_json
+from hsv.cli.output import console, print_json, report_error
 
 if TYPE_CHECKING:
     from hsv.design.verification.claims import Claim
@@ -53,7 +53,7 @@ def verify(
         console.print(_table(claims))
     if failing:
         part, claim = failing[0]
-        errors.print(f"[bold red]hsv: error:[/] {escape(f'{part}: claim fails: {claim}')}", soft_wrap=True)
+        report_error(f"{part}: claim fails: {claim}")
         raise typer.Exit(1)
 
 
@@ -64,10 +64,10 @@ def _table(claims: dict[str, list[Claim]]) -> Table:
     for part, made in claims.items():
         if not made:
             continue
-        table.add_row("", f"[bold]{escape(part)}[/]", "", "")
+        table.add_row("", Text(part, "bold"), "", "")
         for claim in made:
-            cells = (escape(text) for text in (f"  {claim.name}", claim.shown, claim.expected))
-            table.add_row("ok" if claim.ok else "FAIL", *cells, style=None if claim.ok else "bold red")
+            cells = ("ok" if claim.ok else "FAIL", f"  {claim.name}", claim.shown, claim.expected)
+            table.add_row(*cells, style=None if claim.ok else "bold red")
     total, held = sum(len(made) for made in claims.values()), sum(c.ok for made in claims.values() for c in made)
-    table.add_row("", f"[bold]{held} of {total} claims hold[/]", "", "")
+    table.add_row("", Text(f"{held} of {total} claims hold", "bold"), "", "")
     return table

@@ -1,0 +1,59 @@
+"""What a user or a node wrote is printed as it stands, whatever it looks like to the library that prints it."""
+
+from __future__ import annotations
+
+import io
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flown_bags import flown_bag
+from rich.console import Console
+
+from hsv.cli import output
+from hsv.cli.progress import flight, stages
+from hsv.recording.metadata import FILE_NAME
+
+NAME = "run[old] [/x] :bug:"
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown_bag(tmp_path_factory.mktemp("bags") / "flown", duration=11.0, fault=1.0)
+
+
+def test_paths_are_printed_as_they_are(hsv: Callable[..., Any], bag: Path, tmp_path: Path) -> None:
+    path = shutil.copytree(bag, tmp_path / NAME.replace("/", "_"))
+    (path / FILE_NAME).unlink()
+    for command in ("recover", "info"):
+        ran = hsv(command, str(path))
+        assert ran.code == 0 and str(path) in ran.out
+    assert str(path) in hsv("plot", str(path), "--out", str(path / "x.png")).out
+    data = path / "flown_0.mcap"
+    data.write_bytes(data.read_bytes()[: data.stat().st_size // 2])
+    assert str(data) in hsv("info", str(data)).err, "the warning"
+    assert str(data) in hsv("diff", str(data), str(data), "--tolerance", "0").err
+    assert f"'{NAME}'" in hsv("replay", str(bag), "--node", NAME).error
+
+
+def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
+    output.report_line("plant", f"[WARN] {NAME}")
+    output.report_error(NAME)
+    output.warn(NAME)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"plant: [WARN] {NAME}", f"hsv: error: {NAME}", f"hsv: warning: {NAME}"]
+    output.print_table(NAME, {"altitude": (1.0, "m")}, output.Units.si, {"altitude": NAME})
+    title, _, row = capsys.readouterr().out.splitlines()
+    assert title.strip() == NAME and row.strip().endswith(NAME)
+
+
+def test_a_bar_shows_the_name_of_a_scenario_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    written = io.StringIO()
+    monkeypatch.setattr("hsv.cli.progress.errors", Console(file=written, force_terminal=True, width=200))
+    with flight(NAME, 10.0, 100) as report:
+        report(50)
+    with stages() as progress:
+        progress(NAME, 1, 2)
+    assert written.getvalue().count("run[old] [/x]") >= 2
