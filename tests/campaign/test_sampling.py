@@ -1,10 +1,19 @@
+import hashlib
+import time
+
 import numpy as np
 import pytest
 from scipy.stats import qmc
 
-from hsv.campaign.sampling import draw
+from hsv.campaign.campaign import METHODS, plan
+from hsv.campaign.sampling import Sampler
 from hsv.errors import CampaignError
 from hsv.vehicle.parameters import uncertainty_bounds
+
+
+def draw(campaign):
+    return Sampler(campaign).draw(range(campaign.samples))
+
 
 BOUNDS = np.array(list(uncertainty_bounds().values()))
 
@@ -23,6 +32,39 @@ def test_a_uniform_flight_can_be_drawn_alone_from_its_own_seed(planned):
     assert len(set(seeds.tolist())) == 50
     unit = np.random.default_rng(int(seeds[17])).random(samples.shape[1])
     assert samples[17, :10] == pytest.approx(BOUNDS * (2.0 * unit[:10] - 1.0), rel=1e-13)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_any_flights_can_be_drawn_without_the_others(planned, method):
+    campaign = planned(samples=128, method=method)
+    samples, seeds = draw(campaign)
+    for flights in (range(32), range(32, 64), range(127, 128), range(1)):
+        some, their_seeds = Sampler(campaign).draw(flights)
+        assert np.array_equal(some, samples[flights.start : flights.stop])
+        assert np.array_equal(their_seeds, seeds[flights.start : flights.stop])
+
+
+DIGESTS = {
+    "uniform": ("07a157195c30bbbc", "83b65801f8d96725"),
+    "latin_hypercube": ("984ce635f7c625f2", "750ee73c39f9f5d2"),
+    "sobol": ("781056944ef0930f", "750ee73c39f9f5d2"),
+    "corners": ("5a92d3fee8f74b06", "2594ed37723f8d48"),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_samples_stay_what_they_were_in_every_bit(method):
+    # A campaign begun with an earlier version, and the replay of one of its flights, draw the same.
+    campaign = plan("case1", method=method, samples=64, seed=7, fault_start=(90.0, 110.0))
+    drawn = tuple(hashlib.sha256(array.tobytes()).hexdigest()[:16] for array in draw(campaign))
+    assert drawn == DIGESTS[method]
+
+
+def test_the_largest_campaign_starts_at_once(planned):
+    campaign = planned(samples=10**7)
+    started = time.perf_counter()
+    Sampler(campaign).draw(campaign.flights(campaign.batches - 1))
+    assert time.perf_counter() - started < 2.0
 
 
 @pytest.mark.parametrize("method", ["uniform", "latin_hypercube", "sobol"])
@@ -51,6 +93,8 @@ def test_latin_hypercube_and_sobol_spread_more_evenly_than_chance(planned):
     ("settings", "field"),
     [
         ({"samples": 0}, "samples"),
+        ({"samples": 10**7 + 1}, "samples"),
+        ({"samples": 10**6 + 1, "method": "latin_hypercube"}, "samples"),
         ({"samples": 100, "method": "sobol"}, "samples"),
         ({"seed": -1}, "seed"),
         ({"method": "grid"}, "method"),

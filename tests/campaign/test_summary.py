@@ -65,7 +65,7 @@ def test_envelopes_hold_every_flight(results, planned):
     from hsv.campaign.pilot import Pilot
 
     pilot, envelope = Pilot(planned()), results.envelope
-    curves = [signals(pilot.fly(sample).data()) for sample in pilot.samples]
+    curves = [signals(pilot.fly(sample).data()) for sample in pilot.sampler.draw(range(44))[0]]
     assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=0) for c in curves], axis=0))
     assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=0) for c in curves], axis=0))
     assert np.all(envelope.count[:151] == len(curves))

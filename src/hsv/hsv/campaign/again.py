@@ -41,7 +41,7 @@ def in_process(results: Results, flight: int) -> Repetition:
         CampaignError: No such flight.
     """
     row, pilot = _row(results, flight), Pilot(results.campaign)
-    data = pilot.fly(pilot.samples[flight]).data()
+    data = pilot.fly(pilot.sample(flight)).data()
     return Repetition(flight, _outcome(row), pilot.outcome(data))
 
 
@@ -73,7 +73,7 @@ def over_dds(
         )
     with TemporaryDirectory(prefix="hsv_campaign_") as folder:
         path = Path(folder, f"{scenario.name}_flight_{flight}.toml")
-        path.write_text(scenario_toml(scenario, results.campaign.factors, pilot.samples[flight]), encoding="utf-8")
+        path.write_text(scenario_toml(scenario, results.campaign.factors, pilot.sample(flight)), encoding="utf-8")
         prepared = prepare(str(path), bag=bag)
     fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)

@@ -19,6 +19,9 @@ METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 _BATCHES = 256
 _BATCH_LIMITS = (32, 256)
 
+_MOST = {"latin_hypercube": 10**6}
+"""Samples at most, where fewer than by the other methods: each worker has to draw and keep a hypercube whole."""
+
 
 @dataclass(frozen=True)
 class Campaign:
@@ -119,8 +122,9 @@ def plan(
         raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
     if method == "corners":
         samples = 2 ** len(factors)
-    if not 1 <= samples <= 10**8:
-        raise CampaignError(f"samples = {samples}: expected 1 to 100000000")
+    most = _MOST.get(method, 10**7)
+    if not 1 <= samples <= most:
+        raise CampaignError(f"samples = {samples}: expected 1 to {most}")
     if method == "sobol" and samples & (samples - 1):
         raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
     if not 0 <= seed < 2**63:

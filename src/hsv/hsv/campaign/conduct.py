@@ -68,7 +68,7 @@ def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
     own = pilot(campaign.text)
     own.outcome(own.fly_unchanged().data())
     started = time.perf_counter()
-    own.outcome(own.fly(own.samples[0]).data())
+    own.outcome(own.fly(own.sample(0)).data())
     seconds = time.perf_counter() - started
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
     rows = flights * 8 * len(schema(campaign))

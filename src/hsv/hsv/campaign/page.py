@@ -125,7 +125,7 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
     windows = window_starts(pilot.steps)
     reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
     time = windows[reached] * pilot.period
-    flights = {"unchanged": pilot.fly_unchanged(), f"flight {worst}": pilot.fly(pilot.samples[worst])}
+    flights = {"unchanged": pilot.fly_unchanged(), f"flight {worst}": pilot.fly(pilot.sample(worst))}
     return {
         "time": _packed(time),
         "signals": [

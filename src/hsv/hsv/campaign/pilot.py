@@ -8,7 +8,7 @@ from functools import lru_cache
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.factors import flown_scenario
-from hsv.campaign.sampling import draw
+from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.faults.actuator import FaultInjector
@@ -26,8 +26,7 @@ class Pilot:
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
-        self.samples, self.seeds = draw(campaign)
-        """(flights, factors) and (flights)."""
+        self.sampler = Sampler(campaign)
         self.scenario = campaign.scenario
         self._nominal = campaign.parameters
         self._parts = assemble(self._nominal)
@@ -36,6 +35,11 @@ class Pilot:
         """Control period, s."""
         self.steps = self._parts.plant.steps
         """Control periods of a flight that does not end early."""
+
+    def sample(self, flight: int) -> list[float]:
+        """Return the sample of a flight (one value a factor, SI)."""
+        [sample], _ = self.sampler.draw(range(flight, flight + 1))
+        return list(sample.tolist())
 
     def fly(self, sample: Sequence[float]) -> Flight:
         """Fly a sample (one value a factor, SI)."""

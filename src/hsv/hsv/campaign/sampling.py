@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+from functools import cached_property
 
 import numpy as np
 
@@ -10,29 +10,47 @@ from hsv.campaign.campaign import Campaign
 from hsv.units import rounded
 
 
-def draw(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
-    """Return the samples (flights, factors), SI, and the seed (flights) that each was drawn from.
+class Sampler:
+    """Draws the flights of a campaign, any of them at any time: nobody has to draw a large campaign whole."""
 
-    Uniform samples have a seed each, so that any can be drawn alone; the other methods draw all from the campaign's.
-    """
-    unit, seeds = _unit_samples(campaign)
-    low = np.array([factor.low for factor in campaign.factors])
-    high = np.array([factor.high for factor in campaign.factors])
-    values = np.where(unit == 1.0, high, low + (high - low) * unit)
-    # As many digits as a scenario file keeps: a flight is then the same whichever way it is asked for.
-    return np.vectorize(rounded, otypes=[float])(values), seeds
+    def __init__(self, campaign: Campaign) -> None:
+        self._campaign = campaign
+        self._low = np.array([factor.low for factor in campaign.factors])
+        self._high = np.array([factor.high for factor in campaign.factors])
 
+    def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
+        """Return the samples (flights, factors), SI, and the seed (flights) that each was drawn from.
 
-def _unit_samples(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
-    n, d, seed = campaign.samples, len(campaign.factors), campaign.seed
-    seeds = np.full(n, seed, np.uint64)
-    if campaign.method == "corners":
-        return np.array(list(itertools.product((0.0, 1.0), repeat=d))), seeds
-    if campaign.method == "uniform":
-        for flight in range(n):
-            seeds[flight] = np.random.SeedSequence(seed, spawn_key=(flight,)).generate_state(1, np.uint64)[0]
-        return np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()]), seeds
-    from scipy.stats import qmc
+        Uniform samples have a seed each, so that any can be drawn alone; the other methods draw from the campaign's.
+        """
+        unit, seeds = self._unit_samples(flights)
+        values = np.where(unit == 1.0, self._high, self._low + (self._high - self._low) * unit)
+        # As many digits as a scenario file keeps: a flight is then the same whichever way it is asked for.
+        return np.vectorize(rounded, otypes=[float])(values), seeds
 
-    engine = qmc.LatinHypercube(d, seed=seed) if campaign.method == "latin_hypercube" else qmc.Sobol(d, seed=seed)
-    return np.asarray(engine.random(n)), seeds
+    def _unit_samples(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
+        method, seed, d = self._campaign.method, self._campaign.seed, len(self._low)
+        if method == "uniform":
+            keys = (np.random.SeedSequence(seed, spawn_key=(flight,)) for flight in flights)
+            seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], np.uint64)
+            return np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()]), seeds
+        seeds = np.full(len(flights), seed, np.uint64)
+        if method == "latin_hypercube":
+            return self._hypercube[flights.start : flights.stop], seeds
+        if method == "sobol":
+            from scipy.stats import qmc
+
+            engine = qmc.Sobol(d, seed=seed)
+            if flights.start:
+                engine.fast_forward(flights.start)
+            return np.asarray(engine.random(len(flights))), seeds
+        # Corners: the bits of the flight's number, the first factor's in front.
+        return (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float), seeds
+
+    @cached_property
+    def _hypercube(self) -> np.ndarray:
+        """All samples: where one lies in its factor's strata is settled by a shuffle of all."""
+        from scipy.stats import qmc
+
+        engine = qmc.LatinHypercube(len(self._low), seed=self._campaign.seed)
+        return np.asarray(engine.random(self._campaign.samples))

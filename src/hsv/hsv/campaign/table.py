@@ -39,10 +39,11 @@ def fly_batch(text: str, batch: int) -> bytes:
     """Fly a batch of the campaign written in ``text``; return its rows and envelope as a Parquet file."""
     own = pilot(text)
     campaign, envelope, rows = own.campaign, Envelope.empty(), []
-    for flight in campaign.flights(batch):
-        data = own.fly(own.samples[flight]).data()
+    flights = campaign.flights(batch)
+    for flight, sample, seed in zip(flights, *own.sampler.draw(flights), strict=True):
+        data = own.fly(sample).data()
         envelope.add(data, own.steps)
-        rows.append(row(own.samples[flight], flight, int(own.seeds[flight]), campaign, own.outcome(data)))
+        rows.append(row(sample, flight, int(seed), campaign, own.outcome(data)))
     return encode(campaign, rows, envelope)
 
 
