@@ -99,8 +99,8 @@ def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
     console.print(f"{tally(judged)}\n", style="bold")
 
 
-_NAME, _LOCATION = 43, 12
-"""Columns of the names and locations: with the longest verdict less than the 80 of a terminal."""
+_NAME, _LOCATION = 43, 11
+"""Columns of the names and locations: with the longest verdict they fill the 80 of a terminal."""
 
 
 def _shorter(location: str) -> str:
@@ -123,7 +123,7 @@ def _print_ranking(ranks: dict[str, dict[str, Rank]]) -> None:
 
     places = mean_places(ranks)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("Case 1, smaller is better", width=31)
+    table.add_column("Case 1, smaller is better", width=29)
     table.add_column("", no_wrap=True)
     for name in places:
         table.add_column(name, justify="right", min_width=8)

@@ -104,9 +104,9 @@ def _further_stable(evidence: Evidence) -> Finding:
     return Finding(
         (
             Reading(f"{what}, paper-like coupling, nominal vehicle", float(like[0]), "1/s", at_most=0.0),
-            Reading("the same, worst corner", float(like.max()), "1/s", at_most=0.0),
+            Reading(f"{what}, paper-like coupling, worst corner", float(like.max()), "1/s", at_most=0.0),
             Reading(f"{what}, derived coupling, nominal vehicle", float(derived[0]), "1/s", at_most=0.0),
-            Reading("the same, worst corner", float(derived.max()), "1/s", at_most=0.0),
+            Reading(f"{what}, derived coupling, worst corner", float(derived.max()), "1/s", at_most=0.0),
         ),
         "Growth: largest real part of the loop's poles. With the derived coupling a weaker feedback feeds less "
         f"vibration back: {unstable[0]} of {evidence.vehicles} loops are unstable with tau = {tau:g}, {unstable[1]} "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -153,6 +154,7 @@ def _scaled(evidence: Evidence) -> Finding:
     )
 
 
+@lru_cache(maxsize=1)
 def _half_widths(evidence: Evidence) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the half-widths (7) of the set under F' for W, for the measured W', and for W / 2."""
     design = evidence.design(DESIGN)
