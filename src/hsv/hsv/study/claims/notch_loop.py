@@ -12,7 +12,7 @@ from hsv.design.region import fraction
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.claims.claim import Finding, Reading
-from hsv.study.claims.evidence import Evidence, nominal, worst
+from hsv.study.claims.evidence import Evidence, nominal, paper_like_share, worst
 from hsv.study.disturbances import largest_disturbances
 from hsv.study.linear_loop import TARGET, Margin, critical_coupling, phase_margins, sampled_loop, worst_growth
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
@@ -34,7 +34,7 @@ def without_notch(evidence: Evidence) -> Finding:
     """Judge stability without the notch, and by how much coupling it is there."""
     growth, derived = evidence.growth("paper_like", ()), evidence.growth("derived", ())
     flown = evidence.design("baseline").flown
-    share = vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
+    share = paper_like_share()
     critical = critical_coupling(flown.feedback_gain, (), flown.period)
     margin = float("inf") if critical is None else critical / share
     uncertain = assemble(flight_parameters(load_scenario(UNCERTAIN))).plant.vehicle
