@@ -248,12 +248,16 @@ def _check(scenario: Scenario) -> None:
 
 def _check_starts(scenario: Scenario) -> None:
     """Refuse what the flight would never come to."""
-    events = {"command": scenario.command, "tube.change": scenario.tube.change, "fault": scenario.fault}
-    for table, entries in events.items():
-        for index, entry in enumerate(entries):
-            if entry.start > 0.0 and entry.start >= scenario.duration:
+    starts = {
+        "command": [command.start for command in scenario.command],
+        "tube.change": [change.start for change in scenario.tube.change],
+        "fault": [fault.start for fault in scenario.fault],
+    }
+    for table, times in starts.items():
+        for index, start in enumerate(times):
+            if start > 0.0 and start >= scenario.duration:
                 raise ScenarioError(
-                    f"{table}[{index}].start = {entry.start:g} s: "
+                    f"{table}[{index}].start = {start:g} s: "
                     f"expected a time before the flight's end, {scenario.duration:g} s"
                 )
 
