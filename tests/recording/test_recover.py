@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -131,3 +132,30 @@ def test_missing_metadata_is_written_again(whole: Path) -> None:
     metadata.unlink()
     assert recover(file).changed
     assert metadata.read_text() == before and file.read_bytes() == data
+
+
+def test_a_bag_that_is_being_recorded_is_left_alone(kit: SimpleNamespace, tmp_path: Path) -> None:
+    path = tmp_path / "live"
+    writer = BagWriter(path, [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
+    for step in range(100):
+        writer.write("/hsv/state", step, kit.messages.stamped("hsv_msgs/msg/VehicleState", step, step))
+    before = writer.path.stat()
+    with pytest.raises(RecordingError, match="live_0.mcap: is being recorded"):
+        recover(path)
+    assert writer.path.stat() == before and list(path.iterdir()) == [writer.path]
+    writer.close()
+    assert not recover(path).changed and Bag(path).topics["/hsv/state"].count == 100
+
+
+def test_a_full_disk_leaves_the_bag_as_it_was(killed: tuple[Path, int]) -> None:
+    path, _ = killed
+    file = path / "killed_0.mcap"
+    data = file.read_bytes()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (len(data) // 2, limits[1]))
+    try:
+        with pytest.raises(RecordingError, match="killed_0.mcap: cannot be mended: File too large"):
+            recover(path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert list(path.iterdir()) == [file] and file.read_bytes() == data

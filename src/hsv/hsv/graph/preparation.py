@@ -6,7 +6,7 @@ import datetime
 import subprocess
 import tempfile
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from hsv.control.design_file import find_design, read_design_parameters
+from hsv.errors import RecordingError
 from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
@@ -42,12 +43,13 @@ def prepare(
     real_time_factor: float = 0.0,
     step_timeout: float = 10.0,
 ) -> PreparedRun:
-    """Check scenario and design and write the parameter files of a run to a temporary folder.
+    """Check scenario and design, make the bag's directory, write the parameter files of a run to a temporary folder.
 
-    Everything that can be refused is refused here, before any process starts or anything is written beside ``bags``.
+    Everything that can be refused is refused here, before any process starts or anything is written.
 
     Raises:
         ScenarioError, DesignError, ParameterError, TrimError: Names the field that is wrong.
+        RecordingError: ``bag`` exists already or cannot be made.
     """
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
@@ -55,7 +57,6 @@ def prepare(
     design = read_design_parameters(design_file)
     components = assemble({**design, **scenario.parameters()})
     now = datetime.datetime.now(datetime.UTC)
-    bag = bag or bags / f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     run_id = uuid.uuid4().hex
     temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
     folder = Path(temporary.name)
@@ -69,6 +70,8 @@ def prepare(
         files["certificate.json"] = certificate.read_text(encoding="utf-8")
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
+    default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
+    bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
     certified = {"design.certificate": str(folder / "certificate.json")} if "certificate.json" in files else {}
     run = {
         **certified,
@@ -96,6 +99,22 @@ def prepare(
     return PreparedRun(
         scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps, temporary
     )
+
+
+def _new_directory(candidates: Sequence[Path]) -> Path:
+    """Make and return the first of ``candidates`` that is not there.
+
+    Here and not by the recorder: of two runs with one name, one is refused before it has started anything.
+    """
+    for path in candidates:
+        try:
+            path.mkdir(parents=True)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise RecordingError(f"bag = {str(path)!r}: cannot be made ({error.strerror})") from None
+        return path
+    raise RecordingError(f"bag = {str(path)!r}: exists already, expected a new directory")
 
 
 def commit() -> str:

@@ -38,8 +38,11 @@ def write_metadata(mcap: Path) -> None:
     text = yaml.dump(_information(mcap), Dumper=_Dumper, sort_keys=False, width=10**6, allow_unicode=True)
     target = mcap.parent / FILE_NAME
     beside = target.with_suffix(".yaml.part")
-    beside.write_text(text, encoding="utf-8")
-    beside.replace(target)
+    try:
+        beside.write_text(text, encoding="utf-8")
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _information(mcap: Path) -> dict[str, Any]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +15,7 @@ from mcap.writer import Writer
 
 from hsv.errors import RecordingError
 from hsv.recording.metadata import CUSTOM_DATA, FILE_NAME, write_metadata
-from hsv.recording.reader import Bag
+from hsv.recording.reader import Bag, find_mcap
 from hsv.recording.scan import MESSAGE_HEADER, content, records
 from hsv.recording.writer import CHUNK_BYTES
 
@@ -45,16 +48,38 @@ def recover(path: Path | str) -> Recovery:
     Raises:
     ------
     RecordingError
-        If nothing of the bag can be read; see :class:`hsv.recording.reader.Bag`.
+        If its recorder still runs, nothing of the bag can be read (see :class:`hsv.recording.reader.Bag`), or there is
+        no space left.
     """
-    bag = Bag(path)
-    messages = sum(topic.count for topic in bag.topics.values())
-    changed = not bag.complete or not (bag.path.parent / FILE_NAME).exists()
-    if not bag.complete:
-        _rewrite(bag.path)
-    if changed:
-        write_metadata(bag.path)
-    return Recovery(bag.path, messages, changed)
+    mcap = find_mcap(Path(path))
+    with _nobody_writing(mcap):
+        bag = Bag(mcap)
+        messages = sum(topic.count for topic in bag.topics.values())
+        changed = not bag.complete or not (mcap.parent / FILE_NAME).exists()
+        try:
+            if not bag.complete:
+                _rewrite(mcap)
+            if changed:
+                write_metadata(mcap)
+        except OSError as error:
+            raise RecordingError(f"{mcap}: cannot be mended: {error.strerror}") from None
+    return Recovery(mcap, messages, changed)
+
+
+@contextmanager
+def _nobody_writing(mcap: Path) -> Iterator[None]:
+    try:
+        stream = mcap.open("rb")
+    except OSError as error:
+        raise RecordingError(f"{mcap}: cannot be read: {error.strerror}") from None
+    with stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise RecordingError(f"{mcap}: is being recorded, expected a bag whose recorder has ended") from None
+        except OSError:
+            pass  # a file system without locks
+        yield
 
 
 def _rewrite(path: Path) -> None:
@@ -69,8 +94,8 @@ def _rewrite(path: Path) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         beside.replace(path)
-    except OSError as error:
-        raise RecordingError(f"{beside}: cannot be written: {error.strerror}") from None
+    finally:
+        beside.unlink(missing_ok=True)
 
 
 def _copy(path: Path, writer: Writer) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
@@ -27,12 +28,13 @@ class BagWriter:
     """Writes one bag directory.
 
     Every finished chunk is handed to the operating system at once, so that a killed process loses the chunk in
-    progress and nothing else; :func:`hsv.recording.recover.recover` then makes a proper bag of the rest.
+    progress and nothing else; :func:`hsv.recording.recover.recover` then makes a proper bag of the rest. Until then
+    the file is locked, so that nobody takes it for one whose writer was killed.
 
     Parameters
     ----------
     directory
-        The bag directory, ``<name>/`` with ``<name>_0.mcap``; it must not exist yet.
+        The bag directory, ``<name>/`` with ``<name>_0.mcap``; new, or empty.
     topics
         The topics known from the start.
     custom_data
@@ -41,7 +43,7 @@ class BagWriter:
     Raises:
     ------
     RecordingError
-        If the directory exists already or cannot be made.
+        If the directory holds something already or cannot be made.
     """
 
     def __init__(
@@ -50,12 +52,16 @@ class BagWriter:
         self.directory = Path(directory).absolute()
         self.path = mcap_path(self.directory)
         try:
-            self.directory.mkdir(parents=True)
+            self.directory.mkdir(parents=True, exist_ok=True)
+            if any(self.directory.iterdir()):
+                raise FileExistsError
+            self._stream = self.path.open("xb")
         except FileExistsError:
             raise RecordingError(f"bag directory {directory}: exists already, expected a new one") from None
         except OSError as error:
             raise RecordingError(f"bag directory {directory}: cannot be made: {error.strerror}") from None
-        self._stream = self.path.open("wb")
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
         # Chunks are ended by flush() here, because the writer's own limit leaves them in the buffer of the stream.
         self._writer = Writer(self._stream, chunk_size=2**31, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2")
