@@ -128,6 +128,10 @@ class StandInNode(LockstepNode):
             self.count_publishers(topic) > 0 for topic in self._answered
         )
 
+    def stopped(self, signal_number: int) -> int:
+        """Say that the replay is incomplete."""
+        return 128 + signal_number
+
     def close(self) -> None:
         """Finish the bag of answers."""
         for peer in self._peers.values():

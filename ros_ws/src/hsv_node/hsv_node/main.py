@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from rclpy.exceptions import ParameterException
-from rclpy.executors import Executor, ExternalShutdownException
+from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
@@ -41,6 +41,7 @@ def run_nodes(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda received, _frame: stop.append(received))
     nodes: list[ProcessNode] = []
+    code = 0
     try:
         executor = executor_class()
         for node in build():
@@ -54,19 +55,24 @@ def run_nodes(
                 node.poll()
             codes = [node.exit_code for node in nodes if node.exit_code is not None]
             if codes:
-                return max(codes)
+                code = max(codes)
+                break
             # The executor runs nothing while it waits without a limit.
             executor.spin_once(timeout_sec=min([node.patience() for node in nodes]))
-        return 0
+        else:
+            code = max([node.stopped(stop[0]) if node.exit_code is None else node.exit_code for node in nodes])
     except (HsvError, ParameterException, rclpy_implementation.RCLError) as error:
-        return _refuse(name, error)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        return 0
+        code = _refuse(name, error)
     finally:
         for node in nodes:
-            node.close()
+            try:
+                node.close()
+            except HsvError as error:
+                # A full disk is found out by the write that fails, and then by this one: said once.
+                code = code or _refuse(name, error)
             node.destroy_node()
         rclpy.try_shutdown()
+    return code
 
 
 def _refuse(name: str, error: BaseException) -> int:

@@ -20,6 +20,10 @@ class ProcessNode(Node):
     def poll(self) -> None:
         """Called between messages, at least four times a second; overridden where something must be watched."""
 
+    def stopped(self, signal_number: int) -> int:
+        """Return the exit code after a signal; overridden by nodes whose end is that of the run, which it cut short."""
+        return 0
+
     def close(self) -> None:
         """Called once before the process ends; overridden where something must be saved."""
 

@@ -10,7 +10,7 @@ import numpy as np
 from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
 from rosgraph_msgs.msg import Clock
 
-from hsv.graph.description import peers
+from hsv.graph.description import EXIT_DIVERGED, peers
 from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
 from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
@@ -22,9 +22,6 @@ from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
 """Steps that the plant may be ahead of the recorder."""
-
-EXIT_DIVERGED = 3
-"""Exit code after a flight that left the range of the model."""
 
 
 class PlantNode(LockstepNode):
@@ -122,6 +119,10 @@ class PlantNode(LockstepNode):
         if not self._started:
             return 0.02
         return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
+
+    def stopped(self, signal_number: int) -> int:
+        """Say that the flight is incomplete."""
+        return 128 + signal_number
 
     def _try_start(self) -> None:
         missing = [f"{peer} (/hsv/ready)" for peer in self._peers if peer not in self._ready] or self.missing_links()

@@ -42,8 +42,6 @@ def run(
     if not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
     prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout)
-    if prepared.bag.exists():
-        raise QuantityError(f"bag = {str(prepared.bag)!r}: exists already, expected a new directory")
     loaded = prepared.scenario
     clock: dict[str, float] = {}
 
@@ -58,7 +56,7 @@ def run(
             clock["end"] = time.monotonic()
             show(number)
 
-        ending = fly_graph(prepared, composed=composed, on_step=step, on_line=line)
+        diverged = fly_graph(prepared, composed=composed, on_step=step, on_line=line)
     recorded = Bag(prepared.bag)
     data = flight_data(recorded)
     extra = {"bag": str(prepared.bag)}
@@ -71,7 +69,7 @@ def run(
     report_flight(
         loaded,
         flight_metrics(data),
-        diverged_at=float(data.time[-1]) if ending.code == 3 else None,
+        diverged_at=float(data.time[-1]) if diverged else None,
         wall_time=clock["end"] - clock["start"],
         simulated_time=float(data.time[-1]),
         units=units,

@@ -17,6 +17,18 @@ TOPICS = {
 }
 """Topics with exactly one message a step, in the order in which a step is recorded."""
 
+OTHER_TOPICS = {
+    "/hsv/run": "hsv_msgs/msg/Run",
+    "/hsv/ready": "hsv_msgs/msg/Ready",
+    "/rosout": "rcl_interfaces/msg/Log",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+}
+"""Topics beside those with one message a step; recorded at the simulated time at which they arrive."""
+
+EXIT_DIVERGED = 3
+"""Exit code of the plant after a flight that left the range of the model."""
+
 
 @dataclass(frozen=True)
 class NodeDescription:

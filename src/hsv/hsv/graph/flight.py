@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
-from hsv.errors import RunError
-from hsv.graph.description import COMPOSED
-from hsv.graph.launcher import Ending, Launcher
+from hsv.errors import RecordingError, RunError
+from hsv.graph.description import COMPOSED, EXIT_DIVERGED
+from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
 
@@ -16,7 +18,7 @@ def fly_graph(
     composed: bool = False,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
-) -> Ending:
+) -> bool:
     """Fly ``prepared`` with its node processes, or with all nodes in one, recorded to its bag.
 
     Args:
@@ -26,25 +28,36 @@ def fly_graph(
         on_line: Called with node and text of every other line that a node writes.
 
     Returns:
-        How the flight ended: code 3 if it diverged.
+        Whether the flight diverged.
 
     Raises:
-        RunError: A process failed or is not built; its last words are in the message.
+        RunError: A process failed or is not built, or the bag cannot be mended; last words are in the message.
     """
+    started = (COMPOSED,) if composed else prepared.nodes
+    failures = []
+    code = 0
+    try:
+        with Launcher(started, parameter_arguments(prepared.parameter_files), on_step, on_line) as launcher:
+            code = launcher.wait()
+    except RunError as error:
+        failures.append(str(error))
+    finally:
+        try:
+            _mend(prepared.bag)
+        except RecordingError as error:
+            failures.insert(0, str(error))
+    if failures:
+        where = f"{prepared.bag}: " if prepared.bag.is_dir() else ""
+        raise RunError(where + "; ".join(failures))
+    return code == EXIT_DIVERGED
+
+
+def _mend(bag: Path) -> None:
     from hsv.recording.metadata import FILE_NAME
     from hsv.recording.recover import recover
 
-    arguments = [word for path in prepared.parameter_files for word in ("--params-file", str(path))]
-    # The last one to start flies the plant: when it ends, the run does.
-    started = (COMPOSED,) if composed else prepared.nodes
-    try:
-        with Launcher(started, arguments, on_step, on_line) as launcher:
-            ending = launcher.wait(started[-1].name)
-    finally:
-        # A recorder that was killed could not finish its bag.
-        if prepared.bag.is_dir() and not (prepared.bag / FILE_NAME).exists():
-            recover(prepared.bag)
-    if ending.culprit:
-        words = "".join(f"\n  {word}" for word in ending.last_words)
-        raise RunError(f"{ending.culprit} {ending.reason}; the bag is {prepared.bag}. Its last words:{words}")
-    return ending
+    with suppress(OSError):
+        bag.rmdir()  # where no recorder has come to write anything
+    # A recorder that was killed could not finish its bag.
+    if bag.is_dir() and not (bag / FILE_NAME).exists():
+        recover(bag)

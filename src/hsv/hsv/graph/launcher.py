@@ -9,12 +9,12 @@ import subprocess
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from hsv.errors import RunError
-from hsv.graph.description import COMPOSED, PLANT, NodeDescription
+from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, NodeDescription
 
 GRACE = 5.0
 """Seconds between asking a process to end and forcing it."""
@@ -41,22 +41,17 @@ def executable(node: NodeDescription) -> Path:
     )
 
 
+def parameter_arguments(files: Iterable[Path]) -> list[str]:
+    """Return the arguments with which a node takes its parameters from ``files``, later ones over earlier ones."""
+    return [word for path in files for word in ("--params-file", str(path))]
+
+
 @dataclass
 class _Process:
     description: NodeDescription
     popen: subprocess.Popen[str]
     words: deque[str] = field(default_factory=lambda: deque(maxlen=10))
     reader: threading.Thread | None = None
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How a run ended: the exit code of the awaited node, or which other ended it (``culprit``), how, last words."""
-
-    code: int | None
-    culprit: str = ""
-    reason: str = ""
-    last_words: tuple[str, ...] = ()
 
 
 class Launcher:
@@ -69,7 +64,7 @@ class Launcher:
         on_step: Callable[[int], None],
         on_line: Callable[[str, str], None],
     ) -> None:
-        """Prepare to start ``nodes`` with ``arguments``; report steps of the plant and other lines of any node."""
+        """Prepare to start ``nodes`` with ``arguments``, the one that ends the run last; report steps, other lines."""
         self._nodes = list(nodes)
         self._arguments = list(arguments)
         self._on_step = on_step
@@ -94,13 +89,23 @@ class Launcher:
         """Process ids by node name."""
         return {p.description.name: p.popen.pid for p in self._processes}
 
-    def wait(self, awaited: str = PLANT.name) -> Ending:
-        """Wait for the node ``awaited`` to finish, or for any other to end before it; a plant that has landed may."""
+    def wait(self) -> int:
+        """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
+
+        Raises:
+            RunError: It failed, or another ended before it (a plant that has landed may); with its last words.
+        """
+        *others, last = self._processes
         while True:
-            for process in self._processes:
+            for process in others:
                 code = process.popen.poll()
-                if code is not None and not (_landed(process, code) and process.description.name != awaited):
-                    return self._ending(process, code, awaited)
+                if code is not None and not _landed(process, code):
+                    raise self._failure(process, code)
+            code = last.popen.poll()
+            if code is not None:
+                if code == 0 or _landed(last, code):
+                    return code
+                raise self._failure(last, code)
             time.sleep(0.02)
 
     def stop(self) -> None:
@@ -151,18 +156,16 @@ class Launcher:
                     process.words.append(text)
                 self._on_line(process.description.name, text)
 
-    def _ending(self, process: _Process, code: int, awaited: str) -> Ending:
+    def _failure(self, process: _Process, code: int) -> RunError:
         if process.reader:
             process.reader.join(1.0)
-        mine = process.description.name == awaited
-        if mine and (code == 0 or _landed(process, code)):
-            return Ending(code)
         reason = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
-        return Ending(code if mine else None, process.description.name, reason, tuple(process.words))
+        words = "".join(f"\n  {word}" for word in process.words)
+        return RunError(f"{process.description.name} {reason}{'. Its last words:' if words else ''}{words}")
 
 
 def _landed(process: _Process, code: int) -> bool:
-    return process.description in _FLYING and code in (0, 3)
+    return process.description in _FLYING and code in (0, EXIT_DIVERGED)
 
 
 def _die_with_parent() -> None:

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hsv.errors import RunError
 from hsv.graph.description import PLANT, STAND_IN, NodeDescription, graph
-from hsv.graph.launcher import Launcher
+from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.reader import Bag
 from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process
@@ -63,7 +62,7 @@ def _run(
     steps: int,
     progress: Progress,
 ) -> None:
-    """Run ``nodes`` until the stand-in or, where there is none, the plant has ended."""
+    """Run ``nodes`` until the last of them has ended: the stand-in or, where there is none, the plant."""
     file = folder / "parameters.yaml"
     file.write_text(parameter_yaml(values), encoding="utf-8")
 
@@ -71,10 +70,6 @@ def _run(
         if text.startswith("step "):
             progress(title, int(text.split()[1]), steps)
 
-    awaited = STAND_IN if STAND_IN in nodes else PLANT
-    arguments = ["--params-file", str(file)]
+    arguments = parameter_arguments([file])
     with Launcher(nodes, arguments, lambda step: progress(title, step, steps), line) as launcher:
-        ending = launcher.wait(awaited.name)
-    if ending.culprit:
-        words = "".join(f"\n  {word}" for word in ending.last_words)
-        raise RunError(f"{ending.culprit} {ending.reason}. Its last words:{words}")
+        launcher.wait()
