@@ -1,11 +1,37 @@
+import re
+
 import numpy as np
 import pytest
 
+from hsv.control.design_file import find_design, read_design
+from hsv.study.linear_loop import COUPLING_SCALES
 from hsv.study.sensitivity.catalogue import STUDIES, page
-from hsv.study.sensitivity.controllers import WITH_NOTCH, WITHOUT_NOTCH, corners_of, growth
-from hsv.study.sensitivity.flights_strip import finding, strip
-from hsv.study.sensitivity.study import grid, lost_from
+from hsv.study.sensitivity.controllers import (
+    ALL,
+    RMPC,
+    RMPC_DECOUPLED,
+    RMPC_WITH_NOTCH,
+    WIDER_NOTCH,
+    WITH_NOTCH,
+    WITHOUT_NOTCH,
+    corners_of,
+    coupling_limits,
+    feedback,
+    growth,
+    paper_like,
+    said_corners,
+)
+from hsv.study.sensitivity.flights_strip import finding
+from hsv.study.sensitivity.notch import Limits
+from hsv.study.sensitivity.strip import strip
+from hsv.study.sensitivity.study import grid
+from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.variations import BOUNDS, ELEVATOR, WEIGHTS, baseline_variations
 from hsv.vehicle.parameters import uncertainty_bounds, vehicle_parameters
+
+
+def quiet(what, done, total):
+    pass
 
 
 def test_corners_meet_in_all_combinations_of_three_and_scale_with_the_bounds():
@@ -20,19 +46,28 @@ def test_corners_meet_in_all_combinations_of_three_and_scale_with_the_bounds():
     assert {abs(corner["mass"]) for corner in corners} == {2.0 * uncertainty_bounds()["mass"]}
 
 
+def test_a_coarse_study_says_how_many_corners_are_left():
+    assert said_corners(corners_of(1.0)) == "32 of the 1024 corners"
+    assert said_corners(corners_of(1.0, 16.0)) == "2 of the 1024 corners"
+    assert corners_of(1.0, 16.0)[0] == {}
+
+
 def test_a_grid_keeps_its_ends_however_coarse():
     assert grid(0.0, 1.25, 0.05, 1.0) == pytest.approx(np.arange(26) * 0.05)
     assert grid(0.0, 1.25, 0.05, 50.0) == pytest.approx([0.0, 1.25])
 
 
-def test_the_first_lost_point_is_named():
+def test_where_flights_are_lost_is_put_between_points():
     values = np.array([1.0, 2.0, 3.0])
-    assert lost_from(values, np.array([True, False, True])) == 2.0
-    assert lost_from(values, np.array([True, True, True])) is None
     columns = {"without_limits": [1.0, 0.5, 0.5], "finished": [1.0, 1.0, 0.9], "nominal_finished": [1.0, 1.0, 1.0]}
-    text = finding(WITH_NOTCH, values, columns, lambda v: f"x = {v:g}")
-    assert "at its limits first at x = 2, a first flight lost at x = 3, the nominal vehicle nowhere" in text
-    assert "first at x = 3" in finding(WITH_NOTCH, values, columns, lambda v: f"x = {v:g}", rising=False)
+    text = finding(WITH_NOTCH, values, columns, "x = {}")
+    assert "at its limits between x = 1.00 and 2.00, a flight lost between x = 2.00 and 3.00" in text
+    assert text.endswith("the nominal vehicle nowhere")
+    assert "at its limits at x = 3.0 already" in finding(WITH_NOTCH, values, columns, "x = {}", digits=1, rising=False)
+    again = columns | {"finished": [0.9, 1.0, 0.8]}
+    assert "lost at x = 1.00 already and again between x = 2.00 and 3.00" in finding(
+        WITH_NOTCH, values, again, "x = {}"
+    )
 
 
 def test_a_strip_leaves_out_what_a_lost_flight_shows():
@@ -48,19 +83,98 @@ def test_a_strip_leaves_out_what_a_lost_flight_shows():
     assert np.isnan(columns["elastic_decay_time_nominal"]).all()
 
 
-def test_the_notch_holds_where_the_loop_without_it_is_lost():
+def test_labels_say_what_flies():
+    (at_15,), (at_14,) = (read_design(find_design(c.design)).notch for c in (WITH_NOTCH, WIDER_NOTCH))
+    assert f"{at_15.zero_frequency:g} rad/s" in WITH_NOTCH.label
+    assert f"{at_14.zero_frequency:g} rad/s" in WIDER_NOTCH.label
+    assert at_14.pole_damping > at_15.pole_damping
+    for controller, filtered in (
+        (RMPC, False),
+        (RMPC_WITH_NOTCH, True),
+        (RMPC_DECOUPLED, False),
+        (WITHOUT_NOTCH, False),
+    ):
+        assert bool(feedback(controller)[1]) is filtered
+    assert [c.parameters()["vehicle.model"] for c in (*ALL, RMPC_DECOUPLED)] == ["CM"] * 5 + ["DM"]
+    assert paper_like() == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.70), (WITH_NOTCH, 1.10)])
+def test_coupling_limits_bracket_the_change_of_sign(controller, near):
+    over = corners_of(1.0, 8.0)
+    limits = coupling_limits(*feedback(controller), over)
+    assert limits.nominal == pytest.approx(near, abs=0.01)
+    assert limits.worst < limits.nominal
     derived = vehicle_parameters("derived")
-    assert growth(WITH_NOTCH, derived) < -0.1
-    assert growth(WITHOUT_NOTCH, derived) > 1.0
-    assert growth(WITHOUT_NOTCH, derived.with_coupling_scale(0.1)) < 0.0
+    for limit, vehicles in ((limits.nominal, over[:1]), (limits.worst, over)):
+
+        def worst(kappa, vehicles=vehicles):
+            return max(growth(controller, derived.with_coupling_scale(kappa).perturbed(corner)) for corner in vehicles)
+
+        assert worst(limit - 1e-3) < 0.0 < worst(limit + 1e-3)
+    assert f"κ = {limits.nominal:.2f} (nominal vehicle), {limits.worst:.2f} (worst of" in limits.said()
+
+
+def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
+    derived = vehicle_parameters("derived")
+    assert growth(RMPC, derived) > 0.1
+    assert growth(RMPC_WITH_NOTCH, derived) < 0.0
+    limits = coupling_limits(*feedback(RMPC_WITH_NOTCH), corners_of(1.0, 16.0))
+    assert limits.nominal is limits.worst is None
+    assert limits.said().startswith(f"linear loop stable up to κ = {COUPLING_SCALES[-1]} at least (nominal vehicle)")
+
+
+def test_a_strip_is_flown_once_and_found_again(tmp_path):
+    told = []
+    points = {WITH_NOTCH: [Point(WITH_NOTCH.parameters(), corners_of(1.0, 32.0), kappa) for kappa in (0.0, 0.25)]}
+    flown = sweep("test", points, tmp_path, quiet)
+    found = sweep("test", points, tmp_path, lambda *what: told.append(what))
+    assert found == flown
+    assert told == [("test, flights", 2, 2)]
+    assert flown[WITH_NOTCH]["finished"] == [1.0, 1.0]
+    other = {WITH_NOTCH: [Point(WITH_NOTCH.parameters(), corners_of(0.5, 32.0), 0.25)]}
+    assert sweep("test", other, tmp_path, quiet) != flown
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_limits_of_the_notch_in_words():
+    centres = np.array([8.0, 26.0])
+    assert Limits(None, None, None).said(centres).startswith("stable wherever the centre is put, 8 to 26 rad/s, at 15")
+    said = Limits(12.041, None, 0.063).said(centres)
+    assert said == "stable with the centre from 12.04 to 26 rad/s, at 15 rad/s up to a zero damping of 0.063"
+    assert "at 15 rad/s not with a zero damping of 0.02" in Limits(12.0, 14.9, np.nan).said(centres)
+    assert "stable nowhere with zeros as deep, 0.02" in Limits(np.nan, np.nan, np.nan).said(centres)
+
+
+def test_each_group_of_weights_varies_its_own():
+    varied = baseline_variations()
+    nominal = varied.inputs.nominal
+    for group in (*WEIGHTS, BOUNDS):
+        changed = group.times(nominal, 2.0)
+        size = np.concatenate(
+            [table.array() for table in (changed.state_scale, changed.input_scale, changed.input_bound)]
+        )
+        own = np.concatenate(
+            [table.array() for table in (nominal.state_scale, nominal.input_scale, nominal.input_bound)]
+        )
+        assert set(size / own) == {1.0, 2.0}
+        assert np.count_nonzero(size != own) == len(group.states + group.inputs + group.bounds)
+    assert varied.feedback(ELEVATOR, 1.0) is varied.flown
+    softer, stiffer = (varied.feedback(ELEVATOR, factor).feedback_gain[1, 4] for factor in (0.5, 2.0))
+    assert softer < varied.flown.feedback_gain[1, 4] < stiffer
 
 
 def test_a_coarse_study_has_a_page_with_its_findings(tmp_path):
     study = STUDIES["coupling"]
-    outcome = study.run(25.0, tmp_path, lambda what, done, total: None)
+    outcome = study.run(25.0, tmp_path, quiet)
     assert outcome.figure.axes
     assert outcome.strips["kappa"] == [0.0, 1.25]
     text = page(study, outcome)
     assert "coupling.png" in text
     assert all(f"{finding[1:]}." in text for finding in outcome.findings)
-    assert "nowhere (nominal)" in text
+    assert "the worst of 1 of the 1024 corners" in outcome.shows
+    for controller, found in zip(ALL, outcome.findings, strict=False):
+        limit = outcome.strips["unstable_from"][controller.label]["nominal"]
+        assert found.startswith(controller.label)
+        said = re.search(r"stable up to κ = (\S+)( at least)? \(nominal", found)
+        assert float(said[1]) == pytest.approx(COUPLING_SCALES[-1] if limit is None else limit, abs=0.005)

@@ -1,4 +1,4 @@
-"""The controllers that the strips compare, and flying each of them with another vehicle, fault or filter."""
+"""The controllers that the strips compare, the vehicles they fly with, and their linear loops."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from hsv.control.design_file import ControlDesign, find_design, read_parameters
 from hsv.control.notch_filter import NotchSection, flown_sections
 from hsv.design.region import Corner
 from hsv.simulation.scenario import load_scenario
-from hsv.study.corner_flights import Table, fly_over
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
-from hsv.study.linear_loop import worst_growth
-from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds
+from hsv.study.linear_loop import COUPLING_SCALES, critical_coupling, worst_growth
+from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds, vehicle_parameters
+
+PURPLE = "#7d3c98"
 
 
 @dataclass(frozen=True)
 class Controller:
-    """A scenario of Case 1 with changes, and its colour in the plots."""
+    """A scenario with changes, and its colour in the plots."""
 
     label: str
     scenario: str
@@ -42,16 +43,22 @@ class Controller:
 WITH_NOTCH = Controller("tube with notch at 15 rad/s", "case1", BLUE)
 WIDER_NOTCH = Controller("tube with notch at 14 rad/s, wider", "case1", GREEN, "baseline_derived")
 WITHOUT_NOTCH = Controller("tube without notch", "case1_no_notch", ORANGE)
-RMPC = Controller("RMPC, fourth gain", "case1_rmpc_fourth_k", RED, changes=(("vehicle.model", "CM"),))
 
-ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC)
+_ON_CM = (("vehicle.model", "CM"),)
+RMPC = Controller("RMPC without notch", "case1_rmpc_fourth_k", RED, changes=_ON_CM)
+RMPC_WITH_NOTCH = Controller(
+    "RMPC, were it given the notch", RMPC.scenario, PURPLE, RMPC.design, (*_ON_CM, ("notch.enabled", True))
+)
+RMPC_DECOUPLED = Controller("RMPC as the paper flies it, on the decoupled model", RMPC.scenario, RED)
 
-HALF_WIDTH = np.array([1.0, 1.0, 1.0, 1.0, 1.0])
-"""The strips use no measure that weighs rigid errors against each other."""
+ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
+
+SAID_RMPC = "RMPC flies the fourth gain of the nominal family"
+"""For the pages: which of the gains it is."""
 
 
-def corners_of(scale: float) -> list[Corner]:
-    """Return the nominal vehicle and 32 corners of ``scale`` times the parameter bounds.
+def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
+    """Return the nominal vehicle and 32 corners of ``scale`` times the parameter bounds, fewer if coarse.
 
     A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
     """
@@ -59,13 +66,30 @@ def corners_of(scale: float) -> list[Corner]:
     runs = hadamard(16)[:, 1 : 1 + len(names)]
     signs = np.vstack((runs, -runs))
     bounds = np.array(list(uncertainty_bounds().values()))
-    return [{}, *(dict(zip(names, map(float, scale * row * bounds), strict=True)) for row in signs)]
+    over: list[Corner] = [{}, *(dict(zip(names, map(float, scale * row * bounds), strict=True)) for row in signs)]
+    return over[:: max(1, round(coarseness))]
 
 
-def flown(controller: Controller, over: Sequence[Corner], coupling_scale: float | None = None, **changes: Any) -> Table:
-    """Return what is measured on the flights of a controller with each vehicle; changed parameters with __ for dots."""
-    values = controller.parameters() | {name.replace("__", "."): value for name, value in changes.items()}
-    return fly_over(values, over, HALF_WIDTH, coupling_scale=coupling_scale)
+def said_corners(over: Sequence[Corner]) -> str:
+    """Return how many corners ``over`` holds beside the nominal vehicle, and of how many."""
+    return f"{len(over) - 1} of the {2 ** len(uncertainty_bounds())} corners"
+
+
+@cache
+def paper_like() -> float:
+    """Return kappa of the paper-like set: its coupling as a share of the derived."""
+    return vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
+
+
+@cache
+def feedback(controller: Controller) -> tuple[np.ndarray, tuple[NotchSection, ...], float]:
+    """Return gain (2, 9), filter and period (s) of a controller's linear loop."""
+    values = controller.parameters()
+    design = ControlDesign.from_parameters(values)
+    gain = design.adjusted_gain(design.tau)
+    if values["controller"] == "robust_mpc":
+        gain = design.nominal_gains[values["robust_mpc.gain_index"]]
+    return gain, flown_sections(values) if values["notch.enabled"] else (), design.period
 
 
 def growth(
@@ -81,16 +105,29 @@ def growth(
         vehicle: Coupled or not.
         notch: Sections of the filter.
     """
-    gain, own, period = _feedback(controller)
+    gain, own, period = feedback(controller)
     return worst_growth(vehicle, gain, own if notch is None else notch, period)
 
 
-@cache
-def _feedback(controller: Controller) -> tuple[np.ndarray, tuple[NotchSection, ...], float]:
-    """Return gain (2, 9), filter and period (s) of a controller."""
-    values = controller.parameters()
-    design = ControlDesign.from_parameters(values)
-    gain = design.adjusted_gain(design.tau)
-    if values["controller"] == "robust_mpc":
-        gain = design.nominal_gains[values["robust_mpc.gain_index"]]
-    return gain, flown_sections(values) if values["notch.enabled"] else (), design.period
+@dataclass(frozen=True)
+class CouplingLimits:
+    """kappa at which the linear loop stops being stable, of the nominal vehicle and of the worst of ``over``."""
+
+    nominal: float | None
+    worst: float | None
+    over: Sequence[Corner]
+
+    def said(self) -> str:
+        """Return both in words."""
+        nominal, worst = (
+            f"{COUPLING_SCALES[-1]:g} at least" if limit is None else f"{limit:.2f}"
+            for limit in (self.nominal, self.worst)
+        )
+        return f"linear loop stable up to κ = {nominal} (nominal vehicle), {worst} (worst of {said_corners(self.over)})"
+
+
+def coupling_limits(
+    gain: np.ndarray, notch: Sequence[NotchSection], period: float, over: Sequence[Corner]
+) -> CouplingLimits:
+    """Return the limits of a loop; arguments as for :func:`critical_coupling`, ``over`` the nominal vehicle first."""
+    return CouplingLimits(critical_coupling(gain, notch, period), critical_coupling(gain, notch, period, over), over)

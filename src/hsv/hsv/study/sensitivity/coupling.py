@@ -6,68 +6,98 @@ from pathlib import Path
 
 import numpy as np
 
+from hsv.design.region import Corner
 from hsv.study.figures.style import GREY, letter, new_figure, plain_log
-from hsv.study.sensitivity.controllers import ALL, Controller, corners_of, flown, growth
-from hsv.study.sensitivity.flights_strip import Strip, draw_metric, finding, legend, strip
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
+from hsv.study.linear_loop import COUPLING_SCALES
+from hsv.study.sensitivity.controllers import (
+    ALL,
+    SAID_RMPC,
+    WITHOUT_NOTCH,
+    Controller,
+    CouplingLimits,
+    corners_of,
+    coupling_limits,
+    feedback,
+    growth,
+    paper_like,
+    said_corners,
+)
+from hsv.study.sensitivity.flights_strip import draw_metric, legend, lost_where, widths
+from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.vehicle.parameters import vehicle_parameters
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Fly and linearise every controller at kappa from 0 to 1.25."""
-    kappas = grid(0.0, 1.25, 0.05, coarseness)
-    over = corners_of(1.0)[:: max(1, round(2 * coarseness))]
-    vehicles = [vehicle_parameters("derived").with_coupling_scale(float(kappa)) for kappa in kappas]
-    growths: dict[Controller, list[list[float]]] = {}
-    strips: dict[Controller, Strip] = {}
-    total = len(ALL) * len(kappas)
+    """Fly and linearise every controller from kappa = 0, the decoupled model, on."""
+    kappas = grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05, coarseness)
+    over = corners_of(1.0, coarseness)
+    strips = sweep(
+        "coupling", {c: [Point(c.parameters(), over, float(k)) for k in kappas] for c in ALL}, folder, progress
+    )
+    growths: dict[Controller, np.ndarray] = {}
+    limits: dict[Controller, CouplingLimits] = {}
     for number, controller in enumerate(ALL):
-        tables, growths[controller] = [], []
-        for index, (kappa, vehicle) in enumerate(zip(kappas, vehicles, strict=True)):
-            progress("coupling", number * len(kappas) + index, total)
-            tables.append(flown(controller, over, float(kappa)))
-            growths[controller].append([growth(controller, vehicle.perturbed(corner)) for corner in over])
-        strips[controller] = strip(tables)
-    progress("coupling", total, total)
+        progress("coupling, linear loops", number, len(ALL))
+        growths[controller] = np.array([growth_over(controller, float(kappa), over) for kappa in kappas])
+        limits[controller] = coupling_limits(*feedback(controller), over)
+    progress("coupling, linear loops", len(ALL), len(ALL))
 
     figure = new_figure(7.2)
     axes = figure.subplots(3, 1, sharex=True)
-    findings = []
-    for controller, rows in growths.items():
-        values = np.array(rows)
-        axes[0].plot(kappas, values[:, 0], color=controller.color, label=controller.label)
-        axes[0].plot(kappas, values.max(axis=1), "--", color=controller.color, linewidth=0.9)
-        unstable = [lost_from(kappas, values[:, 0] < 0.0), lost_from(kappas, values.max(axis=1) < 0.0)]
-        said = ["nowhere" if kappa is None else f"from κ = {kappa:.2f} on" for kappa in unstable]
-        findings.append(
-            f"{controller.label}: linear loop unstable {said[0]} (nominal), {said[1]} (worst corner); "
-            + finding(controller, kappas, strips[controller], lambda kappa: f"κ = {kappa:.2f}").split(": ")[1]
-        )
+    for (controller, values), width in zip(growths.items(), widths(len(ALL)), strict=True):
+        axes[0].plot(kappas, values[:, 0], color=controller.color, linewidth=width, label=controller.label)
+        axes[0].plot(kappas, values.max(axis=1), "--", color=controller.color, linewidth=width)
     axes[0].axhline(0.0, color="black", linewidth=0.6)
     axes[0].set_ylim(-0.5, 1.5)
     axes[0].set_ylabel("largest real part (1/s)")
     draw_metric(axes[1], kappas, strips, "elastic_decay_time", "s", "elastic decay (s)")
     draw_metric(axes[2], kappas, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
     plain_log(axes[2])
-    axes[2].set_xlabel(r"coupling $\kappa$ (1: derived from a beam model)")
+    axes[2].set_xlabel(r"coupling $\kappa$ (0: decoupled, 1: derived from a beam model)")
     for axis in axes:
-        for kappa in (0.25, 1.0):
+        for kappa in (paper_like(), 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[0].text(0.255, 1.32, "paper-like", color=GREY, fontsize=8)
+    axes[0].text(paper_like() + 0.005, 1.32, "paper-like", color=GREY, fontsize=8)
     axes[0].text(0.995, 1.32, "derived", color=GREY, fontsize=8, ha="right")
     letter(axes)
     legend(figure, shares=False)
+    findings = [f"{c.label}: {limits[c].said()}; {lost_where(kappas, strips[c], 'κ = {}')}" for c in ALL]
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {len(over) - 1} corners of the "
-        "parameters (dashed); (a) linear sampled loop, before and after the fault, at both ends of the step; (b), (c) "
-        "flights, a line ends where one is lost; a decay of 100 s: not before the end of the flight.",
-        tuple(findings),
+        f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {said_corners(over)} of the "
+        "parameter bounds (dashed). (a) Linear sampled loop, the worst of both ends of the step, before and after the "
+        "fault; its limits below are found by root finding. (b), (c) Flights, a line ends where one is lost; a decay "
+        f"of 100 s: not before the end of the flight. {SAID_RMPC}; with κ = 0 and without notch it is the one of the "
+        "paper, which flies it on the decoupled model only.",
+        (*findings, _margin(limits[WITHOUT_NOTCH])),
         {
             "kappa": kappas.tolist(),
-            "growth_per_s": {c.label: rows for c, rows in growths.items()},
+            "growth_per_s": {c.label: rows.tolist() for c, rows in growths.items()},
+            "unstable_from": {c.label: {"nominal": found.nominal, "worst": found.worst} for c, found in limits.items()},
             "flights": {c.label: columns for c, columns in strips.items()},
         },
+    )
+
+
+def growth_over(controller: Controller, kappa: float, over: list[Corner]) -> list[float]:
+    """Return the largest real part (1/s) of a controller's loop around each vehicle of ``over`` with ``kappa``."""
+    vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
+    return [growth(controller, vehicle.perturbed(corner)) for corner in over]
+
+
+def _margin(limits: CouplingLimits) -> str:
+    """Return in words how far the paper-like coupling is from the limit of the loop without notch."""
+    unstable = np.array(growth_over(WITHOUT_NOTCH, paper_like(), list(limits.over))) >= 0.0
+    said = f"the paper-like coupling, κ = {paper_like():.2f},"
+    if limits.nominal is None:
+        return f"{said} is below any limit of the {WITHOUT_NOTCH.label}"
+    share = paper_like() / limits.nominal - 1.0
+    side = "below" if share < 0.0 else "above"
+    return (
+        f"{said} lies {abs(100.0 * share):.1f} % {side} the limit of the {WITHOUT_NOTCH.label}, κ = "
+        f"{limits.nominal:.4f} (nominal vehicle), whose linear loop is unstable there at {unstable[1:].sum()} of "
+        f"{said_corners(limits.over)}"
     )
 
 

@@ -1,59 +1,28 @@
-"""Strips of flights: every controller over one quantity, nominal vehicle and corners."""
+"""Strips of flights drawn and put in words: every controller over one quantity, nominal vehicle and corners."""
 
 from __future__ import annotations
-
-from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hsv.study.corner_flights import Table
+from hsv.study.figures.style import letter, plain_log
 from hsv.study.sensitivity.controllers import Controller
+from hsv.study.sensitivity.strip import Strip
 from hsv.units import to_paper
 
-Strip = dict[str, list[float]]
-"""Columns over the points of a strip, by name."""
 
-_METRICS = (
-    "post_fault_attitude_deviation",
-    "post_fault_attitude_from_nominal",
-    "altitude_end_error",
-    "altitude_error_maximum",
-    "velocity_error_maximum",
-    "elastic_decay_time",
-    "fuel_equivalence_ratio_maximum",
-)
-
-SATURATED_STEPS = 50
-"""Limited steps, one second, from which a flight counts as at its limits."""
-
-
-def strip(tables: Sequence[Table]) -> Strip:
-    """Return the columns of one controller from the table of each point; the nominal vehicle is the first flight.
-
-    Angles in rad, lengths in m, times in s. What a lost flight does not define is not a number, and infinite at worst.
-    """
-    columns: Strip = {"finished": [], "without_limits": [], "nominal_finished": []}
-    for table in tables:
-        finished = table["diverged"] == 0.0
-        columns["finished"].append(float(finished.mean()))
-        columns["nominal_finished"].append(float(finished[0]))
-        columns["without_limits"].append(float((finished & (table["saturated_steps"] <= SATURATED_STEPS)).mean()))
-    for name in _METRICS:
-        rows = [np.abs(table[name]) if name in table else np.full(len(table["diverged"]), np.nan) for table in tables]
-        rows = [np.where(table["diverged"] == 0.0, row, np.nan) for table, row in zip(tables, rows, strict=True)]
-        columns[f"{name}_nominal"] = [float(row[0]) for row in rows]
-        columns[f"{name}_worst"] = [float(np.max(row)) if not np.isnan(row).any() else np.nan for row in rows]
-    return columns
+def widths(count: int) -> np.ndarray:
+    """Return line widths for curves drawn one after another, each thinner, so that none hides another."""
+    return 0.8 + 0.4 * np.arange(count)[::-1]
 
 
 def draw_metric(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip], name: str, unit: str, label: str) -> None:
     """Draw a metric of every controller: solid the nominal vehicle, dashed the worst."""
     factor = to_paper(1.0, unit)[0]
-    for controller, columns in strips.items():
-        for suffix, style, width in (("nominal", "-", 1.2), ("worst", "--", 0.9)):
+    for (controller, columns), width in zip(strips.items(), widths(len(strips)), strict=True):
+        for suffix, style in (("nominal", "-"), ("worst", "--")):
             values = factor * np.array(columns[f"{name}_{suffix}"])
             axis.plot(x, values, style, color=controller.color, linewidth=width)
     axis.set_ylabel(label)
@@ -61,9 +30,10 @@ def draw_metric(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip], name
 
 def draw_share(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip]) -> None:
     """Draw the share of flights that come to their end (solid), and without being at their limits (dotted)."""
-    for controller, columns in strips.items():
-        axis.plot(x, 100.0 * np.array(columns["finished"]), color=controller.color, label=controller.label)
-        axis.plot(x, 100.0 * np.array(columns["without_limits"]), ":", color=controller.color, linewidth=1.2)
+    for (controller, columns), width in zip(strips.items(), widths(len(strips)), strict=True):
+        shares = {name: 100.0 * np.array(columns[name]) for name in ("finished", "without_limits")}
+        axis.plot(x, shares["finished"], color=controller.color, linewidth=width, label=controller.label)
+        axis.plot(x, shares["without_limits"], ":", color=controller.color, linewidth=width)
     axis.set_ylabel("flights (%)")
     axis.set_ylim(-5.0, 105.0)
 
@@ -79,31 +49,74 @@ def legend(figure: Figure, *, shares: bool) -> None:
     figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
+def draw_losses(figure: Figure, x: np.ndarray, strips: dict[Controller, Strip], label: str) -> np.ndarray:
+    """Draw and return three panels over ``x``: which flights are lost, attitude after the fault, altitude at the end.
+
+    Args:
+        figure: Empty.
+        x: Values along the strips.
+        strips: By controller.
+        label: What ``x`` is.
+    """
+    axes = np.asarray(figure.subplots(3, 1, sharex=True))
+    draw_share(axes[0], x, strips)
+    draw_metric(axes[1], x, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
+    draw_metric(axes[2], x, strips, "altitude_end_error", "m", "altitude error at end (ft)")
+    for axis in axes[1:]:
+        plain_log(axis)
+    axes[2].set_xlabel(label)
+    letter(axes)
+    legend(figure, shares=True)
+    return axes
+
+
+LOSSES = (
+    "(a) Share of flights that come to their end (solid), and without a second at the limits of the inputs (dotted); "
+    "(b), (c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost."
+)
+"""What :func:`draw_losses` shows, in words."""
+
+
 def finding(
     controller: Controller,
     x: np.ndarray,
     columns: Strip,
-    say: Callable[[float], str],
+    words: str,
     *,
+    digits: int = 2,
     rising: bool = True,
     nominal: bool = True,
 ) -> str:
-    """Return in words where a controller first meets its limits and where it is lost, going along ``x``.
+    """Return in words between which points a controller comes to its limits and is lost, going along ``x``.
 
     Args:
         controller: Whose strip it is.
         x: Values along the strip, increasing.
         columns: The strip.
-        say: Makes words of a value.
+        words: Around a value, which stands for ``{}``.
+        digits: Of a value, behind the point.
         rising: Go from the least value on, else from the largest.
         nominal: Whether the strip changes the nominal vehicle's flight, too.
     """
+    where = lost_where(x, columns, words, digits=digits, rising=rising, nominal=nominal)
+    return f"{controller.label}: {where}"
+
+
+def lost_where(
+    x: np.ndarray, columns: Strip, words: str, *, digits: int = 2, rising: bool = True, nominal: bool = True
+) -> str:
+    """Return the same without the controller's name."""
     order = slice(None) if rising else slice(None, None, -1)
-    along = x[order]
+    along = [f"{value:.{digits}f}" for value in x[order]]
 
     def first(name: str) -> str:
-        lost = np.flatnonzero(np.array(columns[name])[order] < 1.0)
-        return f"at {say(float(along[lost[0]]))}" if len(lost) else "nowhere"
+        lost = np.array(columns[name])[order] < 1.0
+        begins = np.flatnonzero(lost & ~np.concatenate(([False], lost[:-1])))
+        said = (words.format(f"{along[i - 1]} and {along[i]}" if i else along[0]) for i in begins)
+        return (
+            " and again ".join(f"between {w}" if i else f"at {w} already" for i, w in zip(begins, said, strict=True))
+            or "nowhere"
+        )
 
-    lost = f"{controller.label}: at its limits first {first('without_limits')}, a first flight lost {first('finished')}"
+    lost = f"at its limits {first('without_limits')}, a flight lost {first('finished')}"
     return f"{lost}, the nominal vehicle {first('nominal_finished')}" if nominal else lost

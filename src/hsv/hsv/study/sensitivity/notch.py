@@ -2,121 +2,201 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.contour import ContourSet
 
+from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import NotchSection
+from hsv.design.region import Corner
+from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure, plain_log
-from hsv.study.sensitivity.controllers import WITH_NOTCH, flown, growth
+from hsv.study.linear_loop import stability_limit
+from hsv.study.sensitivity.controllers import Controller, corners_of, growth, said_corners
+from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.vehicle.parameters import vehicle_parameters
 
-POLE_DAMPING = 0.5
-"""Of all filters looked at: a zero damping as large makes the filter none."""
+SETS = (
+    Controller("paper-like coupling", "case1", BLUE),
+    Controller("derived coupling", "case1_derived", RED),
+)
+"""Both with the baseline's gains, and its filter moved."""
 
-SETS = (("paper_like", "paper-like coupling", BLUE), ("derived", "derived coupling", RED))
+
+@cache
+def filter_of_the_baseline() -> NotchSection:
+    """Return the section that the baseline design flies with."""
+    return read_design(find_design("baseline")).notch[0]
+
+
+def moved(centre: float, zero_damping: float | None = None) -> NotchSection:
+    """Return the baseline's section with zeros and poles at ``centre`` (rad/s), and another damping of the zeros."""
+    own = filter_of_the_baseline()
+    damping = own.zero_damping if zero_damping is None else zero_damping
+    return NotchSection(centre, damping, centre, own.pole_damping)
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Linearise the loop over centre and depth, and fly it over the centre, for both sets of coupling."""
+    own = filter_of_the_baseline()
     centres = grid(8.0, 26.0, 0.5, coarseness)
-    depths = np.geomspace(0.005, 0.5, max(3, round(17 / coarseness)))
-    maps = {}
+    depths = np.geomspace(0.005, own.pole_damping, max(3, round(17 / coarseness)))
+    over = corners_of(1.0, coarseness)
+    maps: dict[Controller, np.ndarray] = {}
+    limits: dict[Controller, tuple[Limits, Limits]] = {}
     total = len(SETS) * len(centres)
-    for number, (name, _, _) in enumerate(SETS):
-        vehicle, rows = vehicle_parameters(name), []
+    for number, coupled in enumerate(SETS):
+        rows = []
         for index, centre in enumerate(centres):
-            progress("notch, linear", number * len(centres) + index, total)
-            sections = [NotchSection(float(centre), float(depth), float(centre), POLE_DAMPING) for depth in depths]
-            rows.append([growth(WITH_NOTCH, vehicle, notch=[section]) for section in sections])
-        maps[name] = np.array(rows)
-    progress("notch, linear", total, total)
-    decays = {name: _decays(name, centres, progress) for name, _, _ in SETS}
+            progress("notch, linear loops", number * len(centres) + index, total)
+            rows.append([_growths(coupled, moved(float(centre), float(depth)), over) for depth in depths])
+        maps[coupled] = np.array(rows)
+        limits[coupled] = (_limits(coupled, over[:1], centres, depths), _limits(coupled, over, centres, depths))
+    progress("notch, linear loops", total, total)
+    along = {coupled: [Point(_values(coupled, float(centre)), over) for centre in centres] for coupled in SETS}
+    strips = sweep("notch", along, folder, progress)
 
     figure = new_figure(6.4)
-    grid_spec = figure.add_gridspec(2, 2)
-    levels = np.array([-0.4, -0.3, -0.2, -0.1, 0.0, 0.25, 0.5, 1.0, 1.5])
+    spec = figure.add_gridspec(2, 2)
     panels: list[Axes] = []
-    for column, (name, label, _) in enumerate(SETS):
-        axis = figure.add_subplot(grid_spec[0, column], sharey=panels[0] if panels else None)
-        shown = axis.contourf(
-            centres, depths, maps[name].T, levels=levels, cmap="RdYlBu_r", extend="both", vmin=-1.0, vmax=1.0
-        )
-        axis.contour(centres, depths, maps[name].T, levels=[0.0], colors="black", linewidths=1.2)
-        axis.plot(15.0, 0.02, "k+", markersize=8)
-        plain_log(axis)
-        axis.set_title(label, loc="right")
-        axis.set_xlabel("notch centre (rad/s)")
-        axis.grid(visible=False)
+    for column, (coupled, values) in enumerate(maps.items()):
+        axis = figure.add_subplot(spec[0, column], sharey=panels[0] if panels else None)
+        shown = _draw_map(axis, centres, depths, values)
+        axis.plot(own.zero_frequency, own.zero_damping, "k+", markersize=8)
+        axis.set_title(coupled.label, loc="right")
         panels.append(axis)
-    panels[0].set_ylabel(r"zero damping $\varepsilon_z$ (0.5: no notch)")
+    panels[0].set_ylabel(rf"zero damping $\varepsilon_z$ ({own.pole_damping:g}: no notch)")
     figure.colorbar(shown, ax=panels, label="largest real part (1/s)", aspect=15)
-    axis = figure.add_subplot(grid_spec[1, :])
-    for name, label, color in SETS:
-        axis.plot(centres, decays[name], "o-", color=color, markersize=3, label=label)
-    for limit, color in ((12.0, BLUE), (16.0, RED)):
-        axis.axhline(limit, color=color, linewidth=0.6, linestyle="--")
-    axis.axvline(15.0, color=GREY, linewidth=0.6, linestyle=":")
+    axis = figure.add_subplot(spec[1, :])
+    for coupled, columns in strips.items():
+        for suffix, style in (("nominal", "-"), ("worst", "--")):
+            label = coupled.label if suffix == "nominal" else None
+            decay = columns[f"elastic_decay_time_{suffix}"]
+            axis.plot(centres, decay, f"o{style}", color=coupled.color, markersize=2.5, label=label)
+        limit = load_scenario(coupled.scenario).limits["elastic_decay_time"]
+        axis.axhline(limit, color=coupled.color, linewidth=0.6, linestyle=":")
+    axis.axvline(own.zero_frequency, color=GREY, linewidth=0.6, linestyle=":")
     axis.set_ylim(0.0, 60.0)
-    axis.set_xlabel(r"notch centre (rad/s), $\varepsilon_z$ = 0.02")
+    axis.set_xlabel(rf"notch centre (rad/s), $\varepsilon_z$ = {own.zero_damping:g}")
     axis.set_ylabel("elastic decay (s)")
     axis.legend(loc="upper right")
     letter((*panels, axis))
     return Outcome(
         figure,
         "(a), (b) Largest real part of the sampled loop's poles over the notch's centre and the damping of its zeros, "
-        "nominal vehicle, the worst of both ends of the step, before and after the fault; black: the limit of "
-        "stability, cross: the baseline's filter. Zeros and poles share the centre, pole damping 0.5. (c) Decay time "
-        "in flight; no point where the flight is lost; dashed: the limits of the scenarios.",
-        tuple(_findings(centres, depths, maps, decays)),
+        "the worst of both ends of the step, before and after the fault; colours and solid line, the limit of "
+        f"stability: nominal vehicle; dashed: limit of the worst of {said_corners(over)} of the parameter bounds; "
+        "cross: the baseline's filter. Zeros and poles share the centre, pole damping "
+        f"{own.pole_damping:g}. (c) Decay time in flight, nominal vehicle (solid) and worst corner (dashed); no point "
+        "where a flight is lost; dotted: the limits of the scenarios.",
+        tuple(_finding(c, limits[c], strips[c], centres, said_corners(over)) for c in SETS),
         {
             "centre_rad_per_s": centres.tolist(),
             "zero_damping": depths.tolist(),
-            "growth_per_s": {name: values.tolist() for name, values in maps.items()},
-            "decay_s": {name: values.tolist() for name, values in decays.items()},
+            "growth_per_s": {
+                c.label: {"nominal": m[..., 0].tolist(), "worst": m.max(axis=-1).tolist()} for c, m in maps.items()
+            },
+            "stable": {c.label: {"nominal": vars(n), "worst": vars(w)} for c, (n, w) in limits.items()},
+            "flights": {c.label: columns for c, columns in strips.items()},
         },
     )
 
 
-def _decays(coupling: str, centres: np.ndarray, progress: Progress) -> np.ndarray:
-    found = []
-    for index, centre in enumerate(centres):
-        progress(f"notch, flights, {coupling}", index, len(centres))
-        flown_at = [float(centre)]
-        table = flown(
-            WITH_NOTCH,
-            [{}],
-            vehicle__coupling=coupling,
-            notch__flown__zero_frequency=flown_at,
-            notch__flown__pole_frequency=flown_at,
-        )
-        lost = table["diverged"][0] > 0.0 or "elastic_decay_time" not in table
-        found.append(np.nan if lost else float(table["elastic_decay_time"][0]))
-    progress(f"notch, flights, {coupling}", len(centres), len(centres))
-    return np.array(found)
+@dataclass(frozen=True)
+class Limits:
+    """Where the loop is stable: from ``least`` to ``largest`` centre (rad/s), up to ``shallowest`` damping of zeros.
+
+    Along the one the other is the baseline's. ``None``: to the end of what was looked at; not a number: nowhere.
+    """
+
+    least: float | None
+    largest: float | None
+    shallowest: float | None
+
+    def said(self, centres: np.ndarray) -> str:
+        """Return the limits in words; ``centres``: those looked at."""
+        own = filter_of_the_baseline()
+        least = f"{centres[0]:g}" if self.least is None else f"{self.least:.2f}"
+        largest = f"{centres[-1]:g}" if self.largest is None else f"{self.largest:.2f}"
+        if self.least is None and self.largest is None:
+            span = f"stable wherever the centre is put, {least} to {largest} rad/s"
+        elif self.least is not None and np.isnan(self.least):
+            span = f"stable nowhere with zeros as deep, {own.zero_damping:g}"
+        else:
+            span = f"stable with the centre from {least} to {largest} rad/s"
+        if self.shallowest is None:
+            depth = f"at every zero damping, even at {own.pole_damping:g}: no notch"
+        elif np.isnan(self.shallowest):
+            depth = f"not with a zero damping of {own.zero_damping:g}"
+        else:
+            depth = f"up to a zero damping of {self.shallowest:.2g}"
+        return f"{span}, at {own.zero_frequency:g} rad/s {depth}"
 
 
-def _findings(
-    centres: np.ndarray, depths: np.ndarray, maps: dict[str, np.ndarray], decays: dict[str, np.ndarray]
-) -> list[str]:
-    said = []
-    deep = int(np.argmin(np.abs(depths - 0.02)))
-    for name, label, _ in SETS:
-        stable = centres[maps[name][:, deep] < 0.0]
-        span = f"at {stable.min():.1f} to {stable.max():.1f} rad/s" if len(stable) else "nowhere"
-        if len(stable) == len(centres):
-            span = f"wherever it was put, {centres[0]:g} to {centres[-1]:g} rad/s,"
-        at = int(np.argmin(np.abs(centres - 15.0)))
-        shallow = depths[maps[name][at] < 0.0]
-        limit = f"up to a zero damping of {shallow.max():.2g}" if len(shallow) else "at no depth"
-        best = np.nanargmin(np.where(np.isnan(decays[name]), np.inf, decays[name]))
-        said.append(
-            f"{label}: stable with the centre {span} (deep notch), at 15 rad/s {limit}; the shortest decay in "
-            f"flight is {decays[name][best]:.1f} s at {centres[best]:.1f} rad/s"
-        )
-    return said
+def _limits(coupled: Controller, over: list[Corner], centres: np.ndarray, depths: np.ndarray) -> Limits:
+    own = filter_of_the_baseline()
+
+    @cache
+    def off_centre(centre: float) -> float:
+        return max(_growths(coupled, moved(centre), over))
+
+    def shallow(depth: float) -> float:
+        return max(_growths(coupled, moved(own.zero_frequency, depth), over))
+
+    def limit(growth: Callable[[float], float], along: np.ndarray) -> float | None:
+        return np.nan if growth(float(along[0])) >= 0.0 else stability_limit(growth, along.tolist())
+
+    best = int(np.argmin([off_centre(float(centre)) for centre in centres]))
+    return Limits(
+        limit(off_centre, centres[best::-1]),
+        limit(off_centre, centres[best:]),
+        limit(shallow, np.array([own.zero_damping, *depths[depths > own.zero_damping]])),
+    )
+
+
+def _growths(coupled: Controller, section: NotchSection, over: list[Corner]) -> list[float]:
+    vehicle = vehicle_parameters(load_scenario(coupled.scenario).vehicle.coupling)
+    return [growth(coupled, vehicle.perturbed(corner), notch=[section]) for corner in over]
+
+
+def _values(coupled: Controller, centre: float) -> dict[str, object]:
+    flown = {"notch.flown.zero_frequency": [centre], "notch.flown.pole_frequency": [centre]}
+    return coupled.parameters() | flown
+
+
+def _draw_map(axis: Axes, centres: np.ndarray, depths: np.ndarray, values: np.ndarray) -> ContourSet:
+    """Draw growths (centres, depths, vehicles), the nominal vehicle first; return what a colour bar is made of."""
+    levels = np.array([-0.4, -0.3, -0.2, -0.1, 0.0, 0.25, 0.5, 1.0, 1.5])
+    nominal, worst = values[..., 0].T, values.max(axis=-1).T
+    shown = axis.contourf(centres, depths, nominal, levels=levels, cmap="RdYlBu_r", extend="both", vmin=-1.0, vmax=1.0)
+    axis.contour(centres, depths, nominal, levels=[0.0], colors="black", linewidths=1.2)
+    axis.contour(centres, depths, worst, levels=[0.0], colors="black", linewidths=1.0, linestyles="--")
+    plain_log(axis)
+    axis.set_xlabel("notch centre (rad/s)")
+    axis.grid(visible=False)
+    return shown
+
+
+def _finding(coupled: Controller, limits: tuple[Limits, Limits], columns: Strip, centres: np.ndarray, of: str) -> str:
+    nominal, worst = (found.said(centres) for found in limits)
+    best = {}
+    for suffix in ("nominal", "worst"):
+        decay = np.array(columns[f"elastic_decay_time_{suffix}"])
+        if np.isfinite(decay).any():
+            least = int(np.nanargmin(decay))
+            best[suffix] = f"{decay[least]:.1f} s with the centre at {centres[least]:.1f} rad/s"
+    flights = "; ".join(
+        f"shortest decay in flight {best.get(suffix, 'none: lost wherever the centre is')} ({vehicle})"
+        for suffix, vehicle in (("nominal", "nominal vehicle"), ("worst", "worst corner"))
+    )
+    return f"{coupled.label}: {nominal} (nominal vehicle); {worst} (worst of {of}); {flights}"
 
 
 STUDY = Study("notch", "Centre and depth of the notch filter", run)

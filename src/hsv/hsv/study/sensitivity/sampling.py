@@ -2,94 +2,110 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
 
 from hsv.control.design_file import ControlDesign, find_design, read_design, write_design
-from hsv.control.notch_filter import NotchSection
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.simulation.scenario import load_scenario
-from hsv.study.corner_flights import fly_over
 from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
-from hsv.study.linear_loop import worst_growth
-from hsv.study.sensitivity.controllers import HALF_WIDTH, corners_of
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid, lost_from
-from hsv.study.sources import DIGITS, code_digest, package_digest
+from hsv.study.linear_loop import COUPLING_SCALES, worst_growth
+from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_limits, paper_like, said_corners
+from hsv.study.sensitivity.strip import Strip
+from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, package_digest
 from hsv.units import to_paper
 from hsv.vehicle.parameters import vehicle_parameters
 
-PERIODS = (0.01, 0.02, 0.05)
-COLORS = (GREEN, BLUE, RED)
+PERIODS = {
+    period: Controller(f"T = {period:g} s", "case1", color)
+    for period, color in ((0.01, GREEN), (0.02, BLUE), (0.05, RED))
+}
+INTEGRATION_STEP = 0.01
+"""s: of the vehicle, as at the shipped period."""
+
+FILTERS = ("with the notch", "without")
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Design at each period, linearise over the coupling with and without notch, and fly Case 1."""
-    kappas = grid(0.0, 1.25, 0.05, coarseness)
+    kappas = grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05, coarseness)
+    over = corners_of(1.0, coarseness)
     designs = {period: _design(period, folder, progress) for period in PERIODS}
-    growths: dict[float, dict[str, list[float]]] = {}
-    for period, design in designs.items():
-        growths[period] = {"with": [], "without": []}
-        for index, kappa in enumerate(kappas):
-            progress(f"sampling, T = {period:g} s", index, len(kappas))
-            for name, notch in (("with", design.notch), ("without", ())):
-                growths[period][name].append(_growth(design, float(kappa), notch))
-        progress(f"sampling, T = {period:g} s", len(kappas), len(kappas))
-    over = corners_of(1.0)[:: max(1, round(2 * coarseness))]
-    flights = {}
-    for period, design in designs.items():
-        values = {**design.to_parameters(), **load_scenario("case1").parameters()}
-        # The integration keeps its step, whatever the control period.
-        values["substeps"] = max(1, round(period / 0.01))
-        flights[period] = fly_over(values, over, HALF_WIDTH)
+    growths, limits = {}, {}
+    for done, (period, design) in enumerate(designs.items()):
+        for number, (name, notch) in enumerate(zip(FILTERS, (design.notch, ()), strict=True)):
+            progress("sampling, linear loops", len(FILTERS) * done + number, len(FILTERS) * len(designs))
+            loop = (design.feedback_gain, notch, period)
+            vehicles = [vehicle_parameters("derived").with_coupling_scale(float(kappa)) for kappa in kappas]
+            growths[period, name] = np.array([[worst_growth(v.perturbed(c), *loop) for c in over] for v in vehicles])
+            limits[period, name] = coupling_limits(*loop, over)
+    progress("sampling, linear loops", len(growths), len(growths))
+    along = {PERIODS[period]: [Point(_values(design), over)] for period, design in designs.items()}
+    strips = sweep("sampling", along, folder, progress)
 
     figure = new_figure(5.6)
     axes = figure.subplots(2, 1, sharex=True)
-    for axis, name in zip(axes, ("with", "without"), strict=True):
-        for (period, rows), color in zip(growths.items(), COLORS, strict=True):
-            axis.plot(kappas, rows[name], color=color, label=f"$T$ = {period:g} s")
+    for axis, name in zip(axes, FILTERS, strict=True):
+        for period, controller in PERIODS.items():
+            values = growths[period, name]
+            axis.plot(kappas, values[:, 0], color=controller.color, label=f"${controller.label}$".replace(" s$", "$ s"))
+            axis.plot(kappas, values.max(axis=1), "--", color=controller.color, linewidth=0.9)
         axis.axhline(0.0, color="black", linewidth=0.6)
         axis.set_ylabel("largest real part (1/s)")
-        axis.set_title(f"{name} notch", loc="right")
-        for kappa in (0.25, 1.0):
+        axis.set_title(name, loc="right")
+        for kappa in (paper_like(), 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[1].set_xlabel(r"coupling $\kappa$ (0.25: paper-like, 1: derived)")
+    axes[1].set_xlabel(rf"coupling $\kappa$ ({paper_like():g}: paper-like, 1: derived)")
     axes[0].legend(loc="upper left")
     letter(axes)
-    findings = []
-    for period, table in flights.items():
-        limits = [lost_from(kappas, np.array(growths[period][name]) < 0.0) for name in ("with", "without")]
-        said = ["nowhere" if kappa is None else f"from κ = {kappa:.2f} on" for kappa in limits]
-        attitude = [to_paper(float(v), "rad")[0] for v in _ends(table["post_fault_attitude_deviation"])]
-        decay = _ends(table["elastic_decay_time"])
-        findings.append(
-            f"T = {period:g} s: linear loop unstable {said[0]} with the notch, {said[1]} without; Case 1 with the "
-            f"paper-like coupling: attitude excursion {attitude[0]:.3f} deg (worst of {len(over) - 1} corners "
-            f"{attitude[1]:.3f} deg), decay {decay[0]:.1f} s ({decay[1]:.1f} s), {int(table['diverged'].sum())} "
-            "flights lost"
-        )
     return Outcome(
         figure,
-        "The baseline's inputs designed anew at each period (polytopic model, F, K), notch at 15 rad/s discretised at "
-        "that period; largest real part of the sampled loop's poles over the coupling, nominal vehicle, the worst of "
-        "both ends of the step, before and after the fault.",
-        tuple(findings),
+        "The baseline's inputs designed anew at each period (polytopic model, F, K), its notch discretised at that "
+        "period. Largest real part of the sampled loop's poles over the coupling, the worst of both ends of the step, "
+        f"before and after the fault; nominal vehicle (solid) and the worst of {said_corners(over)} of the parameter "
+        "bounds (dashed); the limits below are found by root finding.",
+        tuple(
+            "; ".join(
+                (
+                    f"{controller.label}: with the notch, {limits[period, FILTERS[0]].said()}",
+                    f"without, {limits[period, FILTERS[1]].said()}",
+                    _flown(strips[controller]),
+                )
+            )
+            for period, controller in PERIODS.items()
+        ),
         {
             "kappa": kappas.tolist(),
-            "growth_per_s": {f"{period:g} s": rows for period, rows in growths.items()},
+            "growth_per_s": {f"{period:g} s, {name}": rows.tolist() for (period, name), rows in growths.items()},
+            "unstable_from": {
+                f"{period:g} s, {name}": {"nominal": found.nominal, "worst": found.worst}
+                for (period, name), found in limits.items()
+            },
+            "flights": {c.label: columns for c, columns in strips.items()},
         },
     )
 
 
-def _ends(values: np.ndarray) -> tuple[float, float]:
-    return float(values[0]), float(values.max())
+def _flown(columns: Strip) -> str:
+    degrees = to_paper(1.0, "rad")[0]
+    attitude = [degrees * columns[f"post_fault_attitude_deviation_{which}"][0] for which in ("nominal", "worst")]
+    decay = [columns[f"elastic_decay_time_{which}"][0] for which in ("nominal", "worst")]
+    lost = 1.0 - columns["finished"][0]
+    return (
+        f"Case 1 with the paper-like coupling and the notch: attitude excursion {attitude[0]:.3f} deg (worst corner "
+        f"{attitude[1]:.3f} deg), decay {decay[0]:.1f} s ({decay[1]:.1f} s), "
+        + (f"{100.0 * lost:.0f} % of the flights lost" if lost else "no flight lost")
+    )
 
 
-def _growth(design: ControlDesign, kappa: float, notch: tuple[NotchSection, ...]) -> float:
-    vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
-    return worst_growth(vehicle, design.feedback_gain, notch, design.period)
+def _values(design: ControlDesign) -> dict[str, object]:
+    """Return Case 1 with a design; the integration keeps its step, whatever the control period."""
+    substeps = max(1, round(design.period / INTEGRATION_STEP))
+    return {**design.to_parameters(), **load_scenario("case1").parameters(), "substeps": substeps}
 
 
 def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:
@@ -98,10 +114,9 @@ def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:
     inputs = read_inputs(source)
     if period == inputs.model.period:
         return read_design(find_design("baseline"))
-    total = hashlib.sha256(
-        f"{source.read_text(encoding='utf-8')}{code_digest()}{package_digest('design')}{period}".encode()
-    ).hexdigest()
-    path = folder / f"design_{1e3 * period:.0f}ms_{total[:DIGITS]}.yaml"
+    parts = source.read_text(encoding="utf-8"), code_digest(), package_digest("design"), str(period)
+    digest = digest_of(part.encode() for part in parts)
+    path = folder / f"design_{1e3 * period:.0f}ms_{digest[:DIGITS]}.yaml"
     if not path.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         changed = inputs.model_copy(update={"model": inputs.model.model_copy(update={"period": period})})
@@ -109,6 +124,7 @@ def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:
             changed, lambda what, done, of: progress(f"design at {period:g} s: {what}", done, of)
         ).design
         write_design(path, design, f"The baseline's gains at a period of {period:g} s, for hsv study sampling.")
+        drop_older(path)
     return read_design(path)
 
 

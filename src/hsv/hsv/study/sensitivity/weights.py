@@ -1,108 +1,236 @@
-"""The weight of the elevator in the feedback gain, which the paper leaves open with all other weights."""
+"""The weights of F and K and the input bounds of K, which the paper leaves open."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from hsv.control.design_file import find_design, read_design
-from hsv.design.baseline import disturbance_columns
-from hsv.design.feedback import feedback_gain
-from hsv.design.inputs import find_inputs, read_inputs
+from hsv.design.region import Corner
 from hsv.simulation.scenario import load_scenario
-from hsv.study.corner_flights import fly_over
-from hsv.study.figures.style import GREY, letter, new_figure
-from hsv.study.linear_loop import worst_growth
-from hsv.study.sensitivity.controllers import HALF_WIDTH, WITH_NOTCH, WITHOUT_NOTCH, Controller, corners_of
-from hsv.study.sensitivity.flights_strip import Strip, draw_metric, legend, strip
+from hsv.study.figures.style import letter, new_figure
+from hsv.study.linear_loop import stability_limit, worst_growth
+from hsv.study.sensitivity.controllers import (
+    RMPC_DECOUPLED,
+    WITH_NOTCH,
+    WITHOUT_NOTCH,
+    Controller,
+    corners_of,
+    said_corners,
+)
+from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study
+from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.variations import (
+    BOUNDS,
+    ELEVATOR,
+    FACTORS,
+    WEIGHTS,
+    Group,
+    Variations,
+    baseline_variations,
+)
 from hsv.units import to_paper
-from hsv.vehicle.dynamics import N_RIGID, N_STATES
 from hsv.vehicle.parameters import vehicle_parameters
 
-CONTROLLERS = (WITH_NOTCH, WITHOUT_NOTCH)
+Strips = dict[Group, Strip]
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Design F with the elevator's scale from 0.03 rad to 0.2 rad, linearise and fly Case 1 with it."""
-    inputs, flown = read_inputs(find_inputs("baseline")), read_design(find_design("baseline"))
-    scales = np.geomspace(0.03, 0.2, max(2, round(13 / coarseness)))
-    over = corners_of(1.0)[:: max(1, round(coarseness))]
-    vehicle = vehicle_parameters("paper_like")
-    gains = []
-    growths: dict[Controller, list[float]] = {controller: [] for controller in CONTROLLERS}
-    tables: dict[Controller, list[dict[str, np.ndarray]]] = {controller: [] for controller in CONTROLLERS}
-    for index, scale in enumerate(scales):
-        progress("weights", index, len(scales))
-        found = feedback_gain(
-            flown.polytope.A[:, :N_RIGID, :N_RIGID],
-            flown.polytope.B[:, :N_RIGID],
-            disturbance_columns(inputs, vehicle_parameters("decoupled")),
-            inputs.feedback.state_scale.array(),
-            np.array([inputs.feedback.input_scale.fuel_equivalence_ratio, scale]),
-            inputs.feedback.method,
-        )
-        gain = np.zeros((2, N_STATES))
-        gain[:, :N_RIGID] = found.F
-        gains.append(float(gain[1, 4]))
-        design = replace(flown, feedback_gain=gain, tube=None)
-        for controller in CONTROLLERS:
-            notch = flown.notch if controller is WITH_NOTCH else ()
-            growths[controller].append(
-                max(worst_growth(vehicle.perturbed(corner), gain, notch, flown.period) for corner in over)
-            )
-            values = {**design.to_parameters(), **load_scenario(controller.scenario).parameters()}
-            tables[controller].append(fly_over(values, over, HALF_WIDTH))
-    progress("weights", len(scales), len(scales))
-    strips = {controller: strip(rows) for controller, rows in tables.items()}
+    """Design F and K with each group of weights times each factor, linearise and fly Case 1 with them."""
+    varied, over = baseline_variations(), corners_of(1.0, coarseness)
+    every = 1 if coarseness < 2.0 else 2
+    factors = {"F": FACTORS[::every], "K": FACTORS[::2]}
+    designs = varied.design(factors, progress)
+    growths = {
+        notched: {
+            group: [_growth(varied, designs["F", group, f].feedback_gain, notched, over) for f in factors["F"]]
+            for group in WEIGHTS
+        }
+        for notched in (True, False)
+    }
 
-    figure = new_figure(7.2)
-    axes = figure.subplots(3, 1, sharex=True)
-    for controller, worst in growths.items():
-        axes[0].plot(scales, worst, "--", color=controller.color, linewidth=0.9)
-        axes[0].plot([], [], color=controller.color, label=controller.label)
-    axes[0].axhline(0.0, color="black", linewidth=0.6)
-    axes[0].set_ylabel("largest real part (1/s)")
-    draw_metric(axes[1], scales, strips, "post_fault_attitude_from_nominal", "rad", "attitude from nominal (deg)")
-    draw_metric(axes[2], scales, strips, "altitude_end_error", "m", "altitude error at end (ft)")
-    axes[1].axhline(0.5, color="black", linewidth=0.6)
-    for axis in axes:
-        axis.axvline(inputs.feedback.input_scale.elevator_deflection, color=GREY, linewidth=0.6, linestyle=":")
-    axes[2].set_xlabel("scale of the elevator in F (rad); larger: a stiffer feedback; 0.07: the baseline's")
-    letter(axes)
-    legend(figure, shares=False)
+    def flown(law: str, groups: tuple[Group, ...], controller: Controller) -> Strips:
+        along = {
+            Controller(group.label, controller.scenario, group.color): [
+                Point(
+                    {**designs[law, group, f].to_parameters(), **load_scenario(controller.scenario).parameters()}, over
+                )
+                for f in factors[law]
+            ]
+            for group in groups
+        }
+        strips = sweep(f"weights_{law}_{controller.scenario}", along, folder, progress)
+        return dict(zip(groups, strips.values(), strict=True))
+
+    of_F = flown("F", WEIGHTS, WITH_NOTCH)
+    of_K = flown("K", (*WEIGHTS, BOUNDS), WITH_NOTCH)
+    of_rmpc = flown("K", (*WEIGHTS, BOUNDS), RMPC_DECOUPLED)
+    limits = _elevator_limits(varied, over)
+    figure = new_figure(7.6)
+    _draw(figure, factors, growths, (of_F, of_K, of_rmpc))
     return Outcome(
         figure,
-        "F designed anew with another scale of the elevator, all else the baseline's; nominal vehicle and "
-        f"{len(over) - 1} corners, paper-like coupling. (a) Linear sampled loop, before and after the fault, worst "
-        "vehicle; (b) attitude from nominal after the fault, black: half a degree; (c) altitude error at the end.",
-        tuple(_findings(scales, gains, growths, strips)),
+        "The baseline with one group of its weights times a factor (1: its own; weights are one over squared scales, "
+        "so that a larger scale weighs less), left: of F, right: of K with its input bounds; all else as it is. Case "
+        f"1, paper-like coupling, nominal vehicle and {said_corners(over)} of the parameter bounds. (a) Largest real "
+        "part of the linear sampled loop's poles, the worst of all vehicles, of both ends of the step, before and "
+        "after the fault; with notch (solid), without (dashed). (c), (d) Attitude from nominal after the fault, worst "
+        "corner; black: half a degree. (e) Altitude error at the end, nominal vehicle (solid), worst corner (dashed). "
+        "(b) Altitude (solid) and velocity (dashed) settled to 2 % of the step, nominal vehicle; a line ends where "
+        "that is not before the fault. (f) The error of (e) under robust MPC with the fourth of the gains, as the "
+        "paper flies it: on the decoupled model, without notch.",
+        (
+            *_feedback_findings(factors["F"], of_F, growths[False]),
+            *limits,
+            *_nominal_findings(factors["K"], of_K, of_rmpc),
+        ),
         {
-            "elevator_scale_rad": scales.tolist(),
-            "elevator_on_pitch_rate_s": gains,
-            "growth_per_s": {c.label: worst for c, worst in growths.items()},
-            "flights": {c.label: columns for c, columns in strips.items()},
+            "factor": {law: list(values) for law, values in factors.items()},
+            "growth_per_s": {
+                "with notch" if notched else "without": {group.label: values for group, values in rows.items()}
+                for notched, rows in growths.items()
+            },
+            "flights": {
+                name: {group.label: columns for group, columns in strips.items()}
+                for name, strips in (("F", of_F), ("K", of_K), ("K, RMPC", of_rmpc))
+            },
         },
     )
 
 
-def _findings(
-    scales: np.ndarray, gains: list[float], growths: dict[Controller, list[float]], strips: dict[Controller, Strip]
-) -> list[str]:
-    attitude = to_paper(1.0, "rad")[0] * np.array(strips[WITH_NOTCH]["post_fault_attitude_from_nominal_worst"])
-    altitude = to_paper(1.0, "m")[0] * np.array(strips[WITH_NOTCH]["altitude_end_error_worst"])
-    said = [
-        f"scale {scales[i]:.3f} rad, gain of the elevator on the pitch rate {gains[i]:.2f} s: worst attitude from "
-        f"nominal {attitude[i]:.3f} deg, worst altitude error {altitude[i]:.1f} ft with the notch"
-        for i in (0, len(scales) // 2, -1)
+def _growth(varied: Variations, gain: np.ndarray, notched: bool, over: list[Corner]) -> float:
+    vehicle, notch = vehicle_parameters("paper_like"), varied.flown.notch if notched else ()
+    return max(worst_growth(vehicle.perturbed(corner), gain, notch, varied.flown.period) for corner in over)
+
+
+def _elevator_limits(varied: Variations, over: list[Corner]) -> list[str]:
+    """Return in words up to which scale of the elevator in F the linear loops are stable."""
+    own = varied.inputs.feedback.input_scale.elevator_deflection
+
+    @cache
+    def gain(factor: float) -> np.ndarray:
+        return varied.feedback(ELEVATOR, factor).feedback_gain
+
+    def limit(notched: bool, vehicles: list[Corner]) -> str:
+        found = stability_limit(lambda factor: _growth(varied, gain(factor), notched, vehicles), FACTORS)
+        return "at every factor" if found is None else f"up to {found * own:.3f} rad"
+
+    return [
+        f"{controller.label}, scale of the elevator in F, {own:g} rad in the baseline: linear loop stable "
+        f"{limit(notched, over[:1])} (nominal vehicle), {limit(notched, over)} (worst of {said_corners(over)})"
+        for controller, notched in ((WITH_NOTCH, True), (WITHOUT_NOTCH, False))
     ]
-    for controller, values in growths.items():
-        stable = scales[np.array(values) < 0.0]
-        where = f"up to a scale of {stable.max():.3f} rad" if len(stable) else "at no scale looked at"
-        said.append(f"{controller.label}: every vehicle stable {where}")
-    return said
 
 
-STUDY = Study("weights", "Weight of the elevator in the feedback", run)
+def _draw(
+    figure: Figure,
+    factors: dict[str, tuple[float, ...]],
+    growths: dict[bool, dict[Group, list[float]]],
+    flights: tuple[Strips, Strips, Strips],
+) -> None:
+    of_F, of_K, of_rmpc = flights
+    panels = figure.subplots(3, 2, sharex=True)
+    feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
+    for notched, rows in growths.items():
+        for group, values in rows.items():
+            panels[0, 0].plot(factors["F"], values, "o-" if notched else "o--", color=group.color, markersize=3)
+    panels[0, 0].axhline(0.0, color="black", linewidth=0.6)
+    panels[0, 0].set_ylabel("largest real part (1/s)")
+    ends = ("altitude_end_error_nominal", "altitude_end_error_worst")
+    settling = ("altitude_settling_time_nominal", "velocity_settling_time_nominal")
+    attitude = ("post_fault_attitude_from_nominal_worst",)
+    for axis, law, strips, names, unit, label in (
+        (panels[0, 1], "K", of_K, settling, 1.0, "step settled (s)"),
+        (panels[1, 0], "F", of_F, attitude, degrees, "attitude from nominal (deg)"),
+        (panels[1, 1], "K", of_K, attitude, degrees, "attitude from nominal (deg)"),
+        (panels[2, 0], "F", of_F, ends, feet, "altitude error at end (ft)"),
+        (panels[2, 1], "K", of_rmpc, ends, feet, "altitude error at end,\nRMPC (ft)"),
+    ):
+        for group, columns in strips.items():
+            for name, style in zip(names, ("o-", "o--"), strict=False):
+                axis.plot(factors[law], unit * np.array(columns[name]), style, color=group.color, markersize=3)
+        axis.set_ylabel(label)
+    for axis in panels[1]:
+        axis.axhline(0.5, color="black", linewidth=0.6)
+    panels[1, 1].sharey(panels[1, 0])
+    for axis in (panels[0, 1], *panels[2]):
+        axis.set_ylim(bottom=0.0)
+    for axis, law in zip(panels[2], ("F", "K"), strict=True):
+        axis.set_xlabel(f"factor on a group of weights of {law}")
+    for axis in panels.ravel():
+        _factor_axis(axis)
+    letter(panels.ravel())
+    groups = [Line2D([], [], color=group.color, marker="o", markersize=3, label=group.label) for group in of_K]
+    figure.legend(handles=groups, loc="outside upper center", ncols=2, frameon=False)
+
+
+def _factor_axis(axis: Axes) -> None:
+    axis.set_xscale("log")
+    axis.xaxis.set_major_locator(FixedLocator(FACTORS))
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.2g}"))
+    axis.xaxis.set_minor_locator(NullLocator())
+    axis.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _feedback_findings(factors: tuple[float, ...], strips: Strips, without: dict[Group, list[float]]) -> list[str]:
+    feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
+
+    def at(group: Group, index: int) -> str:
+        attitude, altitude = (
+            strips[group][f"{name}_worst"][index] for name in ("post_fault_attitude_from_nominal", "altitude_end_error")
+        )
+        loop = "stable" if without[group][index] < 0.0 else "unstable"
+        return (
+            f"attitude from nominal {degrees * attitude:.3f} deg, altitude at the end {feet * altitude:.1f} ft off, "
+            f"linear loop without notch {loop}"
+        )
+
+    own = f"F, the baseline's own weights, worst corner: {at(ELEVATOR, factors.index(1.0))}"
+    return [own, *(f"F, {g.label} {_said(factors, partial(at, g))}" for g in strips)]
+
+
+def _nominal_findings(factors: tuple[float, ...], of_K: Strips, of_rmpc: Strips) -> list[str]:
+    feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
+
+    def at(group: Group, index: int) -> str:
+        settled = ", ".join(
+            f"{axis} {_seconds(of_K[group][f'{axis}_settling_time_nominal'][index])}"
+            for axis in ("altitude", "velocity")
+        )
+        attitude = degrees * of_K[group]["post_fault_attitude_from_nominal_worst"][index]
+        off = feet * of_rmpc[group]["altitude_end_error_nominal"][index]
+        lost = 1.0 - of_rmpc[group]["finished"][index]
+        return (
+            f"step settled: {settled}; worst attitude from nominal {attitude:.3f} deg; RMPC {off:.0f} ft off at the end"
+            + (f", {100.0 * lost:.0f} % of its flights lost" if lost else "")
+        )
+
+    def ends(strips: Strips) -> str:
+        values = np.array([columns["altitude_end_error_nominal"] for columns in strips.values()])
+        return f"{feet * np.nanmin(values):.1f} to {feet * np.nanmax(values):.1f} ft"
+
+    return [
+        f"K, the baseline's own weights: {at(ELEVATOR, factors.index(1.0))}",
+        *(f"K, {g.label} {_said(factors, partial(at, g))}" for g in of_K),
+        f"whatever the weights of K looked at, the tube's altitude ends {ends(of_K)} off, that of RMPC {ends(of_rmpc)} "
+        "(nominal vehicle)",
+    ]
+
+
+def _said(factors: tuple[float, ...], say: Callable[[int], str]) -> str:
+    """Return what ``say`` tells of the least and the largest factor."""
+    return "; ".join(f"times {factors[index]:g}: {say(index)}" for index in (0, -1))
+
+
+def _seconds(value: float) -> str:
+    return "not before the fault" if np.isnan(value) else f"{value:.1f} s"
+
+
+STUDY = Study("weights", "Weights of F and K, input bounds of K", run)

@@ -1,0 +1,83 @@
+"""The flights of a strip, kept controller by controller: a study that was interrupted goes on where it stopped."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.design.region import Corner
+from hsv.study.corner_flights import fly_over
+from hsv.study.sensitivity.controllers import Controller
+from hsv.study.sensitivity.strip import Strip, strip
+from hsv.study.sensitivity.study import Progress
+from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, file_bytes
+
+_MEASURING = (
+    "study/corner_flights.py",
+    "study/measures.py",
+    "study/sensitivity/strip.py",
+    "campaign/tube_levels.py",
+)
+"""What is measured hangs on these beside what the flights hang on."""
+
+_HALF_WIDTH = np.ones(5)
+"""The strips use no measure that weighs rigid errors against each other."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One point of a strip: flat parameters, the vehicles flown there, kappa in place of a named coupling set."""
+
+    values: Mapping[str, Any]
+    over: Sequence[Corner]
+    coupling_scale: float | None = None
+
+
+def sweep(
+    name: str, along: Mapping[Controller, Sequence[Point]], folder: Path, progress: Progress
+) -> dict[Controller, Strip]:
+    """Fly every controller at its points and return their strips.
+
+    Args:
+        name: Of the study.
+        along: Points by controller; the nominal vehicle is the first of each point.
+        folder: Where strips are kept, under a digest of what they depend on.
+        progress: Called with what is done.
+    """
+    total, done = sum(map(len, along.values())), 0
+    strips = {}
+    for number, (controller, points) in enumerate(along.items()):
+        path = folder / f"strip_{name}_{number}_{_digest(points)[:DIGITS]}.json"
+        if path.is_file():
+            strips[controller] = json.loads(path.read_text(encoding="utf-8"))
+        else:
+            tables = []
+            for index, point in enumerate(points):
+                progress(f"{name}, flights", done + index, total)
+                tables.append(
+                    fly_over(dict(point.values), point.over, _HALF_WIDTH, coupling_scale=point.coupling_scale)
+                )
+            strips[controller] = strip(tables)
+            _keep(path, strips[controller])
+        done += len(points)
+    progress(f"{name}, flights", total, total)
+    return strips
+
+
+def _digest(points: Sequence[Point]) -> str:
+    flown = [[dict(point.values), [dict(corner) for corner in point.over], point.coupling_scale] for point in points]
+    text = json.dumps(flown, sort_keys=True, default=np.ndarray.tolist)
+    return digest_of([text.encode(), code_digest().encode(), *map(file_bytes, _MEASURING)])
+
+
+def _keep(path: Path, columns: Strip) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = path.with_suffix(".tmp")
+    new.write_text(json.dumps(columns), encoding="utf-8")
+    new.rename(path)
+    drop_older(path)
