@@ -1,15 +1,20 @@
+import json
+import resource
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from pyarrow import parquet
 
 from hsv.campaign.conduct import capacity, conduct
 from hsv.campaign.fleet import OwnProcess
 from hsv.campaign.store import Store, read_campaign
 from hsv.campaign.summary import Results
+from hsv.campaign.table import CAMPAIGN
 from hsv.errors import CampaignError
 
 
@@ -111,6 +116,117 @@ def test_two_processes_do_not_fly_the_same_campaign(planned, out):
         Store(out, planned()).opened(),
     ):
         pass
+
+
+def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, out):
+    campaign, refused = planned(), []
+
+    def restart_from_elsewhere(done):
+        if 0 < done < campaign.samples:
+            with pytest.raises(CampaignError, match="in use") as error, Store(out, campaign).opened(restart=True):
+                pass
+            refused.append(error)
+
+    conduct(campaign, Store(out, campaign), OwnProcess(), progress=restart_from_elsewhere)
+    assert refused
+    assert out.read_bytes() == results.path.read_bytes()
+    assert list(out.parent.iterdir()) == [out]
+
+
+def test_a_lock_left_by_a_killed_process_stops_nobody(planned, out):
+    out.with_name(out.name + ".lock").touch()
+    with Store(out, planned()).opened():
+        pass
+
+
+def damage(path, how):
+    content = path.read_bytes()
+    if how == "truncated":
+        path.write_bytes(content[: len(content) // 2])
+    elif how == "empty":
+        path.write_bytes(b"")
+    else:
+        parquet.write_table(parquet.read_table(path).slice(1), path)
+
+
+@pytest.mark.parametrize("how", ["truncated", "empty", "a row short"])
+def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out, how):
+    campaign = planned(samples=44)
+    with pytest.raises(KeyboardInterrupt):
+        conduct(campaign, Store(out, campaign), OwnProcess(), progress=interrupted_at(32))
+    store = Store(out, campaign)
+    first = store.folder / "00000000.parquet"
+    (store.folder / "foo.parquet").write_text("nothing")
+    damage(first, how)
+    fleet = Counting()
+    conduct(campaign, store, fleet)
+    assert fleet.flown == [0, 1]
+    assert out.read_bytes() == results.path.read_bytes()
+
+
+def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, results, out):
+    campaign, store = planned(), Store(out, planned())
+
+    def spoil(done):
+        if done == campaign.samples:
+            path = store.folder / "00000001.parquet"
+            content = bytearray(path.read_bytes())
+            content[4:2000] = bytes(1996)
+            path.write_bytes(content)
+
+    with pytest.raises(CampaignError, match=r"00000001\.parquet: damaged"):
+        conduct(campaign, store, OwnProcess(), progress=spoil)
+    assert conduct(campaign, store, OwnProcess()) == len(campaign.flights(1))
+    assert out.read_bytes() == results.path.read_bytes()
+
+
+@contextmanager
+def file_size_limit(limit):
+    """A disk on which no file grows beyond ``limit`` bytes."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.mark.parametrize("limit", [20_000, 120_000])
+def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, limit):
+    campaign = planned()
+    with file_size_limit(limit), pytest.raises(CampaignError, match=r"cannot be written \(File too large\)"):
+        conduct(campaign, Store(out, campaign), OwnProcess())
+    assert not list(out.parent.rglob("*.unfinished"))
+    conduct(campaign, Store(out, campaign), OwnProcess())
+    assert out.read_bytes() == results.path.read_bytes()
+
+
+def rewritten(path, campaign=None, without=()):
+    """Write a result file again as another version might have."""
+    table = parquet.read_table(path)
+    metadata = {key: value for key, value in parquet.read_metadata(path).metadata.items() if key.startswith(b"hsv.")}
+    if campaign:
+        metadata[CAMPAIGN] = json.dumps(json.loads(metadata[CAMPAIGN]) | campaign).encode()
+    metadata = {key: value for key, value in metadata.items() if key.decode() not in without}
+    kept = [name for name in table.column_names if name not in without]
+    parquet.write_table(table.select(kept).replace_schema_metadata(metadata), path)
+
+
+@pytest.mark.parametrize(
+    ("campaign", "without", "expected"),
+    [
+        ({"wind": 3.0, "commit": "abc"}, (), "written by commit abc, which this version does not read"),
+        ({"method": "grid"}, (), "written by commit test.*'grid'"),
+        ({"factors": [{"name": "wind", "unit": "1", "low": 0.0, "high": 1.0}]}, (), "factor 'wind'"),
+        ({}, ("tube_level",), "has no column 'tube_level', written by commit test"),
+        ({}, ("hsv.envelope",), "has no envelope .* written by commit test"),
+    ],
+)
+def test_a_result_of_another_version_is_refused_with_its_commit(results, out, campaign, without, expected):
+    out.write_bytes(results.path.read_bytes())
+    rewritten(out, campaign, without)
+    with pytest.raises(CampaignError, match=rf"^{out}: .*{expected}"):
+        Results(out)
 
 
 def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):

@@ -1,5 +1,7 @@
 """Exceptions of the library: one base class, and one subclass per cause that also inherits the standard one."""
 
+import os
+
 
 class HsvError(Exception):
     """Base of everything this library raises on purpose; the message names the field, its value and what was due."""
@@ -35,3 +37,8 @@ class CampaignError(HsvError, ValueError):
 
 class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""
+
+
+def reason(error: OSError) -> str:
+    """Return why the system refused, in its own words; libraries add theirs, some on several lines."""
+    return os.strerror(error.errno) if error.errno else " ".join(str(error).split())

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
-from hsv.campaign.factors import Factor, factors_of
+from hsv.campaign.factors import Factor, check_names, factors_of
 from hsv.control.design_file import find_design, read_design_parameters
 from hsv.errors import CampaignError
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
@@ -77,9 +77,24 @@ class Campaign:
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """Return the campaign written by :attr:`text`."""
-        values = json.loads(text)
-        return cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
+        """Return the campaign written by :attr:`text`.
+
+        Raises:
+            CampaignError: Another version wrote it, or it is damaged.
+        """
+        commit = "unknown"
+        try:
+            values = json.loads(text)
+            commit = values.get("commit", commit)
+            found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
+            if found.method not in METHODS:
+                raise ValueError(f"method {found.method!r}")
+            check_names(factor.name for factor in found.factors)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise CampaignError(
+                f"campaign written by commit {commit}, which this version does not read: {error}"
+            ) from error
+        return found
 
     def difference(self, other: Campaign) -> str:
         """Return the first setting in which ``other`` differs, in words; empty if in none."""

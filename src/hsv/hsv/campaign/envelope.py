@@ -88,9 +88,13 @@ class Envelope:
 
     @classmethod
     def decode(cls, text: str) -> Self:
-        """Return the envelope that :meth:`encode` wrote."""
+        """Return the envelope that :meth:`encode` wrote.
+
+        Raises:
+            ValueError: It has other signals or windows.
+        """
         s = len(SIGNALS)
-        table = np.frombuffer(base64.b64decode(text)).reshape(-1, 3 * s + 1).copy()
+        table = np.frombuffer(base64.b64decode(text)).reshape(WINDOWS, 3 * s + 1).copy()
         return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])
 
 

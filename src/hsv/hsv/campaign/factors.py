@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import tomli_w
@@ -55,6 +55,18 @@ def factors_of(
     for ends in ([f.low for f in factors], [f.high for f in factors]):
         parse_scenario(scenario_toml(scenario, factors, ends), scenario.name)
     return tuple(factors)
+
+
+def check_names(names: Iterable[str]) -> None:
+    """Refuse a factor that this version does not know.
+
+    Raises:
+        CampaignError: Names it.
+    """
+    known = (*uncertainty_bounds(), *OPTIONAL)
+    for name in names:
+        if name not in known:
+            raise CampaignError(f"factor {name!r}: expected one of {', '.join(known)}")
 
 
 def flown_scenario(base: Scenario, factors: Sequence[Factor], sample: Sequence[float]) -> Scenario:

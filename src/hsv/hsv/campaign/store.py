@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
+from hsv.campaign.lock import locked
 from hsv.campaign.table import CAMPAIGN, COMPRESSION, ENVELOPE, schema
-from hsv.errors import CampaignError
+from hsv.errors import CampaignError, reason
 
 _CAMPAIGN_FILE = "campaign.json"
 
@@ -29,7 +30,7 @@ class Store:
 
     @contextmanager
     def opened(self, restart: bool = False) -> Iterator[set[int]]:
-        """Yield the numbers of the batches that are there; only one process at a time may hold a campaign.
+        """Yield the numbers of the batches that are there whole; only one process at a time may hold a campaign.
 
         Args:
             restart: Throw away what is there.
@@ -37,47 +38,78 @@ class Store:
         Raises:
             CampaignError: The file or folder belongs to another campaign, cannot be made, or is in use.
         """
-        if restart:
-            shutil.rmtree(self.folder, ignore_errors=True)
-            self.out.unlink(missing_ok=True)
-        if self.out.exists():
-            self._check(read_campaign(self.out), self.out)
-            shutil.rmtree(self.folder, ignore_errors=True)
-            yield set(range(self._campaign.batches))
-            return
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise CampaignError(f"out = {str(self.out)!r}: cannot be written ({error.strerror})") from error
-        with (self.folder / "lock").open("w") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise CampaignError(f"{self.folder}: in use, another process is flying this campaign") from None
-            described = self.folder / _CAMPAIGN_FILE
-            if described.exists():
-                self._check(Campaign.from_text(described.read_text(encoding="utf-8")), self.folder)
-            else:
-                _write(described, self._campaign.text.encode())
-            yield {int(path.stem) for path in self.folder.glob("*.parquet")}
+        with _writing(self.out):
+            self.out.parent.mkdir(parents=True, exist_ok=True)
+        lock = self.out.with_name(self.out.name + ".lock")
+        with locked(lock, f"{self.out}: in use, another process is flying this campaign"):
+            if restart:
+                shutil.rmtree(self.folder, ignore_errors=True)
+                self.out.unlink(missing_ok=True)
+            if self.out.exists():
+                self._check(read_campaign(self.out), self.out)
+                shutil.rmtree(self.folder, ignore_errors=True)
+                yield set(range(self._campaign.batches))
+                return
+            self._describe()
+            yield {batch for batch in range(self._campaign.batches) if self._is_whole(batch)}
 
     def keep(self, batch: int, content: bytes) -> None:
-        """Keep a finished batch: it is there whole, or not at all."""
+        """Keep a finished batch: it is there whole, or not at all.
+
+        Raises:
+            CampaignError: It cannot be written.
+        """
         _write(self._part(batch), content)
 
     def finish(self) -> None:
-        """Make the result file of all batches, and remove them."""
+        """Make the result file of all batches, and remove them.
+
+        Raises:
+            CampaignError: The file cannot be written, or a batch is damaged, which is then removed.
+        """
         temporary = self.out.with_name(self.out.name + ".unfinished")
         envelope = Envelope.empty()
         columns = schema(self._campaign)
-        with pq.ParquetWriter(temporary, columns, compression=COMPRESSION) as writer:
-            for batch in range(self._campaign.batches):
-                part = pq.read_table(self._part(batch))
-                envelope.merge(Envelope.decode(part.schema.metadata[ENVELOPE].decode()))
-                writer.write_table(part.cast(columns))
-            writer.add_key_value_metadata({CAMPAIGN: self._campaign.text, ENVELOPE: envelope.encode()})
-        _replace(temporary, self.out)
+        with _writing(self.out, temporary):
+            with pq.ParquetWriter(temporary, columns, compression=COMPRESSION) as writer:
+                for batch in range(self._campaign.batches):
+                    part, its_envelope = self._read(batch)
+                    envelope.merge(its_envelope)
+                    writer.write_table(part.cast(columns))
+                writer.add_key_value_metadata({CAMPAIGN: self._campaign.text, ENVELOPE: envelope.encode()})
+            _replace(temporary, self.out)
         shutil.rmtree(self.folder)
+
+    def _describe(self) -> None:
+        described = self.folder / _CAMPAIGN_FILE
+        if described.exists():
+            try:
+                found = Campaign.from_text(described.read_text(encoding="utf-8"))
+            except (CampaignError, OSError, UnicodeDecodeError) as error:
+                raise CampaignError(f"{described}: {error}; --restart begins anew") from error
+            self._check(found, self.folder)
+            return
+        with _writing(self.folder):
+            self.folder.mkdir(exist_ok=True)
+        _write(described, self._campaign.text.encode())
+
+    def _is_whole(self, batch: int) -> bool:
+        try:
+            with pq.ParquetFile(self._part(batch)) as file:
+                found, rows = file.schema_arrow, file.metadata.num_rows
+        except (OSError, ValueError):
+            return False
+        complete = rows == len(self._campaign.flights(batch)) and ENVELOPE in (found.metadata or {})
+        return complete and bool(found.equals(schema(self._campaign)))
+
+    def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
+        path = self._part(batch)
+        try:
+            part = pq.read_table(path)
+            return part, Envelope.decode(part.schema.metadata[ENVELOPE].decode())
+        except (OSError, ValueError) as error:
+            path.unlink(missing_ok=True)
+            raise CampaignError(f"{path}: damaged, removed; the same command flies these flights again") from error
 
     def _part(self, batch: int) -> Path:
         return self.folder / f"{batch:08}.parquet"
@@ -102,13 +134,29 @@ def read_campaign(path: Path) -> Campaign:
         raise CampaignError(f"{path}: cannot be read, expected the Parquet file of a campaign") from error
     if CAMPAIGN not in metadata:
         raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
-    return Campaign.from_text(metadata[CAMPAIGN].decode())
+    try:
+        return Campaign.from_text(metadata[CAMPAIGN].decode())
+    except (CampaignError, UnicodeDecodeError) as error:
+        raise CampaignError(f"{path}: {error}") from error
 
 
 def _write(path: Path, content: bytes) -> None:
     temporary = path.with_name(path.name + ".unfinished")
-    temporary.write_bytes(content)
-    _replace(temporary, path)
+    with _writing(path, temporary):
+        temporary.write_bytes(content)
+        _replace(temporary, path)
+
+
+@contextmanager
+def _writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
+    """Turn what the system refuses into an error that names ``path``; leave no half of a ``temporary`` file."""
+    try:
+        yield
+    except OSError as error:
+        if temporary:
+            temporary.unlink(missing_ok=True)
+        kept = "; finished batches are kept" if temporary else ""
+        raise CampaignError(f"{path}: cannot be written ({reason(error)}){kept}") from error
 
 
 def _replace(temporary: Path, path: Path) -> None:

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.store import read_campaign
-from hsv.campaign.table import ENVELOPE, OUTCOMES
+from hsv.campaign.table import ENVELOPE, OUTCOMES, schema
+from hsv.errors import CampaignError
 
 CONFIDENCE = 0.95
 
@@ -55,29 +57,46 @@ class Results:
         """Read ``path``.
 
         Raises:
-            CampaignError: The file is missing or not the result of a campaign.
+            CampaignError: The file is missing, not the result of a campaign, or that of another version.
         """
         self.path = path
         self.campaign: Campaign = read_campaign(path)
+        found = pq.read_metadata(path)
+        for name in schema(self.campaign).names:
+            if name not in found.schema.names:
+                raise self._foreign(f"has no column {name!r}")
+        try:
+            self.envelope = Envelope.decode(found.metadata[ENVELOPE].decode())
+            """The envelope of all flights."""
+        except (KeyError, ValueError) as error:
+            raise self._foreign("has no envelope of this version's curves") from error
 
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""
-        return np.asarray(pq.read_table(self.path, columns=[name])[name].to_numpy())
+        return np.asarray(self._read(columns=[name])[name].to_numpy())
 
     @property
     def samples(self) -> np.ndarray:
         """The samples (flights, factors), SI."""
         return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
 
-    @property
-    def envelope(self) -> Envelope:
-        """The envelope of all flights."""
-        return Envelope.decode(pq.read_metadata(self.path).metadata[ENVELOPE].decode())
-
     def row(self, flight: int) -> dict[str, Any]:
         """Return the row of a flight."""
-        [row] = pq.read_table(self.path, filters=[("flight", "==", flight)]).to_pylist()
-        return dict(row)
+        rows = self._read(filters=[("flight", "==", flight)]).to_pylist()
+        if len(rows) != 1:
+            raise CampaignError(f"{self.path}: has {len(rows)} rows of flight {flight}, expected one")
+        return dict(rows[0])
+
+    def _read(self, **what: Any) -> pa.Table:
+        try:
+            return pq.read_table(self.path, **what)
+        except (OSError, ValueError) as error:
+            raise CampaignError(f"{self.path}: damaged, expected the result of a campaign") from error
+
+    def _foreign(self, lack: str) -> CampaignError:
+        return CampaignError(
+            f"{self.path}: {lack}, written by commit {self.campaign.commit}; expected a result of this version"
+        )
 
 
 def limits(results: Results) -> dict[str, float]:
