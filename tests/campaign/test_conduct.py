@@ -4,7 +4,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -180,24 +179,21 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
     assert out.read_bytes() == results.path.read_bytes()
 
 
-@contextmanager
-def file_size_limit(limit):
-    """A disk on which no file grows beyond ``limit`` bytes."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+@pytest.mark.parametrize("flights", [0, 32, 44])
+def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, flights):
+    campaign, before = planned(), resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def fill_the_disk(done):
+        if done == flights:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+
     try:
-        yield
+        with pytest.raises(CampaignError, match=r"cannot be written \(File too large\); finished batches are kept"):
+            conduct(campaign, Store(out, campaign), OwnProcess(), progress=fill_the_disk)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
-
-
-@pytest.mark.parametrize("limit", [20_000, 120_000])
-def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, limit):
-    campaign = planned()
-    with file_size_limit(limit), pytest.raises(CampaignError, match=r"cannot be written \(File too large\)"):
-        conduct(campaign, Store(out, campaign), OwnProcess())
     assert not list(out.parent.rglob("*.unfinished"))
-    conduct(campaign, Store(out, campaign), OwnProcess())
+    assert conduct(campaign, Store(out, campaign), OwnProcess()) == campaign.samples - flights
     assert out.read_bytes() == results.path.read_bytes()
 
 
