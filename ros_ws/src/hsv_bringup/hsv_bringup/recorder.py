@@ -12,7 +12,7 @@ from pathlib import Path
 from hsv_msgs.msg import RecorderProgress, Run
 
 from hsv.errors import ParameterError
-from hsv.graph.description import TOPICS
+from hsv.graph.description import OTHER_TOPICS, TOPICS
 from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.topic import Qos, Topic
@@ -22,15 +22,6 @@ from hsv_node.main import run_node
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
-
-OTHER_TOPICS = {
-    "/hsv/run": "hsv_msgs/msg/Run",
-    "/hsv/ready": "hsv_msgs/msg/Ready",
-    "/rosout": "rcl_interfaces/msg/Log",
-    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
-    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
-}
-"""Topics beside those with one message a step; recorded at the simulated time at which they arrive."""
 
 CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
@@ -80,7 +71,10 @@ class RecorderNode(PeerNode):
     def start_run(self, run: Run) -> None:
         """Note how many steps will come; a second run would need a second bag."""
         if self._complete >= 0:
-            self.get_logger().fatal("a new run was announced: expected a recorder of its own for every run")
+            self.get_logger().fatal(
+                "a new run was announced: expected a recorder of its own for every run, "
+                "and a ROS_DOMAIN_ID of its own for each that flies at the same time"
+            )
             self.finish(1)
         self._last_step = run.last_step
         self._nanoseconds_per_step = round(run.period * 1e9)

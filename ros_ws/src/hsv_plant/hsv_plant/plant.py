@@ -140,7 +140,7 @@ class PlantNode(LockstepNode):
     def _give_up(self, waited: float) -> None:
         step = self._result.step
         behind_recorder = self._flown or not self._room()
-        what = "the recorder's confirmation" if behind_recorder else "/hsv/actuator (from fault_injector)"
+        what = "/hsv/recorder_progress (from recorder)" if behind_recorder else "/hsv/actuator (from fault_injector)"
         silent = unresponsive(self, self._peers)
         blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
         self.get_logger().fatal(f"step {step}: no {what} for {waited:.1f} s; {blame}")

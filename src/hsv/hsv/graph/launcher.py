@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import socket
 import subprocess
 import threading
 import time
@@ -73,21 +74,18 @@ class Launcher:
 
     def __enter__(self) -> Launcher:
         paths = [executable(node) for node in self._nodes]
+        self._domain = _domain_of_its_own()
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
         except BaseException:
-            self.stop()
+            self.__exit__()
             raise
         return self
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-
-    @property
-    def pids(self) -> dict[str, int]:
-        """Process ids by node name."""
-        return {p.description.name: p.popen.pid for p in self._processes}
+        self._domain.close()
 
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
@@ -166,6 +164,22 @@ class Launcher:
 
 def _landed(process: _Process, code: int) -> bool:
     return process.description in _FLYING and code in (0, EXIT_DIVERGED)
+
+
+def _domain_of_its_own() -> socket.socket:
+    """Return what keeps the ROS domain to this run, on this machine, for as long as it is open.
+
+    The nodes of two runs would take each other's messages, and both would be lost.
+    """
+    number = os.environ.get("ROS_DOMAIN_ID") or "0"
+    name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        # A name without a file: it is gone with this process, however that ends.
+        name.bind(f"\0hsv_domain_{number}")
+    except OSError:
+        name.close()
+        raise RunError(f"another run has ROS_DOMAIN_ID={number}: expected a domain of its own for every run") from None
+    return name
 
 
 def _die_with_parent() -> None:
