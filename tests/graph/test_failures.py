@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import time
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 from node_processes import Processes, children, short_scenario
 
-from hsv.graph.description import graph
+from hsv.graph.description import PLANT, RECORDER, graph
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
@@ -28,33 +29,67 @@ def _start_and_fly(processes: Processes, bag: Path, pace: str = "1"):  # type: i
     return run
 
 
-@pytest.mark.parametrize("name", [node.name for node in graph()])
+@pytest.mark.parametrize("name", [node.name for node in graph() if node is not RECORDER])
 def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> None:
     bag = processes.folder / "broken"
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
     assert set(nodes) == {node.name for node in graph()}
     killed = time.monotonic()
-    os.kill(nodes[name], signal.SIGKILL)
+    # Asked to end in flight, the plant ends in order; the flight is lost all the same.
+    asked = name == PLANT.name
+    os.kill(nodes[name], signal.SIGTERM if asked else signal.SIGKILL)
     output, _ = run.communicate(timeout=30.0)
     assert time.monotonic() - killed < 5.0
     assert run.returncode == 1
-    assert f"{name} was killed by SIGKILL" in output
+    assert f"{bag}: {name} {'ended with exit code 143' if asked else 'was killed by SIGKILL'}" in output
     assert len(Bag(bag).columns("/hsv/state")["step"]) > 50
     assert (bag / "metadata.yaml").is_file()
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
 
 
-def test_interrupt_ends_all_and_closes_the_bag(processes: Processes) -> None:
-    bag = processes.folder / "interrupted"
+def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes) -> None:
+    bag = processes.folder / "full"
+    run = _start_and_fly(processes, bag)
+    for pid in (run.pid, children(run.pid)["recorder"]):
+        resource.prlimit(pid, resource.RLIMIT_FSIZE, (150_000, resource.RLIM_INFINITY))
+    output, _ = run.communicate(timeout=30.0)
+    assert run.returncode == 1
+    assert "full_0.mcap: cannot be mended: File too large" in output
+    assert "recorder ended with exit code 2. Its last words:" in output
+    assert output.count("recorder: error: ") == output.count("cannot be written: File too large") == 1
+    assert [file.name for file in bag.iterdir()] == ["full_0.mcap"]
+    assert len(Bag(bag).columns("/hsv/state")["step"]) > 50
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int) -> None:
+    bag, temporary = processes.folder / "interrupted", processes.folder / "temporary"
+    temporary.mkdir()
+    processes.environment["TMPDIR"] = str(temporary)
     run = _start_and_fly(processes, bag)
     nodes = children(run.pid)
-    run.send_signal(signal.SIGINT)
+    if number == signal.SIGINT:
+        _refuse_to_disturb(processes, bag)
+    run.send_signal(number)
     output, _ = run.communicate(timeout=15.0)
     assert run.returncode == 130
     assert "interrupted" in output
     assert Bag(bag).complete
-    assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
+    assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()) and not list(temporary.iterdir())
+
+
+def _refuse_to_disturb(processes: Processes, bag: Path) -> None:
+    """Neither a second run nor a recovery touches a flight and its bag."""
+    for words, refused in (
+        (("run", "case1", "--bag", bag), "exists already"),
+        (("recover", bag), "is being recorded"),
+        (("run", "case1", "--bag", processes.folder / "other"), "another run has ROS_DOMAIN_ID="),
+    ):
+        again = processes.run("hsv", *words)
+        assert again.returncode == (1 if "another" in refused else 2), again.stdout
+        assert refused in again.stdout
+    assert not (processes.folder / "other").exists()
 
 
 def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:

@@ -140,7 +140,7 @@ def test_a_bag_that_is_being_recorded_is_left_alone(kit: SimpleNamespace, tmp_pa
     for step in range(100):
         writer.write("/hsv/state", step, kit.messages.stamped("hsv_msgs/msg/VehicleState", step, step))
     before = writer.path.stat()
-    with pytest.raises(RecordingError, match="live_0.mcap: is being recorded"):
+    with pytest.raises(RecordingError, match=r"live_0\.mcap: is being recorded"):
         recover(path)
     assert writer.path.stat() == before and list(path.iterdir()) == [writer.path]
     writer.close()
@@ -154,7 +154,7 @@ def test_a_full_disk_leaves_the_bag_as_it_was(killed: tuple[Path, int]) -> None:
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (len(data) // 2, limits[1]))
     try:
-        with pytest.raises(RecordingError, match="killed_0.mcap: cannot be mended: File too large"):
+        with pytest.raises(RecordingError, match=r"killed_0\.mcap: cannot be mended: File too large"):
             recover(path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)

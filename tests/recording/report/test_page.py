@@ -1,5 +1,6 @@
 import html
 import re
+import resource
 
 import pytest
 from recorded_flight import message_types
@@ -139,3 +140,14 @@ def test_a_bag_without_a_flight_is_refused(quiet, tmp_path):
 def test_a_file_that_cannot_be_written_is_named(quiet, tmp_path):
     with pytest.raises(RecordingError, match=r"nowhere/page\.html: cannot be written"):
         write_report([quiet], tmp_path / "nowhere" / "page.html")
+
+
+def test_a_full_disk_leaves_no_half_page(quiet, tmp_path):
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
+    try:
+        with pytest.raises(RecordingError, match=r"page\.html: cannot be written \(File too large\)"):
+            write_report([quiet], tmp_path / "page.html")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert not list(tmp_path.iterdir())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import sys
 from typing import Any
 
@@ -71,6 +72,8 @@ app.add_typer(montecarlo, name="montecarlo")
 
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
+    # Asked to end, a command ends its processes and removes its temporary files as after Ctrl-C.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         code = app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False)

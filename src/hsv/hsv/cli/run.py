@@ -30,7 +30,7 @@ def run(
 
     from hsv.cli.progress import flight as flight_bar
     from hsv.cli.summary import report_flight
-    from hsv.errors import QuantityError
+    from hsv.errors import QuantityError, RecordingError
     from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
     from hsv.recording.flight import flight_data
@@ -60,12 +60,16 @@ def run(
     recorded = Bag(prepared.bag)
     data = flight_data(recorded)
     extra = {"bag": str(prepared.bag)}
+    unwritten = None
     if report:
         from hsv.recording.report.page import write_report
 
         page = prepared.bag / "report.html"
-        write_report([recorded], page, paper_units=units is Units.paper)
-        extra["report"] = str(page)
+        try:
+            write_report([recorded], page, paper_units=units is Units.paper)
+            extra["report"] = str(page)
+        except RecordingError as error:
+            unwritten = error  # the flight itself is whole, and told first
     report_flight(
         loaded,
         flight_metrics(data),
@@ -76,3 +80,5 @@ def run(
         json=json,
         extra=extra,
     )
+    if unwritten:
+        raise unwritten

@@ -42,6 +42,8 @@ def write_report(bags: Sequence[Bag], out: Path, *, paper_units: bool = False) -
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as error:
+        if out.is_file():
+            out.unlink()  # half a page
         raise RecordingError(f"{out}: cannot be written ({error.strerror}), expected an HTML file to write") from None
 
 
