@@ -15,10 +15,10 @@ def _case1(evidence: Evidence) -> Finding:
     single, fourth = (evidence.spread(name, LIMITED) for name in ("case1_rmpc", "case1_rmpc_fourth_k"))
     return Finding(
         (
-            *evidence.spread("case1", LIMITED).readings("limited steps, tube", "1", at_most=0.0),
+            *evidence.spread("case1", LIMITED).readings("limited steps of the whole flight, tube", "1", at_most=0.0),
             Reading("the same, derived coupling, worst corner", worst(derived, LIMITED), "1", at_most=0.0),
-            *single.readings("limited steps, RMPC (single gain)", "1", at_most=0.0),
-            *fourth.readings("limited steps, RMPC (fourth gain)", "1", at_most=0.0),
+            *single.readings("limited steps of the whole flight, RMPC (single gain)", "1", at_most=0.0),
+            *fourth.readings("limited steps of the whole flight, RMPC (fourth gain)", "1", at_most=0.0),
         ),
         f"Tube: {_ranges(table)}. {_limits()} What a limiter cuts satisfies the constraints too, so what counts is how "
         "often it had to.",
@@ -29,11 +29,11 @@ def _case2(evidence: Evidence) -> Finding:
     table, derived = evidence.corners("case2"), evidence.corners("case2_derived")
     return Finding(
         (
-            *evidence.spread("case2", LIMITED).readings("limited steps", "1", at_most=0.0),
+            *evidence.spread("case2", LIMITED).readings("limited steps of the whole flight", "1", at_most=0.0),
             Reading("the same, derived coupling, nominal vehicle", nominal(derived, LIMITED), "1", at_most=0.0),
             Reading("the same, derived coupling, worst corner", worst(derived, LIMITED), "1", at_most=0.0),
         ),
-        f"{_ranges(table)}. {_limits()}",
+        f"Flown: {_ranges(table)}. {_limits()}",
     )
 
 
