@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
-from hsv.study.linear_loop import sampled_loop
+from hsv.study.linear_loop import stability_limit, worst_growth
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.parameters import COUPLING_SETS, vehicle_parameters
 from hsv.vehicle.trim import trim
@@ -66,18 +67,30 @@ class FactorRow:
 
 @dataclass(frozen=True)
 class FactorStudy:
-    """The rows; by coupling set the rightmost pole (1/s) over :data:`FINE`; what is certified.
+    """The rows; the linear loops; what is certified.
 
-    ``least_certified``: the least of :data:`FINE` with one Lyapunov function for it and everything up to 1.
+    ``growth``: by coupling set, the rightmost pole (1/s) over :data:`FINE` of the nominal vehicle and of the worst,
+    (2, f). ``limits``: by coupling set, the factor below which the loop is not stable, of the nominal vehicle and of
+    the worst; ``None``: stable down to the least of :data:`FINE`. ``least_certified``: the least of :data:`FINE` with
+    one Lyapunov function for it and everything up to 1.
     """
 
     rows: list[FactorRow]
     growth: dict[str, np.ndarray]
+    limits: dict[str, tuple[float | None, float | None]]
     least_certified: float
 
 
-def factor_study(inputs: DesignInputs, factors: Sequence[float], progress: Progress) -> FactorStudy:
-    """Design and fly at each of ``factors``; ``inputs`` as of the shipped adjustable design.
+def factor_study(
+    inputs: DesignInputs, factors: Sequence[float], over: Sequence[Corner], progress: Progress
+) -> FactorStudy:
+    """Design and fly at each of ``factors``.
+
+    Args:
+        inputs: As of the shipped adjustable design.
+        factors: The first is 1.
+        over: Vehicles of the linear loops, the nominal one first.
+        progress: Called with what is done.
 
     Raises:
         DesignError: No design at tau = 1.
@@ -90,10 +103,13 @@ def factor_study(inputs: DesignInputs, factors: Sequence[float], progress: Progr
         progress("factors", done, len(factors))
         rows.append(_row(gains, with_tau(inputs, [tau]), tau, complete))
     progress("factors", len(factors), len(factors))
-    effectiveness = inputs.disturbance.elevator_effectiveness
-    poles = {coupling: growth(gains, coupling, effectiveness) for coupling in COUPLING_SETS}
+    growths, limits = {}, {}
+    for coupling in COUPLING_SETS:
+        nominal, worst = (partial(growth, gains, coupling, vehicles) for vehicles in (over[:1], over))
+        growths[coupling] = np.array([[loop(tau) for tau in FINE.tolist()] for loop in (nominal, worst)])
+        limits[coupling] = (stability_limit(nominal, FINE[::-1].tolist()), stability_limit(worst, FINE[::-1].tolist()))
     certified = [tau for tau in FINE.tolist() if is_certified(gains, inputs, tau)]
-    return FactorStudy(rows, poles, min(certified))
+    return FactorStudy(rows, growths, limits, min(certified))
 
 
 def _row(gains: ControlDesign, inputs: DesignInputs, tau: float, complete: MeasuredSet) -> FactorRow:
@@ -147,19 +163,10 @@ def _metrics(design: ControlDesign, inputs: DesignInputs, over: Sequence[Corner]
     return [flight_metrics(fly(parts.perturbed(corner)).data()) for corner in over]
 
 
-def growth(gains: ControlDesign, coupling: str, effectiveness: float) -> np.ndarray:
-    """Return the rightmost pole (1/s) of the loop around the coupled vehicle over :data:`FINE`, after the fault."""
-    loops = (
-        sampled_loop(
-            vehicle_parameters(coupling),
-            tau * gains.feedback_gain,
-            gains.notch,
-            gains.period,
-            effectiveness=effectiveness,
-        )
-        for tau in FINE
-    )
-    return np.array([loop.growth for loop in loops])
+def growth(gains: ControlDesign, coupling: str, over: Sequence[Corner], tau: float) -> float:
+    """Return the rightmost pole (1/s) of the loops with ``tau`` around the vehicles ``over``, the worst of all."""
+    vehicle, gain = vehicle_parameters(coupling), tau * gains.feedback_gain
+    return max(worst_growth(vehicle.perturbed(corner), gain, gains.notch, gains.period) for corner in over)
 
 
 def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:

@@ -15,7 +15,7 @@ from hsv.units import to_paper
 
 def widths(count: int) -> np.ndarray:
     """Return line widths for curves drawn one after another, each thinner, so that none hides another."""
-    return 0.8 + 0.4 * np.arange(count)[::-1]
+    return 0.8 + 0.3 * np.arange(count)[::-1]
 
 
 def draw_metric(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip], name: str, unit: str, label: str) -> None:

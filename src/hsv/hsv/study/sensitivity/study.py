@@ -36,9 +36,3 @@ def grid(low: float, high: float, step: float, coarseness: float) -> np.ndarray:
     """Return values from ``low`` to ``high``, ``step`` apart where ``coarseness`` is 1, fewer where it is larger."""
     count = max(2, round((high - low) / (step * coarseness)) + 1)
     return np.linspace(low, high, count)
-
-
-def lost_from(values: np.ndarray, kept: np.ndarray) -> float | None:
-    """Return the first of the increasing ``values`` (n) that is not ``kept`` (n), ``None`` if all are."""
-    lost = np.flatnonzero(~kept)
-    return float(values[lost[0]]) if len(lost) else None
