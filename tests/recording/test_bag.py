@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+import struct
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +11,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -260,3 +263,54 @@ def test_message_that_does_not_fit_its_definition_is_named(kit: SimpleNamespace,
     with pytest.raises(RecordingError, match="topic /hsv/state: message at 5 ns") as error:
         Bag(tmp_path / "bag").columns("/hsv/state")
     assert "\n" not in str(error.value)
+
+
+def _record(data: bytes, opcode: Opcode) -> int:
+    """Return where the first record of a kind begins."""
+    position = 8
+    while data[position] != opcode:
+        position += 9 + struct.unpack_from("<Q", data, position + 1)[0]
+    return position
+
+
+def test_damage_outside_of_the_messages_is_named(written: Written) -> None:
+    file = written[0] / "run_0.mcap"
+    data = file.read_bytes()
+    attached, chunk = _record(data, Opcode.ATTACHMENT), _record(data, Opcode.CHUNK)
+    name = len("scenario.toml")
+    places = {
+        "an attachment's content": (data.index(b"duration = '4 s'"), b"f"),
+        "an attachment's length": (attached + 9 + 16 + 4 + name + 4 + len("application/toml"), b"\xff" * 8),
+        "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8),
+    }
+    for what, (position, wrong) in places.items():
+        file.write_bytes(data[:position] + wrong + data[position + len(wrong) :])
+        with pytest.raises(RecordingError, match="is damaged") as error:
+            Bag(file)
+        assert "\n" not in str(error.value), what
+
+
+def _two_channels(path: Path, kit: SimpleNamespace, kinds: tuple[str, str]) -> Path:
+    """A bag whose topic has two channels."""
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        channels = []
+        for kind in kinds:
+            topic = kit.topic("/hsv/other", kind)
+            schema = writer.register_schema(kind, "ros2msg", topic.definition.encode())
+            channels.append(writer.register_channel(topic.name, "cdr", schema, {"number": str(len(channels))}))
+        for step in range(10):
+            data = kit.messages.stamped(kinds[step % 2], step, step)
+            writer.add_message(channels[step % 2], step, data, step, step)
+        writer.finish()
+    return path
+
+
+def test_two_channels_of_a_topic_are_one(kit: SimpleNamespace, tmp_path: Path) -> None:
+    state, forces = "hsv_msgs/msg/VehicleState", "hsv_msgs/msg/VehicleForces"
+    bag = Bag(_two_channels(tmp_path / "both.mcap", kit, (state, state)))
+    assert bag.topics["/hsv/other"].count == 10
+    assert bag.times("/hsv/other").tolist() == bag.columns("/hsv/other")["step"].tolist() == list(range(10))
+    with pytest.raises(RecordingError, match="/hsv/other: recorded with two definitions"):
+        Bag(_two_channels(tmp_path / "mixed.mcap", kit, (state, forces)))

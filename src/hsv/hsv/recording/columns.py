@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import Typesdict
 
+from hsv.errors import RecordingError
 from hsv.recording.fields import Field, as_dict, fields_of, nanoseconds
-
-Columns = dict[str, NDArray[Any]]
 
 _LITTLE_ENDIAN = b"\x00\x01"
 _HEADER = 4
@@ -28,11 +27,23 @@ _EMPTY_SEQUENCE_TAIL = 4
 surplus on; what is received over DDS does not have it."""
 
 
+class Columns(dict[str, NDArray[Any]]):
+    """One array per field, by field path; a field that the definition lacks is a RecordingError when it is read."""
+
+    def __init__(self, source: str = "") -> None:
+        super().__init__()
+        self.source = source
+        """Where the messages come from, for errors."""
+
+    def __missing__(self, name: str) -> NDArray[Any]:
+        raise RecordingError(f"{self.source}: recorded with another definition, expected a field {name}")
+
+
 class NoCommonLayoutError(Exception):
     """The messages do not all have their fields in the same places."""
 
 
-def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes]) -> Columns:
+def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[bytes], source: str = "") -> Columns:
     """Decode messages of one common layout, in milliseconds for ten thousand.
 
     XCDR1 aligns every number to its own size, counted from the end of the four-byte header, so that the layout depends
@@ -47,6 +58,8 @@ def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[byte
         ``package/msg/Type``.
     messages
         At least one message in CDR with its header.
+    source
+        Where the messages come from, for errors.
 
     Raises:
     ------
@@ -71,12 +84,14 @@ def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[byte
     ):
         raise NoCommonLayoutError
     rows = np.frombuffer(raw, layout.dtype(size))
-    return {path: _column(rows, path, kind) for path, kind in layout.columns.items()}
+    columns = Columns(source)
+    columns.update((path, _column(rows, path, kind)) for path, kind in layout.columns.items())
+    return columns
 
 
-def columns_one_by_one(types: Typesdict, message_type: str, messages: Sequence[object]) -> Columns:
+def columns_one_by_one(types: Typesdict, message_type: str, messages: Sequence[object], source: str = "") -> Columns:
     """Turn deserialized messages of any layout into the same columns as :func:`columns_at_once`."""
-    columns: Columns = {}
+    columns = Columns(source)
     _gather(types, message_type, messages, "", columns)
     return columns
 

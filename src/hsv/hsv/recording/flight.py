@@ -47,7 +47,8 @@ def flight_data(bag: Bag) -> FlightData:
     steps = min(len(columns["step"]) for columns in (state, nominal, command, tube))
     if steps == 0:
         raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
-    acting = [time for time, message in bag.decode("/hsv/fault_status") if message.active]
+    status = bag.columns("/hsv/fault_status")
+    acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
     return FlightData(
         time=state["header.stamp"][:steps] * 1e-9,
         state=state_columns(state)[:steps],
@@ -56,5 +57,5 @@ def flight_data(bag: Bag) -> FlightData:
         command=input_columns(command)[:steps],
         saturated=tube["saturated"][:steps],
         gain_index=nominal["gain_index"][:steps],
-        fault_start=acting[0] * 1e-9 if acting else None,
+        fault_start=float(bag.times("/hsv/fault_status")[acting[0]]) * 1e-9 if len(acting) else None,
     )

@@ -9,20 +9,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Metadata, Schema
+from mcap.records import Channel, Metadata, Schema
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
-from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
+from hsv.graph.description import OTHER_TOPICS, TOPICS
 from hsv.recording.columns import Columns
 from hsv.recording.metadata import CUSTOM_DATA
-from hsv.recording.scan import MESSAGE_HEADER, content, records
+from hsv.recording.scan import DAMAGE, MESSAGE_HEADER, attachment, content, records
 from hsv.recording.topic import Qos
 from hsv.recording.track import Track
+from hsv.recording.typestore import message_types
 
 NAMESPACE = "/hsv/"
 """A bag of this project has topics below this name."""
@@ -64,10 +64,12 @@ class Bag:
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, Channel] = {}
         self._messages: dict[int, tuple[list[int], list[bytes]]] = {}
+        """By channel; channels of one topic share theirs, in the order of the file."""
+        self._columns: dict[str, Columns] = {}
         try:
             self._read()
-        except (EndOfFile, UnicodeDecodeError, KeyError) as error:
-            raise RecordingError(f"{self.path}: is damaged ({type(error).__name__})") from None
+        except (*DAMAGE, KeyError) as error:
+            raise RecordingError(f"{self.path}: is damaged ({str(error) or type(error).__name__})") from None
         self._check()
 
     @property
@@ -102,15 +104,18 @@ class Bag:
 
         Returns:
         -------
-        dict
-            Arrays with the messages along the first axis, by field path; see :mod:`hsv.recording.columns`.
+        Columns
+            Arrays with the messages along the first axis, by field path; see :mod:`hsv.recording.columns`. They are
+            decoded once: whoever asks again gets the same.
 
         Raises:
         ------
         RecordingError
             If the topic is not in the bag or a message does not fit its definition.
         """
-        return self.track(topic).columns()
+        if topic not in self._columns:
+            self._columns[topic] = self.track(topic).columns()
+        return self._columns[topic]
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield time in nanoseconds and message of a topic, deserialized one by one.
@@ -133,10 +138,25 @@ class Bag:
         times, messages = self._of(topic)
         return Track(topic, self.topics[topic].type, self.types, times, messages, str(self.path))
 
+    def text(self, name: str) -> str:
+        """Return an attachment as text.
+
+        Raises:
+        ------
+        RecordingError
+            If it is not in the bag or no text.
+        """
+        if name not in self.attachments:
+            raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
+        try:
+            return self.attachments[name].decode()
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"{self.path}: attachment {name}: {error}, expected text") from None
+
     def definition(self, topic: str) -> str:
         """Return the definition of a topic's type as recorded, its dependencies included."""
         self._of(topic)
-        return next(self._schemas[c.schema_id].data.decode() for c in self._channels.values() if c.topic == topic)
+        return next(self._definitions[c.schema_id] for c in self._channels.values() if c.topic == topic)
 
     def qos(self, topic: str) -> Qos:
         """Return the quality of service with which a topic was offered; the default if the bag does not tell."""
@@ -152,14 +172,16 @@ class Bag:
     @cached_property
     def types(self) -> Typestore:
         """The message types as the bag's own definitions state them."""
-        store = get_typestore(Stores.EMPTY)
-        for schema in self._schemas.values():
-            try:
-                store.register(get_types_from_msg(schema.data.decode(), schema.name))
-            except TypesysError as error:
-                reason = str(error).splitlines()[0]
-                raise RecordingError(f"{self.path}: definition of {schema.name}: {reason}") from None
-        return store
+        definitions = [(schema.name, self._definitions[schema.id]) for schema in self._schemas.values()]
+        return message_types(definitions, str(self.path))
+
+    @cached_property
+    def _definitions(self) -> dict[int, str]:
+        """Text of each schema, by its id."""
+        try:
+            return {schema.id: schema.data.decode() for schema in self._schemas.values()}
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
 
     def _of(self, topic: str) -> tuple[list[int], list[bytes]]:
         for channel in self._channels.values():
@@ -181,12 +203,13 @@ class Bag:
                     self._schemas[schema.id] = schema
                 case Opcode.CHANNEL:
                     channel = Channel.read(content(body))
+                    first = next((c.id for c in self._channels.values() if c.topic == channel.topic), channel.id)
                     self._channels[channel.id] = channel
-                    self._messages.setdefault(channel.id, ([], []))
+                    self._messages.setdefault(channel.id, self._messages.setdefault(first, ([], [])))
                 case Opcode.ATTACHMENT:
-                    attachment = Attachment.read(content(body))
-                    self.attachments[attachment.name] = attachment.data
-                    self.media_types[attachment.name] = attachment.media_type
+                    attached = attachment(body)
+                    self.attachments[attached.name] = attached.data
+                    self.media_types[attached.name] = attached.media_type
                 case Opcode.METADATA:
                     metadata = Metadata.read(content(body))
                     if metadata.name == CUSTOM_DATA:
@@ -199,10 +222,17 @@ class Bag:
             raise RecordingError(f"{self.path}: is cut off before its first messages")
         if not any(channel.topic.startswith(NAMESPACE) for channel in self._channels.values()):
             raise RecordingError(f"{self.path}: has no topic below {NAMESPACE}, expected a bag of this project")
+        known = TOPICS | OTHER_TOPICS
+        found: dict[str, Schema] = {}
         for channel in self._channels.values():
             schema = self._schemas.get(channel.schema_id)
-            if (schema and schema.encoding, channel.message_encoding) != ("ros2msg", "cdr"):
+            if schema is None or (schema.encoding, channel.message_encoding) != ("ros2msg", "cdr"):
                 raise RecordingError(f"{self.path}: topic {channel.topic}: expected a ROS 2 message in CDR")
+            if schema.name != (expected := known.get(channel.topic, schema.name)):
+                raise RecordingError(f"{self.path}: topic {channel.topic} is {schema.name}, expected {expected}")
+            first = found.setdefault(channel.topic, schema)
+            if (schema.name, schema.data) != (first.name, first.data):
+                raise RecordingError(f"{self.path}: topic {channel.topic}: recorded with two definitions, expected one")
 
 
 def find_mcap(path: Path) -> Path:

@@ -7,6 +7,7 @@ this one 0.3 s. Everything else (record contents, decompression, checksums) is l
 from __future__ import annotations
 
 import struct
+import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile, UnsupportedCompressionError
 from mcap.opcode import Opcode
-from mcap.records import Chunk
+from mcap.records import Attachment, Chunk
 from mcap.stream_reader import CRCValidationError, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
@@ -24,11 +25,26 @@ from hsv.errors import RecordingError
 _FRAME = struct.Struct("<BQ")
 MESSAGE_HEADER = struct.Struct("<HIQQ")
 """Channel id, sequence, log time and publish time at the start of a message record; the data follow."""
+_CHECKSUM = struct.Struct("<I")
+
+DAMAGE = (EndOfFile, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
+"""What the package raises on records whose lengths, texts or checksums are wrong."""
 
 
 def content(body: memoryview) -> ReadDataStream:
     """Return the body of a record as the stream that the ``read`` functions of ``mcap.records`` take."""
     return ReadDataStream(BytesIO(body))
+
+
+def attachment(body: memoryview) -> Attachment:
+    """Return an attachment; one whose content does not fit its checksum raises one of :data:`DAMAGE`."""
+    read = Attachment.read(content(body))
+    (expected,) = _CHECKSUM.unpack(body[-_CHECKSUM.size :])
+    actual = zlib.crc32(body[: -_CHECKSUM.size])
+    # Zero: the writer did not compute one.
+    if expected not in (0, actual):
+        raise CRCValidationError(expected, actual, read)
+    return read
 
 
 def records(path: Path) -> Iterator[tuple[int, memoryview]]:
@@ -78,5 +94,5 @@ def _unpack(path: Path, offset: int, body: memoryview) -> bytes:
         return stream.read(length)
     except UnsupportedCompressionError as error:
         raise RecordingError(f"{path}: {error}, expected zstd, lz4 or none") from None
-    except (CRCValidationError, EndOfFile, ZstdError, RuntimeError, UnicodeDecodeError, struct.error) as error:
+    except (*DAMAGE, RuntimeError) as error:
         raise RecordingError(f"{path}: the chunk at byte {offset} is damaged ({error})") from None

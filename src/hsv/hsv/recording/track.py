@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,23 @@ from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
 from hsv.recording.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
+
+
+@contextmanager
+def expecting_fields(source: object) -> Iterator[None]:
+    """Tell a field that is read from a message inside, but that its definition lacks, as what it is.
+
+    Raises:
+        RecordingError: It names ``source``, the message's type and the field.
+    """
+    try:
+        yield
+    except AttributeError as error:
+        if not (kind := getattr(error.obj, "__msgtype__", None)):
+            raise
+        raise RecordingError(
+            f"{source}: {kind}: recorded with another definition, expected a field {error.name}"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -39,12 +57,13 @@ class Track:
         Raises:
             RecordingError: A message does not fit its definition.
         """
+        types, where = self.types.fielddefs, f"{self.source}: topic {self.topic}"
         if self.data:
             try:
-                return columns_at_once(self.types.fielddefs, self.type, self.data)
+                return columns_at_once(types, self.type, self.data, where)
             except NoCommonLayoutError:
                 pass
-        return columns_one_by_one(self.types.fielddefs, self.type, [message for _, message in self.decode()])
+        return columns_one_by_one(types, self.type, [message for _, message in self.decode()], where)
 
     def decode(self) -> Iterator[tuple[int, Any]]:
         """Yield time in nanoseconds and message, deserialized one by one.

@@ -16,6 +16,7 @@ from hsv.graph.description import TOPICS, TUBE_MPC
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
 from hsv.recording.reader import Bag
+from hsv.recording.track import expecting_fields
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 """Attachments: the parameters of the design and, over them, those of the scenario."""
@@ -38,13 +39,10 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
         RecordingError: The bag carries no parameters.
         DesignError, ParameterError: They are not acceptable.
     """
-    attached = {}
-    for name in (DESIGN, SCENARIO):
-        if name not in bag.attachments:
-            raise RecordingError(f"{bag.path}: no attachment {name}, expected a bag recorded by hsv run")
-        attached[name] = parse_parameters(bag.attachments[name].decode(), f"{bag.path}: {name}")
+    attached = {name: parse_parameters(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO)}
     values = attached[DESIGN] | attached[SCENARIO]
-    changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
+    with expecting_fields(bag.path):
+        changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
     if design is not None:
         values = read_design_parameters(design) | attached[SCENARIO]
     return values | changed

@@ -15,7 +15,7 @@ from hsv.graph.description import TOPICS
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
-from hsv.recording.track import Track
+from hsv.recording.track import Track, expecting_fields
 from hsv.replay.attached import broken_off, complete_steps
 from hsv.replay.processes import PROCESSES, Process
 
@@ -48,7 +48,8 @@ class ProcessComparison:
 class _Outputs:
     """Output messages of a process, filled again at every step and kept as bytes."""
 
-    def __init__(self, types: Typestore, topics: Mapping[str, str]) -> None:
+    def __init__(self, types: Typestore, topics: Mapping[str, str], source: str) -> None:
+        self._source = source
         self._types = types
         self._kinds = topics
         self.messages = {topic: blank(types, kind) for topic, kind in topics.items()}
@@ -60,11 +61,15 @@ class _Outputs:
         for topic, message in self.messages.items():
             if vars(message).keys() != self._fields[topic]:
                 new = ", ".join(sorted(vars(message).keys() - self._fields[topic]))
-                raise RecordingError(f"topic {topic}: recorded with another definition, expected a field {new}")
+                raise RecordingError(
+                    f"{self._source}: topic {topic}: recorded with another definition, expected a field {new}"
+                )
             try:
                 data = bytes(self._types.serialize_cdr(message, self._kinds[topic]))
             except (struct.error, TypeError, ValueError, SerdeError) as error:
-                raise RecordingError(f"topic {topic}: recorded with another definition, {error}") from None
+                raise RecordingError(
+                    f"{self._source}: topic {topic}: recorded with another definition, {error}"
+                ) from None
             track = self.tracks[topic]
             track.data.append(data + bytes(-len(data) % WIRE_ALIGNMENT))
             track.times.append(nanoseconds(message.clock if topic == "/clock" else message.header.stamp))
@@ -83,11 +88,10 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
         RecordingError: A topic is missing or recorded with another definition.
         ParameterError, DesignError: The component refuses its parameters.
     """
-    for topic in (*process.inputs, *process.outputs):
-        if (kind := bag.track(topic).type) != TOPICS[topic]:
-            raise RecordingError(f"{bag.path}: topic {topic} is {kind}, expected {TOPICS[topic]}")
+    for topic in process.outputs:
+        bag.track(topic)  # it is there
     component = process.build(values)
-    outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs})
+    outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
     recorded = [bag.track(topic) for topic in process.inputs]
     steps = complete_steps(bag) if broken_off(bag) else min(len(track.data) for track in recorded)
 
@@ -99,10 +103,11 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
         step(())
         steps -= 1
     messages = zip(*(track.cut(steps).decode() for track in recorded), strict=True)
-    for number, inputs in enumerate(messages):
-        if number % PROGRESS_INTERVAL == 0:
-            progress(process.node.name, number, steps)
-        step(tuple(message for _, message in inputs))
+    with expecting_fields(bag.path):
+        for number, inputs in enumerate(messages):
+            if number % PROGRESS_INTERVAL == 0:
+                progress(process.node.name, number, steps)
+            step(tuple(message for _, message in inputs))
     progress(process.node.name, steps, steps)
     return compare_process(bag, process, outputs.tracks)
 
@@ -119,16 +124,23 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     Raises:
         As :func:`replay`.
     """
-    tracks = fly(bag.types, controller, values, progress)
+    with expecting_fields(bag.path):
+        tracks = fly(bag.types, controller, values, progress, str(bag.path))
     return [compare_process(bag, process, tracks) for process in chosen(controller).values()]
 
 
-def fly(types: Typestore, controller: str, values: Mapping[str, Any], progress: Progress) -> dict[str, Track]:
-    """Fly the loop in this process, message by message as the graph does, and return every step topic."""
+def fly(
+    types: Typestore, controller: str, values: Mapping[str, Any], progress: Progress, source: str = "types"
+) -> dict[str, Track]:
+    """Fly the loop in this process, message by message as the graph does, and return every step topic.
+
+    Raises:
+        RecordingError: ``types``, which ``source`` defines, lack a field.
+    """
     processes = chosen(controller)
     components = {name: process.build(values) for name, process in processes.items()}
     made = {
-        name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs})
+        name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
         for name, process in processes.items()
     }
     latest: dict[str, Any] = {}

@@ -11,6 +11,7 @@ import numpy as np
 from hsv.recording.info import TUBE_STATUS
 from hsv.recording.reader import Bag
 from hsv.recording.report.panels import INPUTS, STATE
+from hsv.recording.track import expecting_fields
 
 JOIN_WITHIN = 0.5
 """Seconds: intervals of one kind that are closer are shown as one."""
@@ -51,9 +52,10 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
         *_saturation(bag),
         *_ending(bag, description),
     ]
-    # Nodes say some things both in the log and in their diagnostics.
-    said = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
-    events += [*_joined(said, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
+    with expecting_fields(bag.path):
+        # Nodes say some things both in the log and in their diagnostics.
+        said = sorted([*_diagnostics(bag), *_log(bag)], key=lambda event: event.start)
+        events += [*_joined(said, within=1.5 * DIAGNOSTICS_PERIOD), *_parameter_changes(bag)]
     return sorted(events, key=lambda event: event.start)
 
 

@@ -1,0 +1,44 @@
+"""The message types of a bag, made from the definitions that it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from hsv.errors import RecordingError
+from hsv.recording.fields import TIMES, fields_of
+
+
+def message_types(definitions: Sequence[tuple[str, str]], source: str) -> Typestore:
+    """Return the types of ``definitions``, complete: none refers to a type that is not there.
+
+    Args:
+        definitions: Name and text of each, in the ``ros2msg`` format of MCAP.
+        source: Where they come from, for errors.
+
+    Raises:
+        RecordingError: A definition cannot be parsed, contradicts another, or refers to an unknown type or to itself.
+    """
+    store = get_typestore(Stores.EMPTY)
+    for name, text in definitions:
+        try:
+            store.register(get_types_from_msg(text, name))
+        except TypesysError as error:
+            raise RecordingError(f"{source}: definition of {name}: {str(error).splitlines()[0]}") from None
+    for name, _ in definitions:
+        _check(store, name, (), f"{source}: definition of {name}")
+    return store
+
+
+def _check(store: Typestore, name: str, within: tuple[str, ...], where: str) -> None:
+    if name in within:
+        raise RecordingError(f"{where}: {name} holds itself")
+    if name not in store.fielddefs:
+        raise RecordingError(f"{where}: unknown type {name}")
+    for field in fields_of(store.fielddefs, name):
+        if field.length < 0:
+            raise RecordingError(f"{where}: field {field.name}: length {field.length}, expected a number not below 0")
+        if field.is_message and field.type not in TIMES:
+            _check(store, field.type, (*within, name), where)

@@ -1,0 +1,83 @@
+"""Bags whose topics, definitions or attachments are not as hsv writes them: one line, and exit code 2."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from changed_bags import changed_bag
+from flown_bags import flown_bag
+
+from hsv.recording.topic import Topic
+
+Hsv = Callable[..., Any]
+COMMAND, FORCES = "/hsv/command", "/hsv/forces"
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown_bag(tmp_path_factory.mktemp("bags") / "flown", duration=11.0, fault=1.0)
+
+
+def _with(name: str, **changes: str) -> Callable[[Topic], Topic]:
+    return lambda topic: replace(topic, **changes) if topic.name == name else topic
+
+
+def _renamed(kind: str, field: str) -> Callable[[Topic], Topic]:
+    """Return what gives a field of a message type another name, as an older definition might."""
+    return lambda topic: (
+        replace(topic, definition=topic.definition.replace(f" {field} ", " other ")) if topic.type == kind else topic
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_with(COMMAND, type="std_msgs/msg/Float64", definition="float64 data\n"), "is std_msgs/msg/Float64, expected"),
+        (_with(FORCES, definition="Nowhere other\n"), "unknown type hsv_msgs/msg/Nowhere"),
+        (_with(FORCES, definition="VehicleForces again\n"), "VehicleForces holds itself"),
+        (_with(FORCES, definition="no message\0"), "definition of hsv_msgs/msg/VehicleForces: "),
+        (_with(COMMAND, type="ControlInput"), "expected hsv_msgs/msg/ControlInput"),
+    ],
+    ids=["other type", "unknown type", "holds itself", "no definition", "no package"],
+)
+@pytest.mark.parametrize("command", ["info", "replay", "plot", "report", "diff", "export"])
+def test_a_topic_of_another_type_or_definition(
+    hsv: Hsv, bag: Path, tmp_path: Path, command: str, change: Callable[[Topic], Topic], said: str
+) -> None:
+    made = changed_bag(bag, tmp_path / "made", change)
+    words = {"diff": [str(bag)], "export": ["--csv"]}.get(command, [])
+    ran = hsv(command, str(made), *words)
+    assert ran.code == 2 and said in ran.error and str(made) in ran.error
+
+
+@pytest.mark.parametrize(
+    ("kind", "field", "commands"),
+    [
+        ("ControlInput", "fuel_equivalence_ratio", ["plot", "report", "replay"]),
+        ("VehicleState", "altitude", ["info", "plot", "report", "replay"]),
+        ("VehicleState", "step", ["replay", "replay --rerun"]),
+        ("NominalState", "gain_index", ["plot", "report", "replay"]),
+        ("TubeStatus", "saturated", ["info", "plot", "report", "replay"]),
+        ("TubeStatus", "tau", ["replay", "replay --rerun"]),
+        ("FaultStatus", "active", ["info", "plot", "report", "replay"]),
+        ("FaultStatus", "step", ["replay"]),
+    ],
+)
+def test_a_field_that_a_definition_lacks_is_named(
+    hsv: Hsv, bag: Path, tmp_path: Path, kind: str, field: str, commands: list[str]
+) -> None:
+    made = changed_bag(bag, tmp_path / "made", _renamed(f"hsv_msgs/msg/{kind}", field))
+    for command in commands:
+        ran = hsv(*command.split(), str(made))
+        assert ran.code == 2 and "recorded with another definition" in ran.err and ran.err.count("\n") == 1
+        assert f"expected a field {field}" in ran.err and str(made) in ran.err
+
+
+def test_an_attachment_that_is_no_text(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    made = changed_bag(bag, tmp_path / "made", attachments={"scenario.yaml": b"duration: \xff"})
+    ran = hsv("replay", str(made))
+    assert ran.code == 2 and "attachment scenario.yaml: 'utf-8' codec" in ran.error

@@ -1,0 +1,38 @@
+"""Copies of bags in which something is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from hsv.recording.reader import Bag
+from hsv.recording.topic import Topic
+from hsv.recording.writer import BagWriter
+
+Messages = list[tuple[int, bytes]]
+"""Times in nanoseconds, and CDR."""
+
+NO_ATTACHMENTS: Mapping[str, bytes] = {}
+
+
+def changed_bag(
+    source: Path,
+    target: Path,
+    topics: Callable[[Topic], Topic | None] = lambda topic: topic,
+    messages: Callable[[str, Messages], Messages] = lambda topic, messages: messages,
+    attachments: Mapping[str, bytes] = NO_ATTACHMENTS,
+) -> Path:
+    """Write ``source`` again to ``target`` with other topics (None: left out), messages or attachments."""
+    bag = Bag(source)
+    asked = (
+        topics(Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name))) for t in bag.topics.values()
+    )
+    kept = [topic for topic in asked if topic]
+    writer = BagWriter(target, kept, bag.custom_data)
+    for name, data in (bag.attachments | dict(attachments)).items():
+        writer.attach(name, bag.media_types.get(name, "text/plain"), data)
+    for topic in kept:
+        for time, data in messages(topic.name, bag.messages(topic.name)):
+            writer.write(topic.name, time, data)
+    writer.close()
+    return target
