@@ -85,7 +85,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         "corner; black: half a degree. (e) Altitude error at the end, nominal vehicle (solid), worst corner (dashed). "
         "(b) Altitude (solid) and velocity (dashed) settled to 2 % of the step, nominal vehicle; a line ends where "
         "that is not before the fault. (f) The error of (e) under robust MPC with the fourth of the gains, as the "
-        "paper flies it: on the decoupled model, without notch.",
+        "paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is lost.",
         (
             *_feedback_findings(factors["F"], of_F, growths[False]),
             *limits,
