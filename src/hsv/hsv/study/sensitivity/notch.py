@@ -95,7 +95,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         f"stability: nominal vehicle; dashed: limit of the worst of {said_corners(over)} of the parameter bounds; "
         "cross: the baseline's filter. Zeros and poles share the centre, pole damping "
         f"{own.pole_damping:g}. (c) Decay time in flight, nominal vehicle (solid) and worst corner (dashed); no point "
-        "where a flight is lost; dotted: the limits of the scenarios.",
+        "where a flight is lost; dotted: the limits of the scenarios, of which "
+        f"{SETS[1].scenario} flies another design, {load_scenario(SETS[1].scenario).design}.",
         tuple(_finding(c, limits[c], strips[c], centres, said_corners(over)) for c in SETS),
         {
             "centre_rad_per_s": centres.tolist(),
