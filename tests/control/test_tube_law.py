@@ -172,7 +172,7 @@ def test_scheduled_changes_come_at_their_times():
             r"tau_change\.values: 1 values, expected 2 or 10",
         ),
         ({"tau_change.starts": [2.0, 1.0], "tau_change.values": [0.8, 0.7]}, r"tau_change\.starts = \[2.0, 1.0\]"),
-        ({"tau_change.starts": [1.0], "tau_change.values": [0.4]}, r"tau_change\.values = 0.4: expected 0.5 to 1"),
+        ({"tau_change.starts": [1.0], "tau_change.values": [0.4]}, r"tau_change\.values\[0\] = 0.4: expected 0.5 to 1"),
     ],
 )
 def test_wrong_changes_are_named(changes, message):

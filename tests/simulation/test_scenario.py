@@ -1,7 +1,8 @@
 import pytest
 
-from hsv.errors import ParameterError, ScenarioError
-from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.control.design_file import find_design
+from hsv.errors import ScenarioError
+from hsv.simulation.assembly import assemble, assemble_flight, flight_parameters
 from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_names, scenario_text
 
 CASE1 = scenario_text("case1")
@@ -169,10 +170,54 @@ def test_a_flight_may_have_another_notch_filter_than_its_design():
     scenario = parse_scenario(CASE1 + table + "zero_damping = [0.02, 0.02]\npole_damping = [0.5, 0.4]\n", "two")
     flown = assemble(flight_parameters(scenario)).notch_filter.sections
     assert [(s.zero_frequency, s.pole_damping) for s in flown] == [(15.0, 0.5), (19.5, 0.4)]
-    with pytest.raises(
-        ParameterError, match=r"parameter notch.zero_damping: 1 values, expected as many as notch.flown"
-    ):
-        assemble(flight_parameters(parse_scenario(CASE1 + table, "two")))
+
+
+STEEP = """[[command]]
+velocity_change = "100 ft/s"
+start = "1 s"
+end = "1.1 s"
+[limits]"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[limits]", "[tube]\ntau = 2\n[limits]", r"tube\.tau\[0\] = 2\.0: expected double array from 0 to 1"),
+        ("[limits]", "[tube]\ntau = [1, 0.5]\n[limits]", r"tube\.tau: 2 values, expected 1 or 5"),
+        (
+            "[limits]",
+            '[[tube.change]]\nstart = "5 s"\ntau = 1\n[[tube.change]]\nstart = "6 s"\ntau = 0.01\n[limits]',
+            r"tube\.change\[1\]\.tau\[0\] = 0\.01: expected .*certified",
+        ),
+        ("[limits]", "[notch]\nzero_damping = [-1, 2]\n[limits]", r"notch\.zero_damping\[0\] = -1\.0: expected"),
+        (
+            "[limits]",
+            '[notch]\nzero_frequency = ["15 rad/s", "19 rad/s"]\n[limits]',
+            r"notch\.zero_frequency: 2 values, expected as many as notch\.zero_damping, 1 ",
+        ),
+        (
+            'title = "',
+            'controller = "robust_mpc"\nrobust_mpc.gain_index = 40\ntitle = "',
+            r"robust_mpc\.gain_index = 40: expected -\d+ to \d+",
+        ),
+        ("[limits]", STEEP, r"command: reference at 1 s: altitude = .* no equilibrium"),
+        ('"200 s"', '"0.009 s"', r"duration = 0\.009 s: expected at least a period, 0\.02 s"),
+        ('title = "', 'design = "absent"\ntitle = "', r"design = 'absent': no such file"),
+    ],
+)
+def test_what_the_design_does_not_admit_is_named_as_the_scenario_calls_it(old, new, message):
+    text = CASE1.replace('design = "baseline"\n', "").split("[[fault]]")[0] + "[limits]\n"
+    text = text.replace(old, new, 1)
+    with pytest.raises(ScenarioError, match=f"^scenario 'mine': {message}"):
+        assemble_flight(parse_scenario(text, "mine"))
+
+
+def test_a_wrong_design_is_told_from_a_wrong_scenario(tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(find_design("baseline").read_text().replace("zero_damping: [0.02]", "zero_damping: [-1.0]", 1))
+    scenario = parse_scenario(CASE1.replace('"baseline"', f'"{path}"'), "mine")
+    with pytest.raises(ScenarioError, match=rf"^scenario 'mine': {path}: parameter notch\.zero_damping"):
+        assemble_flight(scenario)
 
 
 def test_commands_add_up_to_breakpoints():

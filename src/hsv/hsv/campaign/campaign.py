@@ -12,6 +12,7 @@ from typing import Any, Self
 from hsv.campaign.factors import Factor, check_names, factors_of
 from hsv.control.design_file import find_design, read_design_parameters
 from hsv.errors import CampaignError
+from hsv.simulation.assembly import blamed_on
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
@@ -144,5 +145,6 @@ def plan(
         raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
     if not 0 <= seed < 2**63:
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
-    design = read_design_parameters(find_design(scenario.design))
+    with blamed_on(scenario):
+        design = read_design_parameters(find_design(scenario.design))
     return Campaign(scenario.name, text, design, method, samples, seed, factors, commit)

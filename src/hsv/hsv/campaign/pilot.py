@@ -12,7 +12,7 @@ from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.faults.actuator import FaultInjector
-from hsv.simulation.assembly import assemble
+from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import Flight, fly
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.vehicle.envelope import in_model_range
@@ -29,7 +29,7 @@ class Pilot:
         self.sampler = Sampler(campaign)
         self.scenario = campaign.scenario
         self._nominal = campaign.parameters
-        self._parts = assemble(self._nominal)
+        self._parts = assemble_flight(self.scenario, campaign.design)
         self._levels = TubeLevels(self._nominal)
         self.period = self._parts.plant.period
         """Control period, s."""

@@ -27,7 +27,7 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import report_flight
-    from hsv.simulation.assembly import assemble, flight_parameters
+    from hsv.simulation.assembly import assemble_flight
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import load_scenario
@@ -36,7 +36,7 @@ def simulate(
     if out:
         check_target(out, "out")
     loaded = load_scenario(scenario)
-    components = assemble(flight_parameters(loaded))
+    components = assemble_flight(loaded)
     started = time.perf_counter()
     flight = fly(components)
     wall = time.perf_counter() - started

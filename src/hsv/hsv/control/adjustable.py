@@ -89,8 +89,8 @@ def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: fl
         raise ParameterError(f"parameter tau_change.starts = {starts}: expected times that do not decrease")
     rows = np.reshape(flat, (len(starts), -1)).tolist() if starts else []
     return [
-        (first_step(start, period), certified(row, minimum, "tau_change.values"))
-        for start, row in zip(starts, rows, strict=True)
+        (first_step(start, period), certified(row, minimum, f"tau_change.values[{index}]"))
+        for index, (start, row) in enumerate(zip(starts, rows, strict=True))
     ]
 
 

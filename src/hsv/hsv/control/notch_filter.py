@@ -153,12 +153,14 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
     chosen = [flown if v[flown.name] else designed for designed, flown in pairs]
     columns = [v[parameter.name] for parameter in chosen]
-    n = len(columns[0])
+    # What is left as designed is right: blame what the flight has otherwise.
+    model = next((p for p in chosen if p in DESIGN_NOTCH_PARAMETERS), chosen[0])
+    n = len(v[model.name])
     for parameter, column in zip(chosen, columns, strict=True):
         if len(column) != n or not 1 <= n <= MAX_SECTIONS:
             raise ParameterError(
                 f"parameter {parameter.name}: {len(column)} values, "
-                f"expected as many as {chosen[0].name}, 1 to {MAX_SECTIONS}"
+                f"expected as many as {model.name}, {n} (1 to {MAX_SECTIONS})"
             )
     return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
 

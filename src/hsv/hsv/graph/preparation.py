@@ -16,7 +16,7 @@ import yaml
 from hsv.control.design_file import find_design, read_design_parameters
 from hsv.errors import RecordingError
 from hsv.graph.description import NodeDescription, graph
-from hsv.simulation.assembly import assemble
+from hsv.simulation.assembly import assemble_flight, blamed_on
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
 
@@ -48,14 +48,15 @@ def prepare(
     Everything that can be refused is refused here, before any process starts or anything is written.
 
     Raises:
-        ScenarioError, DesignError, ParameterError, TrimError: Names the field that is wrong.
+        ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
-    design_file = find_design(scenario.design)
-    design = read_design_parameters(design_file)
-    components = assemble({**design, **scenario.parameters()})
+    with blamed_on(scenario):
+        design_file = find_design(scenario.design)
+        design = read_design_parameters(design_file)
+    components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
     temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")

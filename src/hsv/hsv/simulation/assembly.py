@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from hsv.control.control_law import control_law
 from hsv.control.design_file import find_design, read_design_parameters
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
+from hsv.errors import HsvError, ScenarioError, TrimError
 from hsv.faults.actuator import FaultInjector
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
 from hsv.vehicle.plant import Plant
+
+_FIELDS = {
+    r"^parameter feedback\.tau\b": "tube.tau",
+    r"^parameter tau_change\.starts\b": "tube.change",
+    r"^parameter tau_change\.values\b(\[\d+\])?": r"tube.change\1.tau",
+    r"(parameter )?\bnotch\.flown\.": "notch.",
+    r"^parameter (integral|robust_mpc)\.": r"\1.",
+}
+"""Parameters as a scenario calls them."""
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -37,3 +49,36 @@ def assemble(values: Mapping[str, Any]) -> Components:
         control_law(values),
         FaultInjector.from_parameters(values),
     )
+
+
+def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None) -> Components:
+    """Return the components that fly ``scenario``, with its own design or with these parameters of one.
+
+    Raises:
+        ScenarioError: Names the field that is wrong, or what is wrong with the design.
+    """
+    with blamed_on(scenario):
+        values = flight_parameters(scenario) if design is None else {**design, **scenario.parameters()}
+        components = assemble(values)
+        plant = components.plant
+        if plant.steps < 1:
+            raise ScenarioError(f"duration = {scenario.duration:g} s: expected at least a period, {plant.period:g} s")
+    return components
+
+
+@contextmanager
+def blamed_on(scenario: Scenario) -> Iterator[None]:
+    """Turn errors of components into errors of ``scenario``, with its name and its names of the parameters.
+
+    Raises:
+        ScenarioError: In place of any other error of the library.
+    """
+    try:
+        yield
+    except HsvError as error:
+        text = str(error)
+        for parameter, field in _FIELDS.items():
+            text = re.sub(parameter, field, text)
+        if isinstance(error, TrimError):
+            text = f"{'command' if scenario.command else 'initial'}: {text}"
+        raise ScenarioError(f"scenario {scenario.name!r}: {text}") from error

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, ValidationError
 
-from hsv.control.adjustable import factors
+from hsv.control.adjustable import TAU, factors
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
@@ -233,8 +234,9 @@ def _check(scenario: Scenario) -> None:
         field = "tube.tau" if scenario.tube.tau else "tube.change"
         raise ScenarioError(f"{field}: {scenario.controller} has no adjustable factor, expected controller tube_mpc")
     for index, change in enumerate(scenario.tube.change):
+        field = f"tube.change[{index}].tau"
         try:
-            factors(change.tau, f"tube.change[{index}].tau")
+            factors(replace(TAU, name=field).check(change.tau), field)
         except ParameterError as error:
             raise ScenarioError(str(error).removeprefix("parameter ")) from error
     for index, fault in enumerate(scenario.fault):

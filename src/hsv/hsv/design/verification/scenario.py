@@ -13,7 +13,7 @@ from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most
 from hsv.design.verification.invariant_set import certified_set
 from hsv.errors import DesignError
-from hsv.simulation.assembly import assemble
+from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import Scenario
 
@@ -35,7 +35,7 @@ def scenario_claims(
     """
     if scenario.controller != "tube_mpc":
         raise DesignError(f"scenario {scenario.name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
-    parts = assemble({**subject.design.to_parameters(), **scenario.parameters()})
+    parts = assemble_flight(scenario, subject.design.to_parameters())
     found, model = certified_set(subject), channel_model(subject.design)
     flown: list[FlightEvidence] = []
     for corner in over:
