@@ -143,6 +143,7 @@ class Limits:
 
 def _limits(coupled: Controller, over: list[Corner], centres: np.ndarray, depths: np.ndarray) -> Limits:
     own = filter_of_the_baseline()
+    centres = np.union1d(centres, own.zero_frequency)
 
     @cache
     def off_centre(centre: float) -> float:
