@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flown_bags import flown_bag, parameters
+from flown_bags import flown_bag, parameters, write_bag
 
+from hsv.graph.description import TOPICS
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.metadata import FILE_NAME
+from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
 
@@ -153,3 +155,17 @@ def test_wrong_words_are_one_line(hsv: Hsv, bag: Path) -> None:
     for words in (["--node", "rudder"], ["--node", "plant", "--rerun"], ["--parameters", "missing.yaml"]):
         done = hsv("replay", str(bag), *words)
         assert done.code == 2 and words[1] in done.error
+
+
+def test_what_a_replay_over_dds_needs_is_looked_for_before_it_starts(hsv: Hsv, bag: Path) -> None:
+    for words in (["--node", "notch_filter"], ["--node", "plant"]):
+        done = hsv("replay", str(bag), "--over-dds", *words)
+        assert done.code == 2 and f"{bag.name}_0.mcap: no topic /hsv/run" in done.error
+
+
+def test_a_wrong_attached_parameter_is_told_with_its_bag(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    opened = Bag(bag)
+    design, scenario = parameters(12.0, 6.0)
+    tracks = {topic: opened.track(topic) for topic in TOPICS}
+    done = hsv("replay", str(write_bag(tmp_path / "wrong", tracks, design | {"period": "x"}, scenario)))
+    assert done.code == 2 and "wrong_0.mcap: attached parameter period = 'x': expected double" in done.error

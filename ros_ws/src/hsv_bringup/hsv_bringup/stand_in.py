@@ -73,7 +73,7 @@ class StandInNode(LockstepNode):
             self._announcer = self.create_publisher(Ready, "/hsv/ready", LATCHED)
             self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
             return True
-        assert self._run is not None, "a bag with states has the announcement of its run"
+        assert self._run is not None, "hsv replay takes no bag without the announcement of its run"
         run = Run(run_id="replay", period=self._run.period, last_step=self._run.last_step)
         self._announcer = self._peer(description.PLANT.name).create_publisher(Run, "/hsv/run", LATCHED)
         self._announcer.publish(run)

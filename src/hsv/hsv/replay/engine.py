@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,8 +88,7 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
         RecordingError: A topic is missing or recorded with another definition.
         ParameterError, DesignError: The component refuses its parameters.
     """
-    for topic in process.outputs:
-        bag.track(topic)  # it is there
+    require(bag, process.outputs)
     component = process.build(values)
     outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
     recorded = [bag.track(topic) for topic in process.inputs]
@@ -124,6 +123,7 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     Raises:
         As :func:`replay`.
     """
+    require(bag, TOPICS)
     with expecting_fields(bag.path):
         tracks = fly(bag.types, controller, values, progress, str(bag.path))
     return [compare_process(bag, process, tracks) for process in chosen(controller).values()]
@@ -159,6 +159,12 @@ def fly(
             progress("rerun", latest["/hsv/state"].step, last)
     progress("rerun", last, last)
     return {topic: track for outputs in made.values() for topic, track in outputs.tracks.items()}
+
+
+def require(bag: Bag, topics: Iterable[str]) -> None:
+    """Raise a RecordingError unless all ``topics`` are in ``bag``."""
+    for topic in topics:
+        bag.track(topic)
 
 
 def chosen(controller: str) -> dict[str, Process]:

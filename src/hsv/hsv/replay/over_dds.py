@@ -7,11 +7,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hsv.graph.description import PLANT, STAND_IN, NodeDescription, graph
+from hsv.errors import RecordingError
+from hsv.graph.description import PLANT, STAND_IN, TOPICS, NodeDescription, graph
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.reader import Bag
-from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process
+from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process, require
+
+RUN = "/hsv/run"
 
 
 def replay_all(
@@ -20,8 +23,13 @@ def replay_all(
     """Run each of the nodes ``names`` alone, fed from ``bag`` by a stand-in, and compare what it publishes.
 
     Raises:
+        RecordingError: A topic that is needed is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
+    for name in names:
+        require(bag, (*chosen(controller)[name].inputs, *chosen(controller)[name].outputs))
+    if not bag.messages(RUN):
+        raise RecordingError(f"{bag.path}: topic {RUN}: no message, expected the announcement of the run")
     for name in names:
         process = chosen(controller)[name]
         with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
@@ -42,8 +50,10 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     """Fly the whole graph again and compare every step topic.
 
     Raises:
+        RecordingError: A topic is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
+    require(bag, TOPICS)
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         again = Path(folder, "again")
         steps = len(bag.messages("/hsv/state"))
