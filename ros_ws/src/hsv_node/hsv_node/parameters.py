@@ -32,12 +32,7 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
             # An empty list has no element type in ROS 2: it is declared by type, and set only if somebody gives it.
             value = default if default != [] else None
             declared = node.declare_parameter(parameter.name, value, _descriptor(parameter))
-        except InvalidParameterTypeException as error:
-            given = node._parameter_overrides[parameter.name].value
-            raise ParameterError(
-                f"parameter {parameter.name} = {_short(given)}: expected {parameter.constraint}"
-            ) from error
-        except InvalidParameterValueException as error:
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
             given = node._parameter_overrides[parameter.name].value
             raise ParameterError(
                 f"parameter {parameter.name} = {_short(given)}: expected {parameter.constraint}"
