@@ -6,12 +6,17 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from changed_bags import changed_bag
 from flown_bags import flown_bag
+from mcap.reader import make_reader
 
+from hsv.recording.flight import flight_data, labels
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Topic
 from hsv.recording.writer import BagWriter
+from hsv.simulation.metrics import flight_metrics
 
 Hsv = Callable[..., Any]
 
@@ -44,20 +49,7 @@ def without(bag: Path, tmp_path: Path) -> Callable[[str], Path]:
     """Return the bag without one of its topics."""
 
     def make(topic: str) -> Path:
-        recorded = Bag(bag)
-        kept = [
-            Topic(t.name, t.type, recorded.definition(t.name), t.type_hash, recorded.qos(t.name))
-            for t in recorded.topics.values()
-            if t.name != topic
-        ]
-        writer = BagWriter(tmp_path / "partial", kept, recorded.custom_data)
-        for name, data in recorded.attachments.items():
-            writer.attach(name, recorded.media_types[name], data)
-        for kind in kept:
-            for time, message in recorded.messages(kind.name):
-                writer.write(kind.name, time, message)
-        writer.close()
-        return tmp_path / "partial"
+        return changed_bag(bag, tmp_path / "partial", lambda kind: None if kind.name == topic else kind)
 
     return make
 
@@ -136,3 +128,69 @@ def test_flights_of_one_scenario_are_all_plotted(hsv: Hsv, bag: Path, tmp_path: 
     assert hsv("plot", str(bag), str(other), "--out", "both.svg").code == 0
     text = (tmp_path / "both.svg").read_text()
     assert "short (flown)" in text and "short (other)" in text
+
+
+@pytest.mark.parametrize("command", ["info", "report", "plot", "export", "replay"])
+def test_a_lost_message_is_said_and_no_row_is_taken_for_another(
+    hsv: Hsv, bag: Path, tmp_path: Path, command: str
+) -> None:
+    lost, step = "/hsv/nominal", 300
+    holed = changed_bag(
+        bag,
+        tmp_path / "holed",
+        messages=lambda topic, found: [m for k, m in enumerate(found) if (topic, k) != (lost, step)],
+    )
+    ran = hsv(command, str(holed), *RESULTS[command])
+    assert ran.code == (1 if command == "replay" else 0)
+    said = f"holed_0.mcap: {lost} lacks 1 of 601 steps, the first at t = 6.00 s"
+    assert ran.err.splitlines()[0] == f"hsv: warning: {holed}/{said}"
+    whole, joined = flight_data(Bag(bag)), flight_data(Bag(holed))
+    for name in ("time", "state", "reference", "deviation", "command"):
+        assert np.array_equal(np.delete(getattr(whole, name), step, axis=0), getattr(joined, name)), name
+    expected = flight_metrics(whole)
+    for name, value in flight_metrics(joined).items():
+        assert value == pytest.approx(expected[name], rel=1e-2), name
+
+
+def test_a_recovered_bag_is_replayed_as_far_as_it_is_complete(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    last = {"/hsv/nominal", "/hsv/command", "/hsv/tube_status", "/hsv/actuator", "/hsv/fault_status"}
+    ragged = changed_bag(bag, tmp_path / "ragged", messages=lambda topic, found: found[:-1] if topic in last else found)
+    file = ragged / "ragged_0.mcap"
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    end = max(index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes)
+    (ragged / "metadata.yaml").unlink()
+    file.write_bytes(file.read_bytes()[: end + 1])
+    assert hsv("recover", str(ragged)).code == 0
+    ran = hsv("replay", str(ragged))
+    assert ran.code == 0 and ran.err == "" and ran.out.count("identical in every byte") == 5
+    assert hsv("replay", str(ragged), "--rerun").code == 0
+    assert hsv("info", str(ragged), "--json").json["ending"] == "broken off"
+    # Of a bag in which nothing is missing, the end is the end.
+    whole = changed_bag(bag, tmp_path / "whole")
+    data = whole / "whole_0.mcap"
+    data.write_bytes(data.read_bytes()[:-9])
+    assert hsv("recover", str(whole)).code == 0
+    assert hsv("info", str(whole), "--json").json["ending"] == "finished"
+
+
+def test_flights_whose_folders_have_one_name_are_all_plotted(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    paths = [changed_bag(bag, tmp_path / name / "c") for name in ("da", "db")]
+    assert labels([Bag(path) for path in paths]) == [f"short ({path / 'c_0.mcap'})" for path in paths]
+    words = [str(paths[0].relative_to(tmp_path)), str(paths[1].relative_to(tmp_path))]
+    assert hsv("plot", *words, words[1], "--out", "three.svg").code == 0
+    text = (tmp_path / "three.svg").read_text()
+    for label in ("short (da/c/c_0.mcap)", "short (db/c/c_0.mcap, 2)", "short (db/c/c_0.mcap, 3)"):
+        assert label in text
+
+
+def test_diff_takes_padding_for_no_difference(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    padded = changed_bag(
+        bag,
+        tmp_path / "padded",
+        messages=lambda topic, found: [(time, data + b"\0" * (topic == "/clock")) for time, data in found],
+    )
+    ran = hsv("diff", str(bag), str(padded), "--json")
+    assert ran.code == 0 and ran.json["equal"] and ran.json["identical"]
+    assert "identical in every byte but the padding" in hsv("diff", str(bag), str(padded)).out

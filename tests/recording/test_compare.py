@@ -104,3 +104,10 @@ def test_arrays_and_lists_of_messages(kit: SimpleNamespace) -> None:
     for other in (faults(0.8, 1), faults(0.9, 2)):
         first = compare(faults(0.9, 1), other, tolerance=1e-10).first
         assert first is not None and first.field == "active"
+
+
+def test_different_definitions_where_one_track_is_empty(track: Any, kit: SimpleNamespace) -> None:
+    empty = Track("/hsv/forces", "hsv_msgs/msg/VehicleState", kit.messages.store, [], [])
+    first = compare(track([1.0]), empty).first
+    assert first is not None and (first.step, first.time_ns, first.field) == (0, 0, "lift")
+    assert (first.expected, first.actual) == (True, False)

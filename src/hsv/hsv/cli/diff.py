@@ -44,7 +44,7 @@ def diff(
         print_json(
             {
                 "equal": earliest is None,
-                "identical": not any(c.different_bytes for c in compared) and earliest is None,
+                "identical": all(c.identical for c in compared),
                 "first_difference": earliest
                 and {
                     "topic": earliest.topic,

@@ -35,6 +35,12 @@ class Columns(dict[str, NDArray[Any]]):
         self.source = source
         """Where the messages come from, for errors."""
 
+    def rows(self, rows: NDArray[np.intp]) -> Columns:
+        """Return these rows of every column."""
+        chosen = Columns(self.source)
+        chosen.update((name, column[rows]) for name, column in self.items())
+        return chosen
+
     def __missing__(self, name: str) -> NDArray[Any]:
         raise RecordingError(f"{self.source}: recorded with another definition, expected a field {name}")
 

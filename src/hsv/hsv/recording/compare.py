@@ -84,7 +84,8 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
     largest: dict[str, float] = {}
 
     def note(row: int, name: str, a: Any, b: Any) -> None:
-        found.append((row, Difference(expected.topic, int(steps[row]), expected.times[row], name, a, b)))
+        step, time = (int(steps[row]), expected.times[row]) if count else (0, 0)
+        found.append((row, Difference(expected.topic, step, time, name, a, b)))
 
     if len(disordered):
         row = int(disordered[0])

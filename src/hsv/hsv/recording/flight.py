@@ -7,21 +7,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
+from hsv.recording.steps import joined
 from hsv.simulation.metrics import FlightData
 
 _RIGID = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:
-    """Return a name for each of ``bags``: its scenario, with the bag's folder where several flew the same."""
+    """Return a name for each of ``bags``, no two the same: its scenario, with as much of its path as tells it apart."""
     scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
-    count = Counter(scenarios)
-    return [
-        name if count[name] == 1 else f"{name} ({bag.path.parent.name})"
-        for name, bag in zip(scenarios, bags, strict=True)
-    ]
+    names = scenarios
+    for details in (
+        [bag.path.absolute().parent.name for bag in bags],
+        [str(bag.path) for bag in bags],
+        [f"{bag.path}, {number}" for number, bag in enumerate(bags, 1)],
+    ):
+        count = Counter(names)
+        names = [
+            name if count[name] == 1 else f"{scenario} ({detail})"
+            for name, scenario, detail in zip(names, scenarios, details, strict=True)
+        ]
+    return names
 
 
 def state_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
@@ -37,25 +44,23 @@ def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarra
 
 
 def flight_data(bag: Bag) -> FlightData:
-    """Return the flight in ``bag``; of a broken-off run, the steps that are complete.
+    """Return the flight in ``bag``, of the steps that every topic has.
 
     Raises:
         RecordingError: A topic is missing, or no step is complete.
     """
-    state, nominal = bag.columns("/hsv/state"), bag.columns("/hsv/nominal")
-    command, tube = bag.columns("/hsv/command"), bag.columns("/hsv/tube_status")
-    steps = min(len(columns["step"]) for columns in (state, nominal, command, tube))
-    if steps == 0:
-        raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
+    state, nominal, command, tube = joined(
+        bag, ("/hsv/state", "/hsv/nominal", "/hsv/command", "/hsv/tube_status")
+    ).values()
     status = bag.columns("/hsv/fault_status")
     acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
     return FlightData(
-        time=state["header.stamp"][:steps] * 1e-9,
-        state=state_columns(state)[:steps],
-        reference=state_columns(nominal, "reference.")[:steps],
-        deviation=state_columns(nominal, "deviation.")[:steps],
-        command=input_columns(command)[:steps],
-        saturated=tube["saturated"][:steps],
-        gain_index=nominal["gain_index"][:steps],
+        time=state["header.stamp"] * 1e-9,
+        state=state_columns(state),
+        reference=state_columns(nominal, "reference."),
+        deviation=state_columns(nominal, "deviation."),
+        command=input_columns(command),
+        saturated=tube["saturated"],
+        gain_index=nominal["gain_index"],
         fault_start=float(bag.times("/hsv/fault_status")[acting[0]]) * 1e-9 if len(acting) else None,
     )

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
+from hsv.recording.steps import cut_off
 
 FAULT_STATUS = "/hsv/fault_status"
 STATE = "/hsv/state"
@@ -55,6 +57,8 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
 
 def _ending(bag: Bag) -> str:
     status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
+    if cut_off(bag) and any(bag.topics[topic].count < len(status) for topic in TOPICS if topic in bag.topics):
+        return "broken off"  # the last state may be there, but not what was made of it
     endings = {constants["FINISHED"]: "finished", constants["DIVERGED"]: "diverged"}
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
 

@@ -10,12 +10,13 @@ import numpy as np
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign, parse_parameters, read_design_parameters
-from hsv.errors import RecordingError
+from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
 from hsv.graph.description import TOPICS, TUBE_MPC
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
 from hsv.recording.reader import Bag
+from hsv.recording.steps import cut_off, joined
 from hsv.recording.track import expecting_fields
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
@@ -36,13 +37,16 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
         design: Parameter file to put in place of the attached design.
 
     Raises:
-        RecordingError: The bag carries no parameters.
-        DesignError, ParameterError: They are not acceptable.
+        RecordingError: The bag carries no parameters, or none that are acceptable.
+        DesignError: ``design`` is not acceptable.
     """
     attached = {name: parse_parameters(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO)}
     values = attached[DESIGN] | attached[SCENARIO]
     with expecting_fields(bag.path):
-        changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
+        try:
+            changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
+        except (DesignError, ParameterError) as error:
+            raise RecordingError(f"{bag.path}: attached {error}") from error
     if design is not None:
         values = read_design_parameters(design) | attached[SCENARIO]
     return values | changed
@@ -65,22 +69,20 @@ def complete_steps(bag: Bag) -> int:
 def broken_off(bag: Bag) -> bool:
     """Whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
     status = bag.columns("/hsv/state")["status"]
-    return not len(status) or int(status[-1]) == 0 or not bag.complete
+    return not len(status) or int(status[-1]) == 0 or cut_off(bag)
 
 
 def refuse_vacuous(bag: Bag) -> None:
     """Refuse a bag that would prove nothing.
 
     Raises:
-        RecordingError: The controller was active for less than ten seconds of simulated time.
+        RecordingError: The controller was active for less than ten seconds of simulated time, or there is no step.
     """
-    steps = complete_steps(bag)
-    command = input_columns(bag.columns("/hsv/command"))[:steps]
-    nominal = bag.columns("/hsv/nominal")
-    reference = input_columns(nominal, "reference_input.")[:steps]
-    active = np.abs(command - reference).max(axis=1, initial=0.0) > ACTIVE_INPUT
-    stamps = nominal["header.stamp"][:steps] * 1e-9
-    period = float(np.median(np.diff(stamps))) if steps > 1 else 0.0
+    command, nominal = joined(bag, ("/hsv/command", "/hsv/nominal")).values()
+    deviation = input_columns(command) - input_columns(nominal, "reference_input.")
+    active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT
+    stamps = nominal["header.stamp"] * 1e-9
+    period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     seconds = np.count_nonzero(active) * period
     if seconds < LEAST_ACTIVE_TIME:
         raise RecordingError(

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hsv.errors import RecordingError
-from hsv.recording.columns import Columns
 from hsv.recording.reader import Bag
 from hsv.recording.report.panels import PANELS, STATE, TUBE_STATUS, Curve, Kind, Panel, error_panel
+from hsv.recording.steps import joined
 
 
 @dataclass(frozen=True)
@@ -31,24 +30,21 @@ class FlightCurves:
 
 
 class _Source:
-    """The columns of a bag's topics, decoded once, cut to the steps that every topic has."""
+    """The columns of a bag's topics, of the steps that every topic has."""
 
     def __init__(self, bag: Bag) -> None:
-        names = {curve.topic for panel in PANELS for curve in panel.curves}
-        self.columns: dict[str, Columns] = {name: bag.columns(name) for name in names}
-        self.steps = min(len(columns["step"]) for columns in self.columns.values())
-        if self.steps == 0:
-            raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
-        self.time = self.columns[STATE]["header.stamp"][: self.steps] * 1e-9
+        names = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
+        self.columns = joined(bag, list(names))
+        self.time = self.columns[STATE]["header.stamp"] * 1e-9
 
     def values(self, curve: Curve) -> np.ndarray:
         columns = self.columns[curve.topic]
-        parts = [columns[name][: self.steps] for name in curve.fields]
+        parts = [columns[name] for name in curve.fields]
         return np.sum([part if curve.column is None else part[:, curve.column] for part in parts], axis=0)
 
     def tube(self, name: str) -> np.ndarray:
         """Return a vector field of the tube status, (n, components); components = 0 without a set."""
-        return np.asarray(self.columns[TUBE_STATUS][name][: self.steps], float).reshape(self.steps, -1)
+        return np.asarray(self.columns[TUBE_STATUS][name], float).reshape(len(self.time), -1)
 
 
 def flight_curves(bag: Bag) -> FlightCurves:
