@@ -24,15 +24,16 @@ def changed_bag(
 ) -> Path:
     """Write ``source`` again to ``target`` with other topics (None: left out), messages or attachments."""
     bag = Bag(source)
-    asked = (
-        topics(Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name))) for t in bag.topics.values()
-    )
-    kept = [topic for topic in asked if topic]
-    writer = BagWriter(target, kept, bag.custom_data)
+    recorded = [
+        Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name)) for t in bag.topics.values()
+    ]
+    changed = [(topic.name, topics(topic)) for topic in recorded]
+    kept = {name: topic for name, topic in changed if topic}
+    writer = BagWriter(target, list(kept.values()), bag.custom_data)
     for name, data in (bag.attachments | dict(attachments)).items():
         writer.attach(name, bag.media_types.get(name, "text/plain"), data)
-    for topic in kept:
-        for time, data in messages(topic.name, bag.messages(topic.name)):
+    for name, topic in kept.items():
+        for time, data in messages(name, bag.messages(name)):
             writer.write(topic.name, time, data)
     writer.close()
     return target

@@ -8,13 +8,14 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
-from hsv.errors import ParameterError
+from hsv.errors import ParameterError, RecordingError
 from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos
@@ -44,7 +45,7 @@ class PlayerNode(ProcessNode):
         self._rate = rate
         self._paused = paused
         self._talkers = {
-            topic: self.create_publisher(message_class(bag.topics[topic].type), topic, _profile(bag.qos(topic)))
+            topic: self.create_publisher(_message_class(bag, topic), topic, _profile(bag.qos(topic)))
             for topic in topics
         }
         self._instants = _instants(bag, topics)
@@ -98,6 +99,9 @@ class PlayerNode(ProcessNode):
         if not self._paused:
             response.message = "playing: pause first"
             return response
+        if self._next >= len(self._instants):
+            response.message = "at the end, nothing is left to publish"
+            return response
         self._publish()
         return self._answer(response)
 
@@ -117,6 +121,16 @@ def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str
         for instant, data in bag.messages(topic):
             gathered.setdefault(instant, []).append((topic, data))
     return sorted(gathered.items())
+
+
+def _message_class(bag: Bag, topic: str) -> Any:
+    kind = bag.topics[topic].type
+    try:
+        return message_class(kind)
+    except (ImportError, AttributeError, ValueError):
+        raise RecordingError(
+            f"{bag.path}: topic {topic}: message type {kind} is not installed, expected it or a choice of other topics"
+        ) from None
 
 
 def _profile(qos: Qos) -> QoSProfile:
@@ -143,6 +157,8 @@ def main(args: Sequence[str] | None = None) -> int:
     def build() -> PlayerNode:
         if not 0.0 < options.rate < math.inf:
             raise ParameterError(f"rate = {options.rate}: expected a finite number above zero")
+        if not 0.0 <= options.delay < math.inf:
+            raise ParameterError(f"delay = {options.delay}: expected a finite number (seconds), not below zero")
         bag = Bag(options.bag)
         topics = dict.fromkeys(options.topics or bag.topics)
         for topic in topics:

@@ -1,0 +1,76 @@
+"""The player at its end, and words and bags it cannot use."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from changed_bags import Messages, changed_bag
+from domain_coordinator import domain_id
+from flown_bags import flown_bag
+from node_processes import Processes
+
+from hsv.recording.reader import Bag
+from hsv.recording.topic import Topic
+
+pytestmark = pytest.mark.graph
+
+STEPS = 3
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of three steps."""
+    folder = tmp_path_factory.mktemp("bags")
+
+    def begin(_: str, messages: Messages) -> Messages:
+        return messages[:STEPS]
+
+    return changed_bag(flown_bag(folder / "flown", duration=1.0, fault=0.5), folder / "short", messages=begin)
+
+
+def test_a_step_at_the_end_is_refused(bag: Path) -> None:
+    import rclpy
+    from rclpy.executors import SingleThreadedExecutor
+    from std_srvs.srv import Trigger
+
+    from hsv_bringup.player import PlayerNode
+
+    with domain_id() as number:
+        rclpy.init(domain_id=number)
+        try:
+            player = PlayerNode(Bag(bag), ["/hsv/state"], 1.0, paused=True, delay=0.0)
+            asking = rclpy.create_node("asking")
+            executor = SingleThreadedExecutor()
+            for node in (player, asking):
+                executor.add_node(node)
+            client = asking.create_client(Trigger, "/player/step")
+            assert client.wait_for_service(10.0)
+            calls = [client.call_async(Trigger.Request()) for _ in range(STEPS + 1)]
+            for call in calls:
+                executor.spin_until_future_complete(call, 10.0)
+            assert [call.result().success for call in calls] == [True] * STEPS + [False]
+            assert calls[-1].result().message == "at the end, nothing is left to publish"
+        finally:
+            rclpy.shutdown()
+
+
+@pytest.mark.parametrize("delay", ["inf", "nan", "-1"])
+def test_a_delay_that_never_ends_is_refused(processes: Processes, bag: Path, delay: str) -> None:
+    done = processes.run("hsv", "play", bag, "--delay", delay, "--topic", "/hsv/state", timeout=20.0)
+    assert done.returncode == 2
+    (line,) = [line for line in done.stdout.splitlines() if "warning" not in line]
+    assert line.startswith(f"player: error: delay = {float(delay)}: expected a finite number")
+
+
+def test_a_message_type_that_is_not_installed_is_named(processes: Processes, bag: Path) -> None:
+    def foreign(topic: Topic) -> Topic:
+        if topic.name != "/hsv/forces":
+            return topic
+        return replace(topic, name="/other", type="other_msgs/msg/Other", definition="float64 data\n")
+
+    made = changed_bag(bag, processes.folder / "made", foreign)
+    done = processes.run("hsv", "play", made)
+    assert done.returncode == 2
+    assert "topic /other: message type other_msgs/msg/Other is not installed" in done.stdout.splitlines()[-1]
