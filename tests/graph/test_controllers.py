@@ -95,7 +95,7 @@ def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> 
 
 
 def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> None:
-    bag = _flown(processes, short_scenario(processes.folder, duration=1, coupling="derived"), "uncertified")
+    bag = _flown(processes, short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived"), "uncertified")
     status = bag.columns("/hsv/tube_status")
     assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
     assert "vehicle outside the set" in processes.run("hsv", "info", processes.folder / "uncertified").stdout
