@@ -1,12 +1,15 @@
+import logging
 import os
 import signal
+import time
 
 import pytest
+from distributed import LocalCluster
 
 from hsv.campaign.conduct import conduct
 from hsv.campaign.fleet import fleet
 from hsv.campaign.store import Store
-from hsv.errors import CampaignError
+from hsv.errors import CampaignError, RunError
 
 
 def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, results, out):
@@ -26,12 +29,59 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
     assert out.read_bytes() == results.path.read_bytes()
 
 
-def test_a_scheduler_that_does_not_answer_is_named():
-    with pytest.raises(CampaignError, match="nowhere"), fleet(1, "nowhere://"):
+@pytest.mark.parametrize("address", ["nonsense", "nowhere://x", "tcp://127.0.0.1", "tcp://h:99999", "inproc://x"])
+def test_an_address_that_is_none_is_refused_at_once(address):
+    started = time.monotonic()
+    with pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"), fleet(1, address):
         pass
+    assert time.monotonic() - started < 5.0
 
 
-@pytest.mark.parametrize("workers", [0, -1, 100_000])
+def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
+    monkeypatch.setattr("hsv.campaign.scheduler.ANSWER", 0.5)
+    with pytest.raises(CampaignError, match=r"'127\.0\.0\.1:9': no answer"), fleet(1, "127.0.0.1:9"):
+        pass
+    assert capfd.readouterr().err == ""
+
+
+@pytest.fixture
+def cluster():
+    """A scheduler of its own, without workers."""
+    with LocalCluster(
+        n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+    ) as started:
+        yield started
+
+
+def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
+    monkeypatch.setattr("hsv.campaign.scheduler.WORKERS", 0.5)
+    waited = []
+    with (
+        pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
+        fleet(1, cluster.scheduler_address, lambda: waited.append(True)),
+    ):
+        pass
+    assert waited
+
+
+def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
+    campaign, store = planned(samples=320), Store(out, planned(samples=320))
+    cluster.scale(1)
+
+    def lose(done):
+        if done:
+            cluster.close()
+
+    with (
+        fleet(1, cluster.scheduler_address) as workers,
+        pytest.raises(RunError, match="the scheduler is lost"),
+    ):
+        conduct(campaign, store, workers, progress=lose)
+    with store.opened() as finished:
+        assert finished
+
+
+@pytest.mark.parametrize("workers", [-1, 100_000])
 def test_an_impossible_number_of_workers_is_refused(workers):
-    with pytest.raises(CampaignError, match=f"workers = {workers}"), fleet(workers):
+    with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), fleet(workers):
         pass

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from itertools import islice
 from typing import Any, Protocol
 
+from hsv.campaign.scheduler import connected
 from hsv.campaign.table import fly_batch
-from hsv.errors import CampaignError, RunError
+from hsv.errors import CampaignError, RunError, reason
 
 _AHEAD = 4
 """Batches a core that wait at the workers: enough that none is idle, few enough that a lost worker loses little."""
@@ -63,7 +65,7 @@ class DaskWorkers:
         """Yield number and content of each batch.
 
         Raises:
-            RunError: Workers die of a batch again and again.
+            RunError: Workers die of a batch again and again, or the scheduler is lost.
         """
         from distributed import KilledWorker, as_completed
 
@@ -82,42 +84,43 @@ class DaskWorkers:
         submit(_AHEAD * max(self.cores, 1))
         try:
             for future, content in running:
+                if not isinstance(content, bytes):
+                    raise RunError(f"campaign: the scheduler is lost ({future.status}); what is finished is kept")
                 submit(1)
                 yield numbers.pop(future.key), content
         except KilledWorker as error:
             raise RunError(
                 f"campaign: several workers died of the same batch ({error}); what is finished is kept"
             ) from error
+        except OSError as error:
+            raise RunError(f"campaign: the scheduler is lost ({reason(error)}); what is finished is kept") from error
 
 
 @contextmanager
-def fleet(workers: int, scheduler: str = "") -> Iterator[Fleet]:
+def fleet(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambda: None) -> Iterator[Fleet]:
     """Yield who flies: the workers of the ``scheduler`` at this address, or so many processes of this machine.
 
     Args:
-        workers: 1 flies in this process.
+        workers: 0: one a processor; 1 flies in this process.
         scheduler: Address of a Dask scheduler, e.g. ``"tcp://10.0.0.1:8786"``; empty: this machine.
+        on_wait: Called if the scheduler has no workers yet, before they are waited for.
 
     Raises:
-        CampaignError: No scheduler answers there, or the number is not admissible.
+        CampaignError: The number or the address is not admissible, no scheduler answers there, or it has no workers.
     """
-    if not 1 <= workers <= 4096:
-        raise CampaignError(f"workers = {workers}: expected 1 to 4096")
-    if workers == 1 and not scheduler:
+    if not 0 <= workers <= 4096:
+        raise CampaignError(f"workers = {workers}: expected 0 to 4096")
+    if scheduler:
+        with connected(scheduler, on_wait) as client:
+            yield DaskWorkers(client)
+        return
+    workers = workers or os.cpu_count() or 1
+    if workers == 1:
         yield OwnProcess()
         return
     import dask
     from distributed import Client, LocalCluster
 
-    if scheduler:
-        try:
-            client = Client(scheduler, timeout="20s", set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise CampaignError(f"scheduler = {scheduler!r}: no answer, expected a running Dask scheduler") from error
-        with client:
-            client.wait_for_workers(1)
-            yield DaskWorkers(client)
-        return
     with (
         dask.config.set(_LOCAL),
         LocalCluster(

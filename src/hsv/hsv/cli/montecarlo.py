@@ -71,8 +71,6 @@ def fly(
 
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --fault-start "90 s" "110 s"
     """
-    import os
-
     from hsv.campaign.campaign import plan
     from hsv.campaign.conduct import conduct
     from hsv.campaign.fleet import fleet
@@ -101,7 +99,7 @@ def fly(
     store = Store(out, campaign)
     try:
         with (
-            fleet(workers or os.cpu_count() or 1, scheduler) as flying,
+            fleet(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
             flights_bar(campaign.scenario_name, campaign.samples) as progress,
         ):
             flown = conduct(campaign, store, flying, restart=restart, expect=announce, progress=progress)
