@@ -27,7 +27,10 @@ def wrong(tmp_path):
 def test_a_wrong_value_names_its_file(hsv, wrong, words):
     ran = hsv(*words)
     assert ran.code == 2
-    assert ran.error.removeprefix("scenario 'mine': ") == "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s"
+    assert (
+        ran.error.removeprefix("scenario 'mine': ")
+        == "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s"
+    )
 
 
 def test_a_missing_design_is_named_not_its_certificate(hsv):
