@@ -15,7 +15,7 @@ from markupsafe import Markup
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.campaign.pilot import Pilot
 from hsv.campaign.summary import Results, distributions, limits, shares, worst_flights
-from hsv.errors import CampaignError
+from hsv.errors import CampaignError, reason
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import compressed
@@ -33,10 +33,13 @@ def write_page(results: Results, out: Path) -> None:
     Raises:
         CampaignError: The file cannot be written.
     """
+    page = render(results)
     try:
-        out.write_text(render(results), encoding="utf-8")
+        out.write_text(page, encoding="utf-8")
     except OSError as error:
-        raise CampaignError(f"{out}: cannot be written ({error.strerror}), expected an HTML file to write") from None
+        if out.is_file():
+            out.unlink()  # half a page
+        raise CampaignError(f"{out}: cannot be written ({reason(error)}), expected an HTML file to write") from error
 
 
 def render(results: Results) -> str:

@@ -37,10 +37,7 @@ def announce(capacity: Capacity) -> None:
 
 def show(results: Results, units: Units, json: bool, page: bool, flown: int | None = None) -> None:
     """Print the summary of a campaign and write its page; ``flown`` now, if any were."""
-    written = None
-    if page:
-        written = results.path.with_suffix(".html")
-        write_page(results, written)
+    written = results.path.with_suffix(".html") if page else None
     rows, worst, spread = shares(results), worst_flights(results, _LISTED), distributions(results)
     if json:
         print_json(
@@ -75,11 +72,13 @@ def show(results: Results, units: Units, json: bool, page: bool, flown: int | No
                 ],
             }
         )
-        return
-    _print_tables(results, rows, worst, spread, units)
-    console.print(f"results {results.path}", soft_wrap=True)
+    else:
+        _print_tables(results, rows, worst, spread, units)
+        console.print(f"results {results.path}", soft_wrap=True, markup=False)
     if written:
-        console.print(f"page    {written}", soft_wrap=True)
+        write_page(results, written)
+    if written and not json:
+        console.print(f"page    {written}", soft_wrap=True, markup=False)
 
 
 def _print_tables(

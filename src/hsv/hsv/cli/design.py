@@ -10,7 +10,7 @@ from rich.table import Table
 
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, print_json
-from hsv.cli.targets import check_target
+from hsv.cli.targets import check_target, writing
 
 if TYPE_CHECKING:
     from hsv.control.design_file import ControlDesign
@@ -50,8 +50,10 @@ def design(
         result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
     target = out or source.with_suffix(".yaml")
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
-    write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
-    write_certificate(certificate_path(target), result.report)
+    with writing(target, "out"):
+        write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
+    with writing(certificate_path(target), "certificate"):
+        write_certificate(certificate_path(target), result.report)
     rows = _compared(result.design, result.report, inputs) if compare_sets else []
     if json:
         compared = {"compared_sets": [row.as_dict() for row in rows]} if compare_sets else {}

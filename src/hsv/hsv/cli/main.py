@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+from contextlib import suppress
 from typing import Any
 
 import typer
@@ -30,7 +32,7 @@ from hsv.cli.study import study
 from hsv.cli.trim import trim
 from hsv.cli.verify import verify
 from hsv.cli.view import view
-from hsv.errors import HsvError, RunError
+from hsv.errors import HsvError, RunError, reason
 
 _INTERRUPTED = 130
 
@@ -79,6 +81,8 @@ def main() -> None:
         code = app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
+        if sys.stdout:
+            sys.stdout.flush()
         sys.exit(code)
     except UsageError as error:
         _fail(_usage(error), 2)
@@ -88,6 +92,12 @@ def main() -> None:
         _fail(error, 2)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
+    except BrokenPipeError:
+        _end(1)  # Nobody reads any more: no more words either, as of click and rich.
+    except OSError as error:
+        # Of a file that it fails to open, the system says the name; not of the output that it fails to write.
+        place = f"{error.filename}: cannot be opened" if error.filename else "output: cannot be written"
+        _fail(f"{place} ({reason(error)})", 2)
 
 
 def _usage(error: Any) -> str:
@@ -95,7 +105,18 @@ def _usage(error: Any) -> str:
 
 
 def _fail(problem: object, code: int) -> None:
-    report_error(problem)
+    with suppress(OSError):
+        report_error(problem)
+    _end(code)
+
+
+def _end(code: int) -> None:
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        try:
+            stream.flush()
+        except OSError:
+            # Python would try once more at its end, complain on several lines, and change the exit code.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(code)
 
 

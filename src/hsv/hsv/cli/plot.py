@@ -10,7 +10,7 @@ import typer
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import Units, print_written
 from hsv.cli.shortcomings import warn_of_shortcomings
-from hsv.cli.targets import check_target
+from hsv.cli.targets import check_target, writing
 
 
 def plot(
@@ -33,6 +33,7 @@ def plot(
     check_target(out, "out")
     opened = [Bag(path) for path in bags]
     flights = {name: flight_data(bag) for name, bag in zip(labels(opened), opened, strict=True)}
-    save_figure(flight_figure(flights, units is Units.paper), out)
+    with writing(out, "out"):
+        save_figure(flight_figure(flights, units is Units.paper), out)
     print_written([out], json)
     warn_of_shortcomings(*opened)

@@ -9,7 +9,7 @@ import typer
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
 from hsv.cli.output import Units
-from hsv.cli.targets import check_target
+from hsv.cli.targets import check_target, writing
 
 
 def simulate(
@@ -41,7 +41,7 @@ def simulate(
     flight = fly(components)
     wall = time.perf_counter() - started
     if out:
-        with out.open("wb") as stream:
+        with writing(out, "out"), out.open("wb") as stream:
             np.savez_compressed(stream, time=flight.time, **flight.history._asdict())
     report_flight(
         loaded,

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
-from hsv.errors import ParameterError
+from hsv.errors import ParameterError, reason
 
 
 def check_target(path: Path, field: str) -> None:
@@ -31,6 +33,21 @@ def check_folder(path: Path, field: str) -> None:
         there = there.parent
     if not _takes_files(there):
         raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a folder or the name of a new one")
+
+
+@contextmanager
+def writing(path: Path, field: str) -> Iterator[None]:
+    """Turn what the system refuses while ``path`` is written into one error; half a file is removed.
+
+    Raises:
+        ParameterError: It could not be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        if path.is_file():
+            path.unlink()
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written ({reason(error)})") from error
 
 
 def _takes_files(folder: Path) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.errors import RecordingError
+from hsv.errors import RecordingError, reason
 from hsv.recording.reader import Bag
 from hsv.recording.units import units_of
 
@@ -38,25 +39,34 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
         raise RecordingError(
             f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
         )
+    npz = form is Format.npz
+    contents = _arrays(bag, topics) if npz else {topic: _table(bag, topic) for topic in topics}
     try:
-        if form is Format.npz:
-            arrays: dict[str, Any] = {
-                f"{_file_stem(t)}.{name}": a for t in topics for name, a in _fields(bag, t).items()
-            }
-            target.parent.mkdir(parents=True, exist_ok=True)
-            with target.open("wb") as stream:
-                np.savez_compressed(stream, **arrays)
-            return [target]
-        tables = {topic: _table(bag, topic) for topic in topics}
-        target.mkdir(parents=True)
-        written = []
-        for topic, table in tables.items():
-            path = target / f"{_file_stem(topic)}.{form}"
-            (_write_csv if form is Format.csv else _write_parquet)(path, table)
-            written.append(path)
-        return written
+        (target.parent if npz else target).mkdir(parents=True, exist_ok=npz)
     except OSError as error:
-        raise RecordingError(f"out = {str(target)!r}: cannot be written: {error.strerror}") from None
+        raise _refused(target, error) from error
+    try:
+        if npz:
+            with target.open("wb") as stream:
+                np.savez_compressed(stream, **contents)
+            return [target]
+        write = _write_csv if form is Format.csv else _write_parquet
+        return [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
+    except BaseException as error:
+        # Half an export would be in the way of the next one.
+        shutil.rmtree(target, ignore_errors=True)
+        target.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise _refused(target, error) from error
+        raise
+
+
+def _refused(target: Path, error: OSError) -> RecordingError:
+    return RecordingError(f"out = {str(target)!r}: cannot be written: {reason(error)}")
+
+
+def _arrays(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
+    return {f"{_file_stem(topic)}.{name}": array for topic in topics for name, array in _fields(bag, topic).items()}
 
 
 def _file_stem(topic: str) -> str:
@@ -123,13 +133,15 @@ def _arrow(table: dict[str, NDArray[Any]]) -> Any:
     return pyarrow.table({name: pyarrow.array(column) for name, column in table.items()})
 
 
-def _write_csv(path: Path, table: dict[str, NDArray[Any]]) -> None:
+def _write_csv(path: Path, table: dict[str, NDArray[Any]]) -> Path:
     from pyarrow import csv
 
     csv.write_csv(_arrow(table), path)
+    return path
 
 
-def _write_parquet(path: Path, table: dict[str, NDArray[Any]]) -> None:
+def _write_parquet(path: Path, table: dict[str, NDArray[Any]]) -> Path:
     from pyarrow import parquet
 
     parquet.write_table(_arrow(table), path)
+    return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from io import BytesIO
 from pathlib import Path
 
 import matplotlib
@@ -52,7 +53,10 @@ def save_figure(figure: Figure, path: Path) -> None:
     if path.suffix in (".svg", ".pdf"):
         metadata = {"Date" if path.suffix == ".svg" else "CreationDate": None}
     with matplotlib.rc_context({"svg.hashsalt": "hsv"}):
-        figure.savefig(path, dpi=110, metadata=metadata)
+        # Whole before it meets the disk: on a full one matplotlib's own errors depend on the format.
+        whole = BytesIO()
+        figure.savefig(whole, format=path.suffix[1:], dpi=110, metadata=metadata)
+    path.write_bytes(whole.getvalue())
 
 
 def _mathtext(unit: str) -> str:

@@ -1,0 +1,119 @@
+"""A disk that is full, and output that nobody takes: one line, exit code 2, and no half of a file."""
+
+import os
+import resource
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from node_processes import short_scenario
+from recorded_flight import record_flight
+
+from hsv.cli.targets import writing
+from hsv.design.certificate import write_certificate
+from hsv.errors import ParameterError
+
+FULL = Path("/dev/full")
+
+
+def command(*words, out, buffered=True):
+    """Run the command as a process of its own: what matters is also what Python does at its end."""
+    environment = os.environ | {"PYTHONUNBUFFERED": "" if buffered else "1"}
+    ran = subprocess.run(
+        [sys.executable, "-m", "hsv.cli.main", *words], stdout=out, stderr=subprocess.PIPE, text=True, env=environment
+    )
+    return ran.returncode, ran.stderr
+
+
+@pytest.mark.parametrize("buffered", [True, False])
+@pytest.mark.parametrize("words", [("trim",), ("trim", "--json"), ("--help",)], ids=" ".join)
+def test_output_that_finds_no_space_is_one_line(words, buffered):
+    with FULL.open("w") as full:
+        code, error = command(*words, out=full, buffered=buffered)
+    assert (code, error) == (2, "hsv: error: output: cannot be written (No space left on device)\n")
+
+
+def test_an_error_stays_that_error_if_nothing_can_be_printed():
+    with FULL.open("w") as full:
+        code, error = command("verify", "nope.yaml", out=full)
+    assert code == 2 and error.startswith("hsv: error: design 'nope.yaml'") and error.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [("trim",), ("trim", "--json")], ids=" ".join)
+def test_a_reader_that_has_gone_is_told_nothing(words):
+    reading, writing = os.pipe()
+    os.close(reading)
+    try:
+        assert command(*words, out=writing) == (1, "")
+    finally:
+        os.close(writing)
+
+
+@contextmanager
+def files_no_larger_than(size):
+    """Fill the disk, as far as one process can do it for itself alone."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_histories_that_do_not_fit(hsv, tmp_path):
+    with files_no_larger_than(50_000):
+        ran = hsv("simulate", "case1", "--out", "flight.npz")
+    assert ran.code == 2
+    assert ran.error == "out = 'flight.npz': cannot be written (File too large)"
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    return str(record_flight(tmp_path_factory.mktemp("bags") / "flight", duration=2.0, fault=1.0).path.parent)
+
+
+@pytest.mark.parametrize("name", ["flight.png", "flight.svg", "flight.pdf"])
+def test_a_figure_that_does_not_fit(hsv, tmp_path, bag, name):
+    with files_no_larger_than(2_000):
+        ran = hsv("plot", bag, "--out", name)
+    assert ran.code == 2
+    assert ran.error == f"out = '{name}': cannot be written (File too large)"
+    assert not (tmp_path / name).exists()
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "npz"])
+def test_an_export_that_does_not_fit_is_not_in_the_way_of_the_next(hsv, tmp_path, bag, form):
+    words = ("export", bag, f"--{form}", "--out", "table")
+    with files_no_larger_than(2_000):
+        ran = hsv(*words)
+    assert ran.code == 2
+    assert ran.error == "out = 'table': cannot be written: File too large"
+    assert not list(tmp_path.iterdir())
+    assert hsv(*words).code == 0
+
+
+def test_a_certificate_that_does_not_fit(tmp_path):
+    path = tmp_path / "design.certificate.json"
+    with (
+        pytest.raises(ParameterError, match=r"^certificate = .*cannot be written \(File too large\)"),
+        files_no_larger_than(2_000),
+        writing(path, "certificate"),
+    ):
+        write_certificate(path, {"inputs": list(range(10_000))})
+    assert not path.exists()
+
+
+def test_a_campaign_whose_page_does_not_fit_leaves_its_summary(hsv, tmp_path):
+    short_scenario(tmp_path, duration=3, fault=2)
+    assert (
+        hsv("montecarlo", "short.toml", "--samples", "12", "--workers", "1", "--no-page", "--out", "a.parquet").code
+        == 0
+    )
+    with files_no_larger_than(100_000):
+        ran = hsv("montecarlo", "summary", "a.parquet")
+    assert ran.code == 2 and "12 of 12" in ran.out
+    assert ran.error == "a.html: cannot be written (File too large), expected an HTML file to write"
+    assert not (tmp_path / "a.html").exists()
