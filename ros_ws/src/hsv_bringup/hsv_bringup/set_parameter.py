@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import rclpy
 import yaml
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import NameValidationException
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.utilities import remove_ros_args
@@ -20,16 +21,20 @@ PATIENCE = 30.0
 
 def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
     """Return what the node says to a new ``value``; not successful as well where no such node answers."""
+    parameter = Parameter(name, value=value)
     node = rclpy.create_node("set_parameter", enable_rosout=False)
     try:
         client = AsyncParameterClient(node, node_name)
         deadline = time.monotonic() + PATIENCE
         if client.wait_for_services(PATIENCE):
-            future = client.set_parameters([Parameter(name, value=value)])
+            future = client.set_parameters([parameter])
             rclpy.spin_until_future_complete(node, future, timeout_sec=max(0.0, deadline - time.monotonic()))
             if future.done():
                 return future.result().results[0]
         return SetParametersResult(successful=False, reason=f"no answer from node {node_name!r} in {PATIENCE:g} s")
+    except NameValidationException:
+        expected = "expected the name of a node, such as tube_mpc"
+        return SetParametersResult(successful=False, reason=f"node = {node_name!r}: {expected}")
     finally:
         node.destroy_node()
 
@@ -45,7 +50,7 @@ def main(args: Sequence[str] | None = None) -> int:
     rclpy.init(args=given)
     try:
         result = set_parameter(asked.node, asked.parameter, yaml.safe_load(asked.value))
-    except (TypeError, yaml.YAMLError) as error:
+    except (OverflowError, TypeError, ValueError, yaml.YAMLError) as error:
         result = SetParametersResult(successful=False, reason=" ".join(str(error).split()))
     finally:
         rclpy.try_shutdown()
