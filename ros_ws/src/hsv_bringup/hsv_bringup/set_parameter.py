@@ -21,7 +21,7 @@ PATIENCE = 30.0
 
 def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
     """Return what the node says to a new ``value``; not successful as well where no such node answers."""
-    parameter = Parameter(name, value=value)
+    parameter = Parameter(name, value=value).to_parameter_msg()
     node = rclpy.create_node("set_parameter", enable_rosout=False)
     try:
         client = AsyncParameterClient(node, node_name)
