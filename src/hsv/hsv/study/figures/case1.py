@@ -22,8 +22,8 @@ def conditions(nominal: str = "thin") -> str:
     return (
         "Uncertain parameters as in `case1_uncertain` (mass +5 %, moment of inertia -5 %, the rest at half its bound), "
         f"elevator effectiveness 0.9 from 100 s; {nominal}: nominal parameters. Robust MPC flies the decoupled model "
-        "without tube and notch filter, as in the paper, with the fourth gain of the family, the tightest that "
-        "survives the step with these parameters"
+        "without tube and notch filter, as in the paper, with the fourth gain of the family, the tightest with "
+        "which it loses no corner of the bounds"
     )
 
 
