@@ -1,12 +1,13 @@
 import json
-import resource
 import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
+from full_disk import files_no_larger_than
 from pyarrow import parquet
 
 from hsv.campaign.conduct import capacity, conduct
@@ -181,17 +182,15 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
 
 @pytest.mark.parametrize("flights", [0, 32, 44])
 def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results, out, flights):
-    campaign, before = planned(), resource.getrlimit(resource.RLIMIT_FSIZE)
+    campaign = planned()
+    with ExitStack() as disk:
 
-    def fill_the_disk(done):
-        if done == flights:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+        def fill_the_disk(done):
+            if done == flights:
+                disk.enter_context(files_no_larger_than(20_000))
 
-    try:
         with pytest.raises(CampaignError, match=r"cannot be written \(File too large\); finished batches are kept"):
             conduct(campaign, Store(out, campaign), OwnProcess(), progress=fill_the_disk)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(out.parent.rglob("*.unfinished"))
     assert conduct(campaign, Store(out, campaign), OwnProcess()) == campaign.samples - flights
     assert out.read_bytes() == results.path.read_bytes()

@@ -1,13 +1,12 @@
 """A disk that is full, and output that nobody takes: one line, exit code 2, and no half of a file."""
 
 import os
-import resource
 import subprocess
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from full_disk import files_no_larger_than
 from node_processes import short_scenario
 from recorded_flight import record_flight
 
@@ -49,17 +48,6 @@ def test_a_reader_that_has_gone_is_told_nothing(words):
         assert command(*words, out=writing) == (1, "")
     finally:
         os.close(writing)
-
-
-@contextmanager
-def files_no_larger_than(size):
-    """Fill the disk, as far as one process can do it for itself alone."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def test_histories_that_do_not_fit(hsv, tmp_path):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -11,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
+from full_disk import files_no_larger_than
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import Writer
@@ -182,14 +182,10 @@ def test_writer_refuses(kit: SimpleNamespace, tmp_path: Path) -> None:
 
 def test_full_disk_is_one_clear_line(kit: SimpleNamespace, tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-    try:
-        with pytest.raises(RecordingError, match=r"bag_0\.mcap: cannot be written: File too large"):
-            for step in range(1000):
-                writer.write("/hsv/state", step, kit.messages.random.bytes(200))
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    problem = r"bag_0\.mcap: cannot be written: File too large"
+    with pytest.raises(RecordingError, match=problem), files_no_larger_than(10_000):
+        for step in range(1000):
+            writer.write("/hsv/state", step, kit.messages.random.bytes(200))
 
 
 def _foreign(path: Path, kit: SimpleNamespace) -> Path:

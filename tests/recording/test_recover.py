@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -13,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 import yaml
+from full_disk import files_no_larger_than
 from rosbags.rosbag2 import Reader
 
 from hsv.errors import RecordingError
@@ -151,11 +151,7 @@ def test_a_full_disk_leaves_the_bag_as_it_was(killed: tuple[Path, int]) -> None:
     path, _ = killed
     file = path / "killed_0.mcap"
     data = file.read_bytes()
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (len(data) // 2, limits[1]))
-    try:
-        with pytest.raises(RecordingError, match=r"killed_0\.mcap: cannot be mended: File too large"):
-            recover(path)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    problem = r"killed_0\.mcap: cannot be mended: File too large"
+    with pytest.raises(RecordingError, match=problem), files_no_larger_than(len(data) // 2):
+        recover(path)
     assert list(path.iterdir()) == [file] and file.read_bytes() == data

@@ -1,8 +1,8 @@
 import html
 import re
-import resource
 
 import pytest
+from full_disk import files_no_larger_than
 from recorded_flight import message_types
 
 from hsv.errors import RecordingError
@@ -143,11 +143,7 @@ def test_a_file_that_cannot_be_written_is_named(quiet, tmp_path):
 
 
 def test_a_full_disk_leaves_no_half_page(quiet, tmp_path):
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, limits[1]))
-    try:
-        with pytest.raises(RecordingError, match=r"page\.html: cannot be written \(File too large\)"):
-            write_report([quiet], tmp_path / "page.html")
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    problem = r"page\.html: cannot be written \(File too large\)"
+    with pytest.raises(RecordingError, match=problem), files_no_larger_than(100_000):
+        write_report([quiet], tmp_path / "page.html")
     assert not list(tmp_path.iterdir())
