@@ -1,4 +1,4 @@
-"""A recorder killed at a random moment loses the last fraction of a second and nothing else.
+"""A recorder killed at a random moment loses what was on its way to the disk and nothing else.
 
 HSV_KILLS=20 python3 -m pytest tests/graph/test_killed_recorder.py
 """
@@ -19,14 +19,12 @@ from rosbags.rosbag2 import Reader
 
 from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
+from hsv_plant.plant import MAX_AHEAD
 
 pytestmark = [pytest.mark.graph, pytest.mark.timeout(180)]
 
 KILLS = int(os.environ.get("HSV_KILLS", "2"))
 PERIOD = 0.02
-LARGEST_LOSS = 0.5
-"""Seconds of simulated time."""
-
 LISTEN = textwrap.dedent(
     """
     import struct, time
@@ -76,9 +74,10 @@ def test_bag_opens_and_has_all_but_the_last_moment(processes: Processes, seed: i
     assert _steps(bag) and Bag(bag).complete
     flown = [line.split() for line in words.read_text().splitlines() if len(line.split()) == 2]
     last = max(int(step) for moment, step in flown if float(moment) <= killed)
-    lost = (last + 1 - _steps(bag)) * PERIOD
-    print(f"killed at step {last}, lost {lost:.2f} s")
-    assert lost < LARGEST_LOSS
+    lost = last + 1 - _steps(bag)
+    print(f"killed at step {last}, lost {lost} steps, {lost * PERIOD:.2f} s")
+    # How many depends on the machine; more than the plant may be ahead of what is on the disk, on none.
+    assert lost <= MAX_AHEAD
     with Reader(bag) as reader:
         assert reader.message_count == sum(topic.count for topic in Bag(bag).topics.values())
 
