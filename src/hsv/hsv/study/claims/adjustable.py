@@ -112,7 +112,7 @@ def _further_stable(evidence: Evidence) -> Finding:
         f"vibration back: {unstable[0]} of {evidence.vehicles} loops are unstable with tau = {tau:g}, {unstable[1]} "
         f"with 1. With the paper-like coupling the slowest pole, at {abs(_slowest(evidence, 1.0).imag):.1f} rad/s with "
         f"1, is one at {abs(_slowest(evidence, tau).imag):.1f} rad/s with {tau:g}: there the rigid body wants the "
-        "feedback. Below the certified range of tau the loop is lost ([factor](study/factor.md)).",
+        "feedback. How far below the certified range the loop stays stable: [factor](study/factor.md).",
     )
 
 

@@ -130,8 +130,8 @@ def _smaller(evidence: Evidence) -> Finding:
             Reading("the same, largest, for F' in place of tau F'", _largest(measured, whole), "1", at_most=1.0),
         ),
         "The set for F' itself shrinks with W'. But the law (48) applies tau F', a weaker feedback, and the set that "
-        f"is invariant under it is {shown(float(ratios[0]), '1')} times Z in altitude, {shown(float(ratios[1]), '1')} "
-        "times in velocity.",
+        f"is invariant under both is {shown(float(ratios[0]), '1')} times Z in altitude, "
+        f"{shown(float(ratios[1]), '1')} times in velocity.",
     )
 
 

@@ -270,7 +270,7 @@ CLAIMS = (
         "the trajectory comes close to the nominal",
         "The robust auxiliary feedback control law steers the actual trajectory into the mRPI set and makes it "
         "approximate the nominal trajectory.",
-        "1",
+        "Section 1",
         _close_to_nominal,
     ),
     Claim(

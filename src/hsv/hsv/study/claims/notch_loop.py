@@ -57,7 +57,7 @@ def without_notch(evidence: Evidence) -> Finding:
         f"The paper-like coupling, {share:g} times the derived one, was chosen so that the nominal vehicle is stable, "
         f"and it is only just: from {share * margin:.4f} times on, {100.0 * (margin - 1.0):.1f} % more coupling, it is "
         f"not ({MARGIN:g}: what the largest uncertainty of a parameter, 10 %, asks for). Without the notch "
-        f"{lost} of {len(growth)} vehicles are unstable, most slowly (second-mode ringing in flight at worst "
+        f"{lost} of {len(growth)} vehicles are unstable, most of them slowly (second-mode ringing in flight at worst "
         f"{ringing:.1f} times the nominal). The stability proof is one of the decoupled model.",
     )
 

@@ -45,7 +45,7 @@ def draw(material: Material) -> Drawing:
         f"and {end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
         "How far robust MPC ends off is the size of its gain, which the paper does not state: with the single gain of "
         f"(32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. The tube keeps a few "
-        "feet of error, because its law has no integral action. Their velocity bends "
+        "feet of error, because its law has no integral action. The tubes' velocity bends "
         f"{case1.switches(material)}, where the nominal state enters the next smaller ellipsoid of the nested family "
         "and the law takes its gain; the law of the paper has one gain and would not bend.",
     )

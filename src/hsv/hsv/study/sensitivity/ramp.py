@@ -49,7 +49,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         figure,
         f"Case 2 with the ramp from {shipped.start:g} s on; nominal vehicle (solid) and the worst of "
         f"{said_corners(over)} of the parameter bounds (dashed). The one of {lengths[-1]:g} s ends as the fault sets "
-        "in, whose error its largest then holds. (c) After the fault, black: half a degree.",
+        "in, so that its largest error includes the fault's. (c) After the fault, black: half a degree.",
         tuple(_finding(controller, lengths, columns) for controller, columns in strips.items()),
         {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
     )
