@@ -30,12 +30,6 @@ def values(finding):
     return {reading.what: reading.value for reading in finding.readings}
 
 
-def test_every_claim_is_measured(findings):
-    for name, finding in findings.items():
-        assert 1 <= finding.leading <= len(finding.readings), name
-        assert not any(math.isnan(reading.value) for reading in finding.readings), name
-
-
 def test_what_loses_a_step_s_share_of_its_level_decreases():
     A = np.array([[[0.5, 0.0], [0.0, 0.5]], [[0.0, 0.9], [0.0, 0.0]]])
     B = np.zeros((2, 2, 1))

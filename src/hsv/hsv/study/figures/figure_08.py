@@ -4,20 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import inputs_from_report
-from hsv.design.model import linearised, polytopic_model
-from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.frequency import bode_difference, frequency_response
+from hsv.study.extended_model import codesigned_model, extended_model
 from hsv.study.figures.bode import bode_lines, label_bode
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
+from hsv.study.mode_peaks import elastic_modes
 from hsv.vehicle.envelope import FOOT
-from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
-from hsv.vehicle.modes import Mode, modes
-from hsv.vehicle.parameters import vehicle_parameters
-from hsv.vehicle.trim import trim
 
 POINT = (85817.0, 8037.0)
 """ft, ft/s: between the samples of the model."""
@@ -30,26 +25,25 @@ def draw(material: Material) -> Drawing:
     design = material.design("adjustable")
     certificate = design.certificate
     inputs = inputs_from_report(certificate["inputs"])
-    notch = tuple(NotchSection(**section.model_dump()) for section in inputs.notch)
-    decoupled = vehicle_parameters("decoupled")
     point = POINT[0] * FOOT, POINT[1] * FOOT
-    whole = polytopic_model(inputs.model, decoupled, notch).whole
-    ecm = linearised(inputs.model, decoupled, notch)(*point)
     figure = new_figure(5.0)
     magnitude, phase = figure.subplots(2, 1, sharex=True)
     period = inputs.model.period
-    coupled = _coupled(notch, point)
     drawn = []
     for system, label, style in (
-        (zero_order_hold(*coupled, period), "ECM with its coupling", {"color": GREY, "linewidth": 0.8}),
-        (zero_order_hold(*ecm, period), "ECM, coupling ignored", {"color": RED}),
-        (whole.at(*point), "Codesigned polytopic LPV", {"color": BLUE, "linestyle": ":", "linewidth": 2.0}),
+        (extended_model(inputs, "paper_like", point), "ECM with its coupling", {"color": GREY, "linewidth": 0.8}),
+        (extended_model(inputs, "decoupled", point), "ECM, coupling ignored", {"color": RED}),
+        (
+            codesigned_model(inputs, point),
+            "Codesigned polytopic LPV",
+            {"color": BLUE, "linestyle": ":", "linewidth": 2.0},
+        ),
     ):
         drawn.append(frequency_response(*system, FREQUENCIES, period)[:, PITCH_RATE, ELEVATOR])
         bode_lines(magnitude, phase, FREQUENCIES, drawn[-1], label, **style)
     decibel, degree = bode_difference(drawn[-1], drawn[0])
     loud, late = np.argmax(decibel), np.argmax(degree)
-    elastic = [f"{mode.natural_frequency:.1f}" for mode in _elastic(coupled[0])]
+    elastic = [f"{mode.natural_frequency:.1f}" for mode in elastic_modes("paper_like").values()]
     label_bode(magnitude, phase, FREQUENCIES)
     letter((magnitude, phase))
     magnitude.legend(loc="upper right")
@@ -69,17 +63,6 @@ def draw(material: Material) -> Drawing:
         "rad/s. No control-oriented model of the paper has these: that the weak coupling is ignored is part of the "
         "design, and the price is that stability with flexibility has to be shown by other means.",
     )
-
-
-def _elastic(A: np.ndarray) -> list[Mode]:
-    """Return the elastic modes of the ECM, slower first: the two fastest of little damping, the filter's has much."""
-    return [mode for mode in modes(A) if abs(mode.damping_ratio) < 0.1][1::-1]
-
-
-def _coupled(notch: tuple[NotchSection, ...], point: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
-    vehicle, filter_ = vehicle_parameters("paper_like"), Filter(*series(continuous(notch)))
-    equilibrium = trim(vehicle, *point)
-    return extended_jacobian(extended_state(equilibrium.state, filter_), equilibrium.input, vehicle, filter_, False)
 
 
 FIGURE = PaperFigure(
