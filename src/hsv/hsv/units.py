@@ -1,7 +1,14 @@
-"""The edge between quantities with units, as people write them, and the SI numbers used everywhere inside."""
+"""The edge between quantities with units, as people write them, and the SI numbers used everywhere inside.
+
+A conversion is one rounding: numbers are read and factors multiplied as fractions, so that constants are the same
+numbers on every machine and under every version of the units library.
+"""
 
 from __future__ import annotations
 
+import math
+import re
+from fractions import Fraction
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -24,30 +31,53 @@ PAPER_UNITS = {
 }
 """The unit in which the paper (or the literature it cites) prints a quantity of an SI unit of ours."""
 
+_EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
+
+_TERM = r"([^\W\d]\w*|[%°])(\s*(\^|\*\*)\s*-?\d(\.\d+)?)?"
+_QUANTITY = re.compile(
+    r"(?P<number>(?>[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,4})?))"
+    rf"\s*(?P<unit>(1?\s*/\s*)?{_TERM}(\s*[*/ ]\s*{_TERM})*)?",
+    re.IGNORECASE,
+)
+"""A decimal number and, if anything follows, a product or quotient of units with one-digit exponents."""
+
+_ROOT_BITS = 80
+"""Binary digits of a square root before it is rounded to the 53 of a number."""
+
 
 @cache
 def registry() -> pint.UnitRegistry:
-    """Return the one unit registry (built on first use: it takes a noticeable fraction of a second)."""
+    """Return the one unit registry, whose factors are fractions (built on first use: it takes a while)."""
     import pint
 
-    return pint.UnitRegistry(autoconvert_offset_to_baseunit=False)
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
 
 
 def rounded(value: float) -> float:
-    """Return ``value`` to 15 digits: what was written, without the last-digit error of a conversion or a sum."""
+    """Return ``value`` to 15 digits: what was written, without the last-digit error of a sum or a product."""
     return float(f"{value:.15g}")
 
 
 @cache
 def factor(unit: str, to: str) -> float:
     """Return the number that turns a value in ``unit`` into one in ``to``; both multiplicative."""
-    return float(registry().Quantity(1.0, unit).to(to).magnitude)
+    return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
 
 
 def to_paper(value: float, unit: str) -> tuple[float, str]:
     """Return ``value``, given in the SI ``unit``, in the paper's unit, and the name of that unit."""
     paper = PAPER_UNITS.get(unit, unit)
     return (value * factor(unit, paper) if paper != unit else value), paper
+
+
+def in_base_units(text: str) -> float:
+    """Return the quantity in ``text``, such as ``"300 slug"``, in SI base units and radians.
+
+    Raises:
+        ValueError, pint.UndefinedUnitError: The text is not a number and a unit.
+    """
+    number, unit = _number_and_unit(text)
+    return _scaled(number, _squared(unit)[0])
 
 
 def parse_quantity(text: object, unit: str, field: str) -> float:
@@ -62,46 +92,72 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Angles are
             no bare numbers, nor frequencies angular frequencies: "15 Hz" is refused where rad/s are due.
     """
-    import math
-
     import pint
 
     expected = f"expected a finite quantity such as {_EXAMPLES.get(unit, f'1.0 {unit}')!r}"
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise QuantityError(f"{field} = {text!r}: {expected}")
-    if not isinstance(text, str) and unit != "1":
-        raise QuantityError(f"{field} = {text!r}: the unit is missing, {expected}")
-    if isinstance(text, str) and not any(map(str.isdigit, text)):
+    if not isinstance(text, str):
+        if unit != "1":
+            raise QuantityError(f"{field} = {text!r}: the unit is missing, {expected}")
+        if not math.isfinite(text):
+            raise QuantityError(f"{field} = {text!r}: {expected}")
+        return float(text)
+    if not any(map(str.isdigit, text)):
         raise QuantityError(f"{field} = {text!r}: no number, {expected}")
     try:
-        quantity: Any = registry().Quantity(str(text).replace("%", " percent"))
-        if quantity.to_root_units().units != _root_units(unit):
-            raise QuantityError(
-                f"{field} = {text!r}: {'the unit is missing' if _bare(text) else 'wrong unit'}, {expected}"
-            )
-        value = rounded(float(quantity.to(unit).magnitude))
+        number, written = _number_and_unit(text)
+        (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
+        if dimension != wanted:
+            problem = "wrong unit" if written else "the unit is missing"
+            raise QuantityError(f"{field} = {text!r}: {problem}, {expected}")
+        return _scaled(number, square / wanted_square)
     except QuantityError:
         raise
+    except OverflowError as error:
+        raise QuantityError(f"{field} = {text!r}: {expected}") from error
     except pint.UndefinedUnitError as error:
         raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
     except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
         raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
-    if not math.isfinite(value):
-        raise QuantityError(f"{field} = {text!r}: {expected}")
-    return value
 
 
-def _bare(text: object) -> bool:
-    try:
-        float(str(text))
-    except ValueError:
-        return False
-    return True
+def _number_and_unit(text: str) -> tuple[Fraction, str]:
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found:
+        raise ValueError(f"{text!r}: expected a number and a unit")
+    unit = (found["unit"] or "").replace("%", "percent")
+    return Fraction(found["number"]), f"1{unit}" if unit.startswith("/") else unit
 
 
 @cache
-def _root_units(unit: str) -> object:
-    return registry().Quantity(1.0, unit).to_root_units().units
+def _squared(unit: str) -> tuple[Fraction, Any]:
+    """Return the square of the factor from ``unit`` to base units, a fraction, and the base units of the square.
+
+    The literature gives elastic modes in roots of a mass: squares have whole exponents.
+    """
+    from pint.util import UnitsContainer
+
+    square = {}
+    for name, exponent in registry().parse_units("" if unit == "1" else unit)._units.items():
+        square[name] = int(2 * exponent)
+        if square[name] != 2 * exponent:
+            raise ValueError(f"{unit!r}: expected exponents that are whole or halves")
+    base = registry().Quantity(Fraction(1), UnitsContainer(square)).to_base_units()
+    return Fraction(base.magnitude), base._units
 
 
-_EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
+def _scaled(number: Fraction, square: Fraction) -> float:
+    """Return ``number`` times the square root of ``square``, rounded once."""
+    if not number:
+        return 0.0
+    product = number * number * square
+    # A whole number of at least _ROOT_BITS bits; where the root goes on behind it, its last bit says so.
+    shift = max(0, _ROOT_BITS - (product.numerator.bit_length() - product.denominator.bit_length()) // 2)
+    whole, rest = divmod(product.numerator << 2 * shift, product.denominator)
+    root = math.isqrt(whole)
+    if rest or root * root != whole:
+        root = root << 1 | 1
+        shift += 1
+    value = float(Fraction(root, 1 << shift))
+    return -value if number < 0 else value

@@ -51,6 +51,8 @@ def info(
 def _print(description: dict[str, Any]) -> None:
     from rich.table import Table
 
+    from hsv.simulation.fingerprint import in_words
+
     heading = {
         "path": description["path"],
         "duration": f"{description['duration_s']:.6g} s",
@@ -58,6 +60,7 @@ def _print(description: dict[str, Any]) -> None:
         "complete": "yes" if description["complete"] else "no: hsv recover mends it",
         "ending": description["ending"] or "not recorded",
         **description["custom_data"],
+        "fingerprint": in_words(description["fingerprint"], description["as_published"]),
         "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
         or "nothing",
         "faults": _intervals(description["faults"], lambda f: f"{f['type']} {f['value']:g} of {f['channel']}, "),

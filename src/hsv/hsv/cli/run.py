@@ -33,7 +33,7 @@ def run(
     from hsv.errors import QuantityError, RecordingError
     from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
-    from hsv.recording.flight import flight_data
+    from hsv.recording.flight import flight_data, flight_fingerprint
     from hsv.recording.reader import Bag
     from hsv.simulation.metrics import flight_metrics
 
@@ -73,6 +73,8 @@ def run(
     report_flight(
         loaded,
         flight_metrics(data),
+        fingerprint=flight_fingerprint(recorded),
+        design_hash=recorded.custom_data["design_hash"],
         diverged_at=float(data.time[-1]) if diverged else None,
         wall_time=clock["end"] - clock["start"],
         simulated_time=float(data.time[-1]),

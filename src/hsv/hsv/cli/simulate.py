@@ -27,7 +27,8 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import report_flight
-    from hsv.simulation.assembly import assemble_flight
+    from hsv.control.design_file import find_design, read_design_parameters
+    from hsv.simulation.assembly import assemble_flight, blamed_on
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import load_scenario
@@ -36,7 +37,9 @@ def simulate(
     if out:
         check_target(out, "out")
     loaded = load_scenario(scenario)
-    components = assemble_flight(loaded)
+    with blamed_on(loaded):
+        design = read_design_parameters(find_design(loaded.design))
+    components = assemble_flight(loaded, design)
     started = time.perf_counter()
     flight = fly(components)
     wall = time.perf_counter() - started
@@ -46,6 +49,8 @@ def simulate(
     report_flight(
         loaded,
         flight_metrics(flight.data()),
+        fingerprint=flight.fingerprint,
+        design_hash=design["design.hash"],
         diverged_at=flight.time[-1] if flight.status is FlightStatus.DIVERGED else None,
         wall_time=wall,
         simulated_time=float(flight.time[-1]),

@@ -6,6 +6,7 @@ from typing import Any
 
 from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
 from hsv.errors import RunError
+from hsv.simulation.fingerprint import as_published, in_words
 from hsv.simulation.limits import Verdict, verdicts
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario
@@ -15,6 +16,8 @@ def report_flight(
     scenario: Scenario,
     metrics: dict[str, float],
     *,
+    fingerprint: str | None,
+    design_hash: str,
     diverged_at: float | None,
     wall_time: float,
     simulated_time: float,
@@ -30,6 +33,7 @@ def report_flight(
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
     judged = verdicts(scenario, metrics, ended=diverged_at is None)
     factor = simulated_time / wall_time if wall_time > 0.0 else 0.0
+    same = as_published(fingerprint, scenario.name, design_hash)
     if json:
         print_json(
             {
@@ -37,6 +41,8 @@ def report_flight(
                 "diverged_at_s": diverged_at,
                 "within_limits": diverged_at is None and all(verdict.within for verdict in judged.values()),
                 "metrics": to_json(quantities, units),
+                "fingerprint": fingerprint,
+                "as_published": same,
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
                 **(extra or {}),
@@ -44,6 +50,7 @@ def report_flight(
         )
     else:
         print_table(scenario.title, quantities, units, limit_verdicts(judged, units))
+        console.print(f"fingerprint {in_words(fingerprint, same)}", soft_wrap=True)
         console.print(f"flown {simulated_time:.6g} s in {wall_time:.3g} s: {factor:.3g} x real time")
         for name, value in (extra or {}).items():
             console.print(f"{name:5} {value}", soft_wrap=True)

@@ -62,7 +62,9 @@ class IntegralTubeLaw:
         nominal_input: np.ndarray,
     ) -> TubeResult:
         """Return the input of this step; arguments as in :meth:`hsv.control.tube_law.TubeLaw.step`."""
-        integral_input = (self._rate * self._law.gain[:, _ALTITUDE_AND_VELOCITY]) @ self._integral
+        # Written out: the order of a matrix product's sums depends on the machine.
+        altitude, velocity = (self._rate * self._law.gain[:, _ALTITUDE_AND_VELOCITY] * self._integral).T
+        integral_input = altitude + velocity
         result = self._law.step(
             state,
             filtered_pitch_rate,

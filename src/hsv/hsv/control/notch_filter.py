@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
+from hsv.elementary import tangent
+from hsv.elimination import solve
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 
@@ -49,10 +51,11 @@ class NotchSection:
     def state_space(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
         """Return A (2, 2), B (2), C (2), D of the continuous filter (paper eq. 39), controller canonical form."""
         w_z, e_z, w_p, e_p = self.zero_frequency, self.zero_damping, self.pole_frequency, self.pole_damping
-        gain = (w_p / w_z) ** 2
-        A = np.array([[-2.0 * e_p * w_p, -(w_p**2)], [1.0, 0.0]])
+        ratio = w_p / w_z
+        gain = ratio * ratio
+        A = np.array([[-2.0 * e_p * w_p, -(w_p * w_p)], [1.0, 0.0]])
         B = np.array([1.0, 0.0])
-        C = gain * np.array([2.0 * e_z * w_z - 2.0 * e_p * w_p, w_z**2 - w_p**2])
+        C = gain * np.array([2.0 * e_z * w_z - 2.0 * e_p * w_p, w_z * w_z - w_p * w_p])
         return A, B, C, gain
 
 
@@ -86,15 +89,16 @@ def discretise(sections: Sequence[NotchSection], period: float) -> NotchData:
                 f"parameter notch.zero_frequency[{i}] = {section.zero_frequency}: "
                 f"expected less than the Nyquist frequency {math.pi / period:.6g} rad/s"
             )
-        A, B, C, D = section.state_space()
-        # Bilinear rule s = (2 / warped) (z - 1) / (z + 1), with the step that maps the centre frequency onto itself.
-        warped = 2.0 * math.tan(angle) / section.zero_frequency
-        inverse = np.linalg.inv(np.eye(2) - 0.5 * warped * A)
-        data.A[i] = inverse @ (np.eye(2) + 0.5 * warped * A)
-        data.B[i] = warped * inverse @ B
-        data.C[i] = C @ inverse
-        data.D[i] = D + 0.5 * warped * C @ inverse @ B
-        data.G[i] = np.linalg.solve(np.eye(2) - data.A[i], data.B[i])
+        A, _, C, D = section.state_space()
+        # Bilinear rule s = (1 / half) (z - 1) / (z + 1), half the step that maps the centre frequency onto itself.
+        half = tangent(angle) / section.zero_frequency
+        identity = np.eye(2)
+        inverse = solve(identity - half * A, identity)  # of I - half A; I + half A is twice the identity less that
+        data.A[i] = 2.0 * inverse - identity
+        data.B[i] = 2.0 * half * inverse[:, 0]  # B of the section is (1, 0)
+        data.C[i] = C[0] * inverse[0] + C[1] * inverse[1]
+        data.D[i] = D + half * data.C[i, 0]
+        data.G[i] = _rest_of(A)
     return data
 
 
@@ -104,8 +108,16 @@ def continuous(sections: Sequence[NotchSection]) -> NotchData:
     data = NotchData(np.zeros((n, 2, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros((n, 2)))
     for i, section in enumerate(sections):
         data.A[i], data.B[i], data.C[i], data.D[i] = section.state_space()
-        data.G[i] = np.linalg.solve(-data.A[i], data.B[i])
+        data.G[i] = _rest_of(data.A[i])
     return data
+
+
+def _rest_of(A: np.ndarray) -> np.ndarray:
+    """Return the equilibrium (2) for an input of one, of the continuous section ``A`` (2, 2) and of the discrete one.
+
+    The bilinear rule leaves it where it is.
+    """
+    return np.array([0.0, -1.0 / A[0, 1]])
 
 
 def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

@@ -21,7 +21,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
-from hsv.errors import ParameterError, TrimError
+from hsv.elementary import arcsine
+from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES
 from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
@@ -80,7 +81,7 @@ def _trimmed(
             continue
         # The trim next to this one is near, but only a fixed start gives the same bits whatever came before.
         unknown = guess.copy()
-        size[k] = balance(rigid, math.asin(sine), rate[k, 1], unknown, state[k], inputs[k])
+        size[k] = balance(rigid, arcsine(sine), rate[k, 1], unknown, state[k], inputs[k])
     for k in range(rows):
         defect[k] = 0.0
         if k + 1 < rows and not (
@@ -129,10 +130,7 @@ class ReferenceTrajectory:
         size = np.full(rows, np.inf)
         rigid = vehicle_parameters("decoupled")
         _, state, inputs, defect = self.data
-        try:
-            _trimmed(rigid, command, rate, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
-        except np.linalg.LinAlgError as error:
-            raise TrimError("reference: no equilibrium, expected commands inside the trimmable envelope") from error
+        _trimmed(rigid, command, rate, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
         good = (size < CONVERGED) & np.all((inputs >= INPUT_MINIMUM) & (inputs <= INPUT_MAXIMUM), axis=1)
         for row in np.flatnonzero(~good)[:1]:
             climb, acceleration = rate[row]

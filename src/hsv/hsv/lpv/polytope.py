@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from hsv.elimination import solve
 from hsv.errors import DesignError
 
 INTERPOLATIONS = ("linear", "cubic")
@@ -46,20 +47,50 @@ def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: st
         slope = np.diff(samples, axis=0) / np.diff(breakpoints)[:, None]
         coefficients = np.stack((np.zeros_like(slope), np.zeros_like(slope), slope, samples[:-1]))
     elif interpolation == "cubic":
-        from scipy.interpolate import CubicSpline  # half a second of imports that a grid does not need
-
-        coefficients = CubicSpline(breakpoints, samples).c
+        coefficients = _spline(breakpoints, samples)
     else:
         raise DesignError(f"interpolation = {interpolation!r}: expected one of {', '.join(INTERPOLATIONS)}")
     return AxisWeights(breakpoints, np.ascontiguousarray(coefficients))
 
 
+def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the coefficients (4, s - 1, r) of the cubic splines through ``y`` (s, r) at ``x`` (s), not-a-knot.
+
+    Two points give a line, three a parabola, four and more piecewise cubics with a continuous third derivative at the
+    second and at the last point but one (de Boor, A Practical Guide to Splines, ch. IV).
+    """
+    n = len(x)
+    step = np.diff(x)
+    secant = np.diff(y, axis=0) / step[:, None]
+    if n == 2:
+        return np.stack((np.zeros_like(secant), np.zeros_like(secant), secant, y[:-1]))
+    # The slopes at the breakpoints: second derivatives are continuous inside.
+    left, right = np.zeros((n, n)), np.empty_like(y)
+    for i in range(1, n - 1):
+        left[i, i - 1 : i + 2] = step[i], 2.0 * (step[i - 1] + step[i]), step[i - 1]
+        right[i] = 3.0 * (step[i] * secant[i - 1] + step[i - 1] * secant[i])
+    if n == 3:
+        left[0, :2] = left[2, 1:] = 1.0
+        right[0], right[2] = 2.0 * secant[0], 2.0 * secant[1]
+    else:
+        for near, far, inner, end in ((0, 1, 1, 0), (n - 2, n - 3, n - 2, n - 1)):
+            both = step[near] + step[far]
+            left[end, inner], left[end, end] = both, step[far]
+            weighted = (step[near] + 2.0 * both) * step[far] * secant[near] + step[near] * step[near] * secant[far]
+            right[end] = weighted / both
+    slope = solve(left, right)
+    bend = (slope[:-1] + slope[1:] - 2.0 * secant) / step[:, None]
+    return np.stack((bend / step[:, None], (secant - slope[:-1]) / step[:, None] - bend, slope[:-1], y[:-1]))
+
+
 def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
     """Return the weights (n, r) at many ``values`` (n), clamped to the breakpoints; for design and plots."""
-    from scipy.interpolate import PPoly
-
-    clamped = np.clip(values, weights.breakpoints[0], weights.breakpoints[-1])
-    return np.asarray(PPoly(weights.coefficients, weights.breakpoints)(clamped))
+    breakpoints, coefficients = weights
+    clamped = np.clip(values, breakpoints[0], breakpoints[-1])
+    piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)
+    local = (clamped - breakpoints[piece])[:, None]
+    c = coefficients[:, piece]
+    return np.asarray(((c[0] * local + c[1]) * local + c[2]) * local + c[3])
 
 
 class PolytopeData(NamedTuple):

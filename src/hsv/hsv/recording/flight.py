@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsv.recording.reader import Bag
-from hsv.recording.steps import joined
+from hsv.recording.steps import cut_off, joined
+from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.metrics import FlightData
 
 _RIGID = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")
@@ -63,4 +64,25 @@ def flight_data(bag: Bag) -> FlightData:
         saturated=tube["saturated"],
         gain_index=nominal["gain_index"],
         fault_start=float(bag.times("/hsv/fault_status")[acting[0]]) * 1e-9 if len(acting) else None,
+    )
+
+
+def flight_fingerprint(bag: Bag) -> str | None:
+    """Return the fingerprint of the flight in ``bag``, ``None`` if it does not hold every step from the first on.
+
+    Raises:
+        RecordingError: A topic is missing, or no step is complete.
+    """
+    topics = ("/hsv/state", "/hsv/filtered_state", "/hsv/nominal", "/hsv/command", "/hsv/actuator")
+    state, filtered, nominal, command, actuator = joined(bag, topics).values()
+    every = np.arange(len(state["step"]))
+    if cut_off(bag) or not all(np.array_equal(bag.columns(topic)["step"], every) for topic in topics):
+        return None
+    return fingerprint(
+        state_columns(state),
+        filtered["filtered_pitch_rate"],
+        state_columns(nominal, "deviation."),
+        input_columns(nominal, "input."),
+        input_columns(command),
+        input_columns(actuator),
     )

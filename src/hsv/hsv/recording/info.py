@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hsv.errors import RecordingError
 from hsv.graph.description import TOPICS
+from hsv.recording.flight import flight_fingerprint
 from hsv.recording.reader import Bag
 from hsv.recording.steps import cut_off
+from hsv.simulation.fingerprint import as_published
 
 FAULT_STATUS = "/hsv/fault_status"
 STATE = "/hsv/state"
@@ -23,11 +26,14 @@ def describe(bag: Bag) -> dict[str, Any]:
     -------
     dict
         ``path``, ``complete``, ``start_s``, ``duration_s``, ``messages``, ``topics``, ``custom_data``,
+        ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is nothing to compare it with),
         ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
         channel), ``saturation`` and ``tube``; the last four are None without the topic that tells. Times are
         simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
+    fingerprint = _fingerprint(bag)
+    flown = bag.custom_data.get("scenario", ""), bag.custom_data.get("design_hash", "")
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     return {
         "path": str(bag.path),
@@ -37,6 +43,8 @@ def describe(bag: Bag) -> dict[str, Any]:
         "messages": sum(topic["messages"] for topic in topics),
         "topics": topics,
         "custom_data": bag.custom_data,
+        "fingerprint": fingerprint,
+        "as_published": as_published(fingerprint, *flown),
         "attachments": [
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
@@ -46,6 +54,13 @@ def describe(bag: Bag) -> dict[str, Any]:
         "saturation": _saturation(bag) if TUBE_STATUS in bag.topics else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.topics else None,
     }
+
+
+def _fingerprint(bag: Bag) -> str | None:
+    try:
+        return flight_fingerprint(bag)
+    except RecordingError:
+        return None
 
 
 def _topic(bag: Bag, name: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import TubeLaw, active_gain, tube_input
 from hsv.faults.actuator import FaultInjector, apply_faults
+from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.metrics import FlightData
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
@@ -88,8 +89,9 @@ def _fly(
     planned_state = filter_state.copy()
     filtered = tube.filtered and 0 < len(notch.D) == len(tube.notch.D)
     last = len(reference.state) - 1
-    x_n = x - reference.state[min(max(-reference.first, 0), last)]
-    S, new = np.empty(n * (n + m)), np.empty(n)
+    S, x_n, new = np.empty(n * (n + m)), np.empty(n), np.empty(n)
+    for i in range(n):
+        x_n[i] = x[i] - reference.state[min(max(-reference.first, 0), last), i]
     u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     # Copies, made when another row holds: views of rows in every step take a twentieth of the loop's time.
     x_r, u_r, defect, row = np.empty(n), np.empty(m), np.empty(n), -1
@@ -111,7 +113,9 @@ def _fly(
         due = active_gain(tube, k)
         if due != active:
             active = due
-            gain[:] = tube.gains[active]
+            for i in range(m):
+                for j in range(n):
+                    gain[i, j] = tube.gains[active, i, j]
         q_f = filter_step(notch, filter_state, x[4])
         history.filtered_pitch_rate[k] = q_f
         for i in range(n):
@@ -170,6 +174,12 @@ class Flight:
 
     def _along(self, rows: np.ndarray) -> np.ndarray:
         return np.asarray(rows[self.trajectory.rows(len(self.history.state))])
+
+    @property
+    def fingerprint(self) -> str:
+        """The digest of all its bits, see :mod:`hsv.simulation.fingerprint`."""
+        h = self.history
+        return fingerprint(h.state, h.filtered_pitch_rate, h.deviation, h.nominal_input, h.command, h.actuator)
 
     def data(self) -> FlightData:
         """Return what the metrics are made of."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from hsv.elementary import exponential, sines_cosines
 from hsv.vehicle.parameters import VehicleParameters
 
 STATE_NAMES = (
@@ -44,7 +45,7 @@ def forces(x: Any, u: Any, p: Any) -> Any:
     """
     altitude, velocity, alpha = x[0], x[1], x[2]
     fuel, elevator = u[0], u[1]
-    density = p.reference_density * np.exp(-(altitude - p.reference_altitude) / p.density_scale_height)
+    density = p.reference_density * exponential(-(altitude - p.reference_altitude) / p.density_scale_height)
     pressure = 0.5 * density * velocity * velocity
     alpha2 = alpha * alpha
     lift = pressure * p.reference_area * (p.lift_alpha * alpha + p.lift_elevator * elevator + p.lift_zero)
@@ -87,24 +88,24 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
         + p.elastic_force_2_elevator * u[1]
         + p.elastic_force_2_zero
     )
-    psi_1, psi_2, inertia = p.inertial_coupling_1, p.inertial_coupling_2, p.moment_of_inertia
+    psi_1, psi_2 = p.inertial_coupling_1, p.inertial_coupling_2
     omega_1, omega_2 = p.natural_frequency_1, p.natural_frequency_2
-    k_1 = 1.0 + psi_1 * psi_1 / inertia
-    k_2 = 1.0 + psi_2 * psi_2 / inertia
-    k_12 = psi_1 * psi_2 / inertia
-    right_1 = -2.0 * p.damping_ratio_1 * omega_1 * x[6] - omega_1 * omega_1 * x[5] + force_1 - psi_1 * moment / inertia
-    right_2 = -2.0 * p.damping_ratio_2 * omega_2 * x[8] - omega_2 * omega_2 * x[7] + force_2 - psi_2 * moment / inertia
+    # Couplings and moment for the moment of inertia.
+    c_1, c_2 = psi_1 / p.moment_of_inertia, psi_2 / p.moment_of_inertia
+    angular = moment / p.moment_of_inertia
+    k_1, k_2, k_12 = 1.0 + psi_1 * c_1, 1.0 + psi_2 * c_2, psi_1 * c_2
+    right_1 = -2.0 * p.damping_ratio_1 * omega_1 * x[6] - omega_1 * omega_1 * x[5] + force_1 - psi_1 * angular
+    right_2 = -2.0 * p.damping_ratio_2 * omega_2 * x[8] - omega_2 * omega_2 * x[7] + force_2 - psi_2 * angular
     determinant = k_1 * k_2 - k_12 * k_12
     acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant
     acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant
 
-    sin_alpha, cos_alpha = np.sin(alpha), np.cos(alpha)
-    sin_path, cos_path = np.sin(pitch - alpha), np.cos(pitch - alpha)
+    sin_alpha, cos_alpha, sin_path, cos_path = sines_cosines(alpha, pitch - alpha)
     out[0] = velocity * sin_path
     out[1] = (thrust * cos_alpha - drag) / p.mass - p.gravity * sin_path
     out[2] = (-thrust * sin_alpha - lift) / (p.mass * velocity) + rate + p.gravity / velocity * cos_path
     out[3] = rate
-    out[4] = (moment + psi_1 * acceleration_1 + psi_2 * acceleration_2) / inertia
+    out[4] = angular + c_1 * acceleration_1 + c_2 * acceleration_2
     out[5] = x[6]
     out[6] = acceleration_1
     out[7] = x[8]

@@ -10,11 +10,11 @@ from numba import njit
 FOOT = 0.3048
 """Metres in a foot, by definition."""
 
-ALTITUDE_RANGE = (85000.0 * FOOT, 86500.0 * FOOT)
-"""m; the paper prints 865000 ft as the upper end."""
+ALTITUDE_RANGE = (25908.0, 26365.2)
+"""m: 85000 ft to 86500 ft; the paper prints 865000 ft as the upper end."""
 
-VELOCITY_RANGE = (7700.0 * FOOT, 8300.0 * FOOT)
-"""m/s"""
+VELOCITY_RANGE = (2346.96, 2529.84)
+"""m/s: 7700 ft/s to 8300 ft/s"""
 
 INPUT_MINIMUM = np.array([0.0, -math.radians(30.0)])
 INPUT_MAXIMUM = np.array([1.5, math.radians(30.0)])

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any, NamedTuple
 
 from hsv.errors import QuantityError
-from hsv.units import parse_quantity, registry
+from hsv.units import in_base_units, parse_quantity
 
 COUPLING_SETS = ("paper_like", "derived")
 """Named sets of inertial coupling that a vehicle may fly with."""
@@ -123,11 +123,7 @@ def vehicle_parameters(coupling: str = "paper_like") -> VehicleParameters:
     """
     if coupling not in (*COUPLING_SETS, "decoupled"):
         raise QuantityError(f"coupling = {coupling!r}: expected one of {', '.join(COUPLING_SETS)}")
-    values = {
-        name: float(registry().Quantity(row["value"]).to_base_units().magnitude)
-        for name, row in _rows(coupling).items()
-    }
-    return VehicleParameters(**values)
+    return VehicleParameters(**{name: in_base_units(row["value"]) for name, row in _rows(coupling).items()})
 
 
 def uncertain_parameters() -> list[str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numba import njit
 
+from hsv.elementary import arcsine
+from hsv.elimination import solve
 from hsv.errors import TrimError
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
@@ -53,7 +54,7 @@ def balance(
         u: Written.
     """
     rates = np.empty(N_STATES)
-    slope, right = np.empty((3, 3)), np.empty(3)
+    slope, right = np.empty((3, 3)), np.empty((3, 1))
     trial = unknown.copy()
     best_size = np.inf
     x[4:] = 0.0
@@ -68,7 +69,8 @@ def balance(
         if size >= best_size and best_size < CONVERGED:
             break  # rounding level: no further step helps
         if size < best_size:
-            unknown[:] = trial
+            for i in range(3):
+                unknown[i] = trial[i]
             best_size = size
         A, B = jacobian(x, u, rigid)
         for i, row in enumerate((1, 2, 4)):
@@ -76,16 +78,16 @@ def balance(
             slope[i, 0] = A[row, 2] + A[row, 3]
             for j in range(N_INPUTS):
                 slope[i, 1 + j] = B[row, j]
-            right[i] = rates[row]
-        if not np.all(np.isfinite(slope)):
-            break
-        trial = trial - np.linalg.solve(slope, right)
+            right[i, 0] = rates[row]
+        change = solve(slope, right)  # not finite where the slope is singular
+        for i in range(3):
+            trial[i] -= change[i, 0]
     x[2], x[3] = unknown[0], unknown[0] + path_angle
     u[0], u[1] = unknown[1], unknown[2]
     # At zero coordinates the elastic accelerations of the decoupled model are the generalised forces.
     derivative(x, u, rigid, rates)
-    x[5] = rates[6] / rigid.natural_frequency_1**2
-    x[7] = rates[8] / rigid.natural_frequency_2**2
+    x[5] = rates[6] / (rigid.natural_frequency_1 * rigid.natural_frequency_1)
+    x[7] = rates[8] / (rigid.natural_frequency_2 * rigid.natural_frequency_2)
     return best_size
 
 
@@ -117,10 +119,7 @@ def trim(
         raise TrimError(f"{where}: expected a climb rate below the velocity and a finite acceleration")
     x, u = np.zeros(N_STATES), np.zeros(N_INPUTS)
     x[0], x[1] = altitude, velocity
-    try:
-        size = balance(vehicle.decoupled(), math.asin(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
-    except np.linalg.LinAlgError:
-        size = math.inf
+    size = balance(vehicle.decoupled(), arcsine(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
     check_equilibrium(where, size, u)
     rates = np.empty(N_STATES)
     derivative(x, u, vehicle, rates)

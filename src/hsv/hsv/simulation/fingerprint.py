@@ -1,0 +1,63 @@
+"""The fingerprint of a flight: a digest of every bit that its loop computed, the same on every machine.
+
+A table of published fingerprints is part of the library: whoever flies a shipped scenario with a shipped design can
+tell whether it is the same flight. It holds no scenario whose nominal law calls a solver in flight: what a solver
+returns depends on the machine within a tolerance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+FORMAT = 1
+"""Version of what is digested, and in which order."""
+
+TABLE = "fingerprints.toml"
+
+
+def fingerprint(
+    state: np.ndarray,
+    filtered_pitch_rate: np.ndarray,
+    deviation: np.ndarray,
+    nominal_input: np.ndarray,
+    command: np.ndarray,
+    actuator: np.ndarray,
+) -> str:
+    """Return ``v1:`` and the SHA-256 of a flight, rows k = 0 ... n: x (9), q_f, x_n (9), u_n (2), command, actuator (2).
+
+    Digested are little-endian float64 numbers, row after row, every NaN as the same one.
+    """
+    rows = np.column_stack((state, filtered_pitch_rate, deviation, nominal_input, command, actuator)).astype("<f8")
+    rows[np.isnan(rows)] = np.nan
+    return f"v{FORMAT}:{hashlib.sha256(rows.tobytes()).hexdigest()}"
+
+
+def published(scenario: str, design_hash: str) -> str | None:
+    """Return the published fingerprint of a shipped ``scenario`` with the design of this digest, ``None`` without one."""
+    entry = _table().get(scenario, {})
+    return entry.get("fingerprint") if entry.get("design_hash") == design_hash else None
+
+
+def as_published(found: str | None, scenario: str, design_hash: str) -> bool | None:
+    """Tell whether a fingerprint is the published one, ``None`` where there is none to compare or none is published."""
+    expected = published(scenario, design_hash)
+    return None if expected is None or found is None else found == expected
+
+
+def in_words(found: str | None, same: bool | None) -> str:
+    """Return a fingerprint and what :func:`as_published` said about it, for people."""
+    if found is None:
+        return "none: steps are missing"
+    verdict = {True: ", as published", False: ", not the published flight of this scenario", None: ""}[same]
+    return f"{found}{verdict}"
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads(files("hsv.simulation").joinpath(TABLE).read_text(encoding="utf-8"))

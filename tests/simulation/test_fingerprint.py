@@ -1,0 +1,64 @@
+import hashlib
+import struct
+
+import numpy as np
+import pytest
+
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.fingerprint import _table, as_published, fingerprint, in_words, published
+from hsv.simulation.scenario import load_scenario, scenario_names
+
+
+def columns(rows=3):
+    rng = np.random.default_rng(5)
+    return [rng.normal(size=(rows, width)) if width > 1 else rng.normal(size=rows) for width in (9, 1, 9, 2, 2, 2)]
+
+
+def test_every_shipped_scenario_that_calls_no_solver_flies_as_published():
+    """The table is repeated, bit for bit, by a build of this machine."""
+    flown = [name for name in scenario_names() if load_scenario(name).nominal.law == "family"]
+    assert sorted(_table()) == flown
+    for name in flown:
+        assert fly(assemble_flight(load_scenario(name))).fingerprint == _table()[name]["fingerprint"], name
+
+
+def test_digest_is_that_of_little_endian_rows():
+    x, q_f, x_n, u_n, command, actuator = columns()
+    rows = b"".join(
+        struct.pack("<25d", *x[k], q_f[k], *x_n[k], *u_n[k], *command[k], *actuator[k]) for k in range(len(x))
+    )
+    assert fingerprint(x, q_f, x_n, u_n, command, actuator) == f"v1:{hashlib.sha256(rows).hexdigest()}"
+
+
+@pytest.mark.parametrize("column", range(6))
+def test_every_bit_counts(column):
+    before, changed = columns(), columns()
+    flat = changed[column].ravel()
+    flat[-1] = np.nextafter(flat[-1], np.inf)
+    changed[column] = flat.reshape(changed[column].shape)
+    assert fingerprint(*before) != fingerprint(*changed)
+
+
+def test_every_nan_is_the_same():
+    patterns = np.array([0x7FF8000000000000, 0xFFF8000000000000, 0x7FF8000000000001], np.uint64).view(float)
+    found = set()
+    for pattern in patterns:
+        changed = columns()
+        changed[0][1, 2] = pattern
+        found.add(fingerprint(*changed))
+    assert len(found) == 1
+
+
+def test_published_fingerprints_hold_for_their_design_only():
+    name, entry = next(iter(_table().items()))
+    same, design = entry["fingerprint"], entry["design_hash"]
+    assert published(name, design) == same
+    assert as_published(same, name, design) is True
+    assert as_published("v1:0", name, design) is False
+    assert as_published(same, name, "another design") is None
+    assert as_published(same, "nothing published", design) is None
+    assert as_published(None, name, design) is None
+    assert in_words(same, True) == f"{same}, as published"
+    assert "not the published flight" in in_words("v1:0", False)
+    assert "steps are missing" in in_words(None, None)
