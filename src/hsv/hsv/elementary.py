@@ -12,7 +12,6 @@ the argument, which is what the complex step needs.
 
 from __future__ import annotations
 
-from fractions import Fraction
 from math import factorial
 from typing import Any
 
@@ -56,9 +55,7 @@ _C4, _C6, _C8, _C10, _C12, _C14, _C16, _C18 = ((-1) ** k / factorial(2 * k) for 
 _E2, _E3, _E4, _E5, _E6, _E7, _E8, _E9, _E10, _E11, _E12, _E13 = (1 / factorial(k) for k in range(2, 14))
 _LOGARITHM = tuple(1 / (2 * k + 1) for k in range(1, 13))
 _ARCTANGENT = tuple((-1) ** k / (2 * k + 1) for k in range(1, 23))
-_ARCSINE = tuple(
-    float(Fraction(factorial(2 * k), 4**k * factorial(k) * factorial(k) * (2 * k + 1))) for k in range(1, 26)
-)
+_ARCSINE = tuple(factorial(2 * k) / (4**k * factorial(k) * factorial(k) * (2 * k + 1)) for k in range(1, 26))
 
 
 @njit(cache=True)
@@ -296,7 +293,7 @@ def logarithm(x: float) -> float:
     """Return the natural logarithm of ``x``, a normal positive number."""
     if not np.finfo(np.float64).tiny <= x <= np.finfo(np.float64).max:
         return np.nan
-    exponent = (np.float64(x).view(np.int64) >> 52) - 1023
+    exponent = int(np.float64(x).view(np.int64) >> 52) - 1023
     # In two factors: 2^1023 has no inverse among the normal numbers.
     half = exponent >> 1
     mantissa = x * _power_of_two(-half) * _power_of_two(half - exponent)

@@ -140,7 +140,7 @@ def _squared(unit: str) -> tuple[Fraction, Any]:
 
     square = {}
     for name, exponent in registry().parse_units("" if unit == "1" else unit)._units.items():
-        square[name] = int(2 * exponent)
+        square[name] = round(2 * float(exponent))  # type: ignore[arg-type]
         if square[name] != 2 * exponent:
             raise ValueError(f"{unit!r}: expected exponents that are whole or halves")
     base = registry().Quantity(Fraction(1), UnitsContainer(square)).to_base_units()

@@ -29,7 +29,7 @@ def fingerprint(
     command: np.ndarray,
     actuator: np.ndarray,
 ) -> str:
-    """Return ``v1:`` and the SHA-256 of a flight, rows k = 0 ... n: x (9), q_f, x_n (9), u_n (2), command, actuator (2).
+    """Return ``v1:`` and the SHA-256 of the rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command and actuator (2 each).
 
     Digested are little-endian float64 numbers, row after row, every NaN as the same one.
     """
@@ -39,7 +39,7 @@ def fingerprint(
 
 
 def published(scenario: str, design_hash: str) -> str | None:
-    """Return the published fingerprint of a shipped ``scenario`` with the design of this digest, ``None`` without one."""
+    """Return the published fingerprint of ``scenario`` with the design of this digest, ``None`` without one."""
     entry = _table().get(scenario, {})
     return entry.get("fingerprint") if entry.get("design_hash") == design_hash else None
 
