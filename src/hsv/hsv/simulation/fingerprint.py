@@ -29,7 +29,7 @@ def fingerprint(
     command: np.ndarray,
     actuator: np.ndarray,
 ) -> str:
-    """Return ``v1:`` and the SHA-256 of the rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command and actuator (2 each).
+    """Return ``v1:`` and the SHA-256 of rows k = 0 ... n: x (9), q_f, x_n (9), u_n, command, actuator (2 each).
 
     Digested are little-endian float64 numbers, row after row, every NaN as the same one.
     """
