@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from hsv.control.design_file import find_design, read_design_parameters
+from hsv.control.design_file import find_design, read_parameters
 from hsv.errors import RecordingError
 from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble_flight, blamed_on
@@ -55,7 +55,7 @@ def prepare(
     scenario = parse_scenario(text, Path(scenario_name).stem)
     with blamed_on(scenario):
         design_file = find_design(scenario.design)
-        design = read_design_parameters(design_file)
+        design = read_parameters(design_file)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
