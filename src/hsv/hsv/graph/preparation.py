@@ -31,6 +31,8 @@ class PreparedRun:
     nodes: tuple[NodeDescription, ...]
     steps: int
     """Number of the last step if the flight does not diverge."""
+    step_timeout: float
+    """Wall time (s) to wait for a node that does nothing."""
     folder: tempfile.TemporaryDirectory[str]
     """Holds the parameter files; gone with this object."""
 
@@ -97,9 +99,8 @@ def prepare(
     }
     (folder / "run.yaml").write_text(parameter_yaml(run), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(
-        scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps, temporary
-    )
+    nodes = graph(scenario.controller)
+    return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:
