@@ -28,7 +28,7 @@ def _shortened(processes: Processes, scenario: str, duration: float, fault: floa
 
 def _flown(processes: Processes, scenario: Path, name: str, *words: str) -> Bag:
     command = ("hsv", "run", scenario, "--no-report", "--bag", processes.folder / name, *words)
-    done = processes.run(*command, timeout=120.0)
+    done = processes.run(*command)
     assert done.returncode == 0, done.stdout
     return Bag(processes.folder / name)
 
