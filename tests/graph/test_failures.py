@@ -14,6 +14,7 @@ from node_processes import Processes, children, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
 from hsv.graph.description import PLANT, RECORDER, graph
+from hsv.graph.progress import HUNG_AFTER
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
@@ -25,8 +26,8 @@ ON_DISK = 50
 
 def _start_and_fly(processes: Processes, bag: Path, *words: str) -> subprocess.Popen[str]:
     """Start a long flight and return it once some of it is on disk."""
-    scenario = short_scenario(processes.folder, duration=3600, fault=100)
-    run = processes.start("hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", "1", *words)
+    scenario = short_scenario(processes.folder, duration=10_000, fault=100)
+    run = processes.start("hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", "4", *words)
 
     def flies() -> bool:
         assert run.poll() is None, run.communicate()[0]
@@ -114,7 +115,7 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
 def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) -> None:
     bag = processes.folder / "hung"
     # Longer than it takes to call a process hung: that is said before.
-    run = _start_and_fly(processes, bag, "--step-timeout", "8")
+    run = _start_and_fly(processes, bag, "--step-timeout", "6")
     pid = children(run.pid)[name]
     os.kill(pid, signal.SIGSTOP)
     try:
@@ -124,7 +125,7 @@ def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) 
             os.kill(pid, signal.SIGCONT)
     assert run.returncode == 1
     assert f"{name}: [WARN] hangs: no progress for 5 s" in output
-    assert ("plant hangs: no progress for 8." if name == "plant" else f"no answer from {name}") in output
+    assert ("plant hangs: no progress for 6." if name == "plant" else f"no answer from {name}") in output
     assert Bag(bag).complete
 
 
@@ -141,11 +142,11 @@ def test_a_node_that_hangs_at_its_start_is_named_and_ends_the_run(processes: Pro
 def test_a_run_that_stands_still_as_a_whole_goes_on(processes: Processes) -> None:
     """As on a machine so busy that nothing of it gets to run, or one that sleeps."""
     bag = processes.folder / "slept"
-    run = _start_and_fly(processes, bag, "--step-timeout", "5")
+    run = _start_and_fly(processes, bag, "--step-timeout", "3")
     pids = [run.pid, *children(run.pid).values()]
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)
-    time.sleep(7.0)
+    time.sleep(HUNG_AFTER + 0.5)
     before = recorded_steps(bag)
     for pid in pids:
         os.kill(pid, signal.SIGCONT)
