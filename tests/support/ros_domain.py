@@ -36,7 +36,7 @@ def own_domain() -> Iterator[int]:
         with ExitStack() as held:
             try:
                 held.enter_context(_bound(socket.AF_INET, socket.SOCK_STREAM, ("127.0.0.1", first_port(domain))))
-                _look_for_others(domain)
+                look_for_others(domain)
             except OSError:
                 continue
             yield domain
@@ -51,7 +51,7 @@ def own_environment() -> Iterator[dict[str, str]]:
         yield os.environ | {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
 
 
-def _look_for_others(domain: int) -> None:
+def look_for_others(domain: int) -> None:
     """Raise an OSError if a participant or ``hsv run`` is on the domain."""
     with ExitStack() as tried:
         tried.enter_context(_bound(socket.AF_UNIX, socket.SOCK_DGRAM, f"\0hsv_domain_{domain}"))

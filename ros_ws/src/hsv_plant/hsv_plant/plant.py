@@ -15,7 +15,7 @@ from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_sta
 from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
-from hsv_node.lockstep import LockstepNode
+from hsv_node.lockstep import LINK_LOOK, LockstepNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
@@ -121,7 +121,7 @@ class PlantNode(LockstepNode):
     def patience(self) -> float:
         """Wake in time for the next state when paced."""
         if not self._started:
-            return 0.02
+            return LINK_LOOK
         return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
 
     def stopped(self, signal_number: int) -> int:
