@@ -5,8 +5,14 @@ import signal
 import time
 from pathlib import Path
 
+from hypothesis import HealthCheck, settings
+
 # Started in the background, a shell's child ignores SIGINT, and so would every process that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Neither an example nor the search for one has a time limit: other work on the machine must not fail a test.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
 
 MOST_WORKERS = 8
 """Each may have a graph of six processes, of a tenth of a gigabyte each."""

@@ -12,7 +12,9 @@ from hsv.graph.progress import Standstill, processor_time
 QUIET = 60.0
 """Seconds without progress after which a test gives up."""
 
-_LOOK = 0.05
+_PAUSE = 0.1
+_LOOK = 1.0
+"""Seconds between two looks at the progress: all processes of the machine are looked through."""
 
 
 def wait_until(
@@ -33,11 +35,13 @@ def wait_until(
         AssertionError: No progress for :data:`QUIET` seconds.
     """
     watched = tuple(pids)
-    standstill = Standstill()
+    standstill, looks = Standstill(), 0.0
     while not done():
-        seconds = standstill.look((progress(), int(used(watched))))
-        assert seconds < QUIET, f"no progress for {seconds:.0f} s"
-        pause(_LOOK)
+        if time.monotonic() >= looks:
+            looks = time.monotonic() + _LOOK
+            seconds = standstill.look((progress(), int(used(watched))))
+            assert seconds < QUIET, f"no progress for {seconds:.0f} s"
+        pause(_PAUSE)
 
 
 def output_of(popen: subprocess.Popen[str]) -> str:
