@@ -26,7 +26,7 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
-	python3 -m pytest -n 2 -m "not graph" && exec python3 -m pytest -n 2 --dist loadfile -m graph
+	python3 -m pytest -n auto -m "not graph" && exec python3 -m pytest -n auto --dist loadfile -m graph
 
 # Browser and node come from Debian, node's readers of bags from npm; where apt-get is not wanted, install them before.
 test-viewers: setup ## set up, install a browser, node and npm packages, then run the tests that need them

@@ -1,6 +1,34 @@
 """For all tests."""
 
+import os
 import signal
+import time
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
 
 # Started in the background, a shell's child ignores SIGINT, and so would every process that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Neither an example nor the search for one has a time limit: other work on the machine must not fail a test.
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")
+
+MOST_WORKERS = 8
+"""Each may have a graph of six processes, of a tenth of a gigabyte each."""
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """Return how many processes test (``-n auto``): one for every core that nothing else uses, and one at least."""
+    cores = len(os.sched_getaffinity(0))
+    return max(1, min(cores - _running(), MOST_WORKERS))
+
+
+def _running() -> int:
+    """Return how many other threads want a core, over a second: averages of minutes still know the set-up."""
+    looks = 20
+    others = 0
+    for _ in range(looks):
+        time.sleep(1.0 / looks)
+        others += int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0]) - 1
+    return round(others / looks)

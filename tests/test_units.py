@@ -81,7 +81,7 @@ def test_bounds_of_the_envelope_are_exact():
     assert bounds == VELOCITY_RANGE
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(0, 10**9))
 def test_a_decimal_in_feet_becomes_the_decimal_in_metres(thousandths):
     # 0.3048 is exact: the value in metres has a short decimal, and that is what must come out.
@@ -90,7 +90,7 @@ def test_a_decimal_in_feet_becomes_the_decimal_in_metres(thousandths):
     assert parse_quantity(f"{thousandths / 1000} ft", "m", "h") == expected
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-1e12, 1e12))
 def test_rounding_keeps_fifteen_digits(value):
     assert rounded(value) == pytest.approx(value, rel=1e-14)

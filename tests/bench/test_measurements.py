@@ -1,7 +1,9 @@
 """Each measurement once, small: that it measures, not what."""
 
+import math
+
 import pytest
-from domain_coordinator import domain_id
+from ros_domain import own_domain
 
 from hsv.bench.graph import graph_lap
 from hsv.bench.in_process import against_scipy
@@ -21,8 +23,8 @@ def test_writing_is_measured():
 
 
 @pytest.fixture
-def own_domain(monkeypatch):
-    with domain_id() as number:
+def domain(monkeypatch):
+    with own_domain() as number:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         yield
@@ -30,10 +32,10 @@ def own_domain(monkeypatch):
 
 @pytest.mark.graph
 @pytest.mark.parametrize(("loop", "composed"), [("events", False), ("wait_set", False), ("ordered", True)])
-def test_a_lap_of_the_ring(own_domain, loop, composed):
-    assert 0.0 < ring_lap(100, loop, composed=composed) < 1.0
+def test_a_lap_of_the_ring(domain, loop, composed):
+    assert 0.0 < ring_lap(100, loop, composed=composed) < math.inf
 
 
 @pytest.mark.graph
-def test_a_lap_of_the_graph(own_domain):
-    assert 0.0 < graph_lap(2.0) < 1.0
+def test_a_lap_of_the_graph(domain):
+    assert 0.0 < graph_lap(2.0) < math.inf

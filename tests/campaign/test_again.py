@@ -1,5 +1,5 @@
 import pytest
-from domain_coordinator import domain_id
+from ros_domain import own_domain
 
 from hsv.campaign import again
 from hsv.errors import CampaignError
@@ -25,7 +25,7 @@ def test_a_flight_that_is_not_there_is_refused(results):
 
 @pytest.mark.graph
 def test_a_flight_over_dds_is_the_same_in_every_bit(results, tmp_path, monkeypatch):
-    with domain_id() as number:
+    with own_domain() as number:
         monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
         repeated = again.over_dds(results, 17, tmp_path / "bag")

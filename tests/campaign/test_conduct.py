@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from full_disk import files_no_larger_than
 from pyarrow import parquet
+from waiting import wait_until
 
 from hsv.campaign.conduct import capacity, conduct
 from hsv.campaign.fleet import OwnProcess
@@ -77,10 +78,12 @@ def test_a_killed_process_loses_no_finished_batch(planned, tmp_path, out):
     process.stdin.write("go\n")
     process.stdin.flush()
     store = Store(out, campaign)
-    deadline = time.monotonic() + 120.0
-    while len(list(store.folder.glob("*.parquet"))) < 3:
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.005)
+
+    def finished_batches():
+        assert process.poll() is None
+        return len(list(store.folder.glob("*.parquet")))
+
+    wait_until(lambda: finished_batches() >= 3, [process.pid], finished_batches, pause=lambda _: time.sleep(0.005))
     process.send_signal(signal.SIGKILL)
     process.wait()
     with store.opened() as finished:

@@ -1,8 +1,8 @@
 import os
-import time
 
 import pytest
 from recorded_flight import record_flight
+from waiting import wait_until
 
 
 @pytest.fixture(scope="module")
@@ -45,8 +45,5 @@ def test_view_opens_the_viewer_that_is_installed(hsv, bag, monkeypatch, tmp_path
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}/bin")
     assert hsv("view", str(bag.path.parent)).code == 0
     asked = tmp_path / "plotjuggler.asked"
-    for _ in range(100):
-        if asked.exists() and asked.read_text():
-            break
-        time.sleep(0.05)
+    wait_until(lambda: asked.exists() and asked.read_text())
     assert f"--datafile {bag.path}" in asked.read_text() and "plotjuggler.xml" in asked.read_text()

@@ -67,7 +67,7 @@ def test_a_fault_acts_from_the_first_step_at_or_after_its_time(time, step):
     assert first_step(time, 0.02) == step
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.integers(0, 10**7), st.sampled_from([0.01, 0.02, 0.05, 0.001]))
 def test_the_time_of_a_step_is_that_step(k, period):
     assert first_step(k * period, period) == k

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from domain_coordinator import domain_id
 from node_processes import Processes
+from ros_domain import own_environment
 
 
 @pytest.fixture
 def ros_environment() -> Iterator[dict[str, str]]:
     """Return the environment of processes on a domain that nobody else uses."""
-    with domain_id() as number:
-        yield os.environ | {"ROS_DOMAIN_ID": str(number), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with own_environment() as environment:
+        yield environment
 
 
 @pytest.fixture

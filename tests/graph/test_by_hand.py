@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import sys
-
 import pytest
-from injected_fault import INJECT, assert_fault_acted
+from injected_fault import LONG, inject_and_land
 from node_processes import Processes
 
 from hsv.graph.description import graph
-from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
 
 
 def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> None:
     bag = processes.folder / "by_hand"
-    flight = ["-p", "duration:=6.0", "-p", "real_time_factor:=2.0"]
-    extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": flight}
+    extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": LONG}
     nodes = {
         node.name: processes.start(
             "ros2",
@@ -28,12 +24,8 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
         )
         for node in graph()
     }
-    script = processes.run(sys.executable, "-c", INJECT)
-    assert script.returncode == 0, script.stdout
-    assert nodes["plant"].wait(60.0) == 0
-    processes.stop()
-    assert [popen.returncode for popen in nodes.values()] == [0] * len(nodes)
-    assert_fault_acted(Bag(bag), script.stdout)
+    inject_and_land(processes, nodes["plant"], bag)
+    assert [popen.returncode for name, popen in nodes.items() if name != "plant"] == [0] * (len(nodes) - 1)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +67,7 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
 def test_bad_parameters_are_refused_in_one_line(
     processes: Processes, package: str, executable: str, arguments: list[str], words: list[str]
 ) -> None:
-    done = processes.run("ros2", "run", package, executable, "--ros-args", *arguments, timeout=30.0)
+    done = processes.run("ros2", "run", package, executable, "--ros-args", *arguments)
     assert done.returncode == 2, done.stdout
     lines = [line for line in done.stdout.splitlines() if line.startswith(f"{executable}: error: ")]
     assert len(lines) == 1, done.stdout

@@ -28,7 +28,7 @@ def _shortened(processes: Processes, scenario: str, duration: float, fault: floa
 
 def _flown(processes: Processes, scenario: Path, name: str, *words: str) -> Bag:
     command = ("hsv", "run", scenario, "--no-report", "--bag", processes.folder / name, *words)
-    done = processes.run(*command, timeout=120.0)
+    done = processes.run(*command)
     assert done.returncode == 0, done.stdout
     return Bag(processes.folder / name)
 
@@ -61,7 +61,7 @@ def test_robust_mpc_flies_as_in_process(processes: Processes) -> None:
 
 def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processes) -> None:
     scenario = _shortened(processes, "case1_qp", 4, 2, value=0.6)
-    bag = _flown(processes, scenario, "left")
+    bag = _flown(processes, scenario, "left", "--composed")
     _check_equal(bag, _history(scenario))
     assert not bag.columns("/hsv/nominal")["status"].any()
 
@@ -95,7 +95,8 @@ def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> 
 
 
 def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> None:
-    bag = _flown(processes, short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived"), "uncertified")
+    scenario = short_scenario(processes.folder, duration=1, fault=0.5, coupling="derived")
+    bag = _flown(processes, scenario, "uncertified", "--composed")
     status = bag.columns("/hsv/tube_status")
     assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
     assert "vehicle outside the set" in processes.run("hsv", "info", processes.folder / "uncertified").stdout

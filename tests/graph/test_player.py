@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 from changed_bags import Messages, changed_bag
-from domain_coordinator import domain_id
 from flown_bags import flown_bag
 from node_processes import Processes
+from ros_domain import own_domain
+from waiting import wait_until
 
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Topic
@@ -37,7 +38,7 @@ def test_a_step_at_the_end_is_refused(bag: Path) -> None:
 
     from hsv_bringup.player import PlayerNode
 
-    with domain_id() as number:
+    with own_domain() as number:
         rclpy.init(domain_id=number)
         try:
             player = PlayerNode(Bag(bag), ["/hsv/state"], 1.0, paused=True, delay=0.0)
@@ -46,10 +47,9 @@ def test_a_step_at_the_end_is_refused(bag: Path) -> None:
             for node in (player, asking):
                 executor.add_node(node)
             client = asking.create_client(Trigger, "/player/step")
-            assert client.wait_for_service(10.0)
+            wait_until(client.service_is_ready, pause=executor.spin_once)
             calls = [client.call_async(Trigger.Request()) for _ in range(STEPS + 1)]
-            for call in calls:
-                executor.spin_until_future_complete(call, 10.0)
+            wait_until(lambda: all(call.done() for call in calls), pause=executor.spin_once)
             assert [call.result().success for call in calls] == [True] * STEPS + [False]
             assert calls[-1].result().message == "at the end, nothing is left to publish"
         finally:
@@ -58,7 +58,7 @@ def test_a_step_at_the_end_is_refused(bag: Path) -> None:
 
 @pytest.mark.parametrize("delay", ["inf", "nan", "-1"])
 def test_a_delay_that_never_ends_is_refused(processes: Processes, bag: Path, delay: str) -> None:
-    done = processes.run("hsv", "play", bag, "--delay", delay, "--topic", "/hsv/state", timeout=20.0)
+    done = processes.run("hsv", "play", bag, "--delay", delay, "--topic", "/hsv/state")
     assert done.returncode == 2
     (line,) = [line for line in done.stdout.splitlines() if "warning" not in line]
     assert line.startswith(f"player: error: delay = {float(delay)}: expected a finite number")

@@ -155,8 +155,8 @@ def test_two_hundred_seconds_fly_in_a_fraction_of_a_second():
     fly(parts)
     times = []
     for _ in range(5):
-        started = time.perf_counter()
+        started = time.process_time()
         fly(parts)
-        times.append(time.perf_counter() - started)
-    # 40 ms is the aim; other work on the machine must not fail this test.
+        times.append(time.process_time() - started)
+    # 40 ms is the aim. Processor time: other work on the machine must not fail this test.
     assert min(times) < 0.2

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import signal
+import subprocess
+import sys
 import textwrap
+from pathlib import Path
 
 import pytest
+from node_processes import Processes, recorded_steps
+from waiting import exit_code_of, wait_until
 
 from hsv.recording.reader import Bag
+from hsv.replay.attached import complete_steps
 
 INJECT = textwrap.dedent(
     """
@@ -19,9 +26,10 @@ INJECT = textwrap.dedent(
 
     def call(kind, name, request):
         client = node.create_client(kind, name)
-        assert client.wait_for_service(20.0)
+        while not client.wait_for_service(1.0):
+            pass
         future = client.call_async(request)
-        rclpy.spin_until_future_complete(node, future, timeout_sec=20.0)
+        rclpy.spin_until_future_complete(node, future)
         return future.result()
 
     def inject(channel, kind, value):
@@ -40,6 +48,10 @@ INJECT = textwrap.dedent(
     assert not refused.accepted and "1.5" in refused.message, refused
     injected = inject("fuel_equivalence_ratio", "loss_of_effectiveness", 0.95)
     assert injected.accepted, injected
+    # So that it acts in a step at least.
+    flown = steps[-1]
+    while steps[-1] < flown + 5:
+        rclpy.spin_once(node, timeout_sec=0.1)
     cleared = call(ClearFault, "/hsv/clear_fault", ClearFault.Request(channel="fuel_equivalence_ratio"))
     assert cleared.accepted, cleared
     print("acts", injected.step, "until", cleared.step)
@@ -47,14 +59,27 @@ INJECT = textwrap.dedent(
 )
 """Script of a process of its own; waits for a flight to call into."""
 
+LONG = ["-p", "duration:=600.0", "-p", "real_time_factor:=2.0"]
+"""Parameters of a flight that does not end before the script, however slow the machine: it is interrupted."""
 
-def assert_fault_acted(bag: Bag, output: str) -> None:
-    """Check a flight of 301 steps against what :data:`INJECT` printed."""
-    _, first, _, end = output.split()[-4:]
-    assert bag.topics["/hsv/state"].count == 301
+
+def inject_and_land(processes: Processes, flying: subprocess.Popen[str], bag: Path) -> None:
+    """Inject and clear a fault in the flight of ``flying``, interrupt it later, check what was recorded."""
+    script = processes.run(sys.executable, "-c", INJECT)
+    assert script.returncode == 0, script.stdout
+    _, first, _, end = script.stdout.split()[-4:]
+    wait_until(lambda: recorded_steps(bag) > int(end), [flying.pid], lambda: recorded_steps(bag))
+    flying.send_signal(signal.SIGINT)
+    assert exit_code_of(flying) == 128 + signal.SIGINT
+    processes.stop()
+    _assert_fault_acted(Bag(bag), int(first), int(end))
+
+
+def _assert_fault_acted(bag: Bag, first: int, end: int) -> None:
+    steps = complete_steps(bag)
+    assert bag.complete and first < end < steps
     active = [message.step for _, message in bag.decode("/hsv/fault_status") if message.active]
-    assert active == list(range(int(first), int(end)))
-    ratio = (
-        bag.columns("/hsv/actuator")["fuel_equivalence_ratio"] / bag.columns("/hsv/command")["fuel_equivalence_ratio"]
-    )
+    assert active == list(range(first, end))
+    actuator, command = (bag.columns(topic)["fuel_equivalence_ratio"] for topic in ("/hsv/actuator", "/hsv/command"))
+    ratio = actuator[:steps] / command[:steps]
     assert ratio[active] == pytest.approx(0.95)

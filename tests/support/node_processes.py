@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import time
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
+
+from waiting import output_of, parents, wait_until
+
+from hsv.errors import RecordingError
+from hsv.recording.reader import Bag
 
 SHORT = """
 title = "a short Case 1"
@@ -64,37 +69,38 @@ class Processes:
         self._started.append(popen)
         return popen
 
-    def run(self, *command: str | Path, timeout: float = 60.0) -> subprocess.CompletedProcess[str]:
+    def run(self, *command: str | Path) -> subprocess.CompletedProcess[str]:
         """Run a command to its end and return exit code and output."""
         popen = self.start(*command)
-        output, _ = popen.communicate(timeout=timeout)
+        output = output_of(popen)
         return subprocess.CompletedProcess(popen.args, popen.returncode, output)
 
     def stop(self) -> None:
         """End what still runs."""
-        for number, patience in ((signal.SIGINT, 5.0), (signal.SIGKILL, 5.0)):
-            for popen in self._started:
-                if popen.poll() is None:
-                    popen.send_signal(number)
-            deadline = time.monotonic() + patience
-            for popen in self._started:
-                try:
-                    popen.wait(max(0.0, deadline - time.monotonic()))
-                except subprocess.TimeoutExpired:
-                    continue
+        for number in (signal.SIGINT, signal.SIGKILL):
+            running = [popen for popen in self._started if popen.poll() is None]
+            for popen in running:
+                popen.send_signal(number)
+            with suppress(AssertionError):
+                wait_until(lambda: all(popen.poll() is not None for popen in self._started), [p.pid for p in running])
+
+
+def recorded_steps(bag: Path) -> int:
+    """Return how many steps are on the disk."""
+    try:
+        return Bag(bag).topics["/hsv/state"].count
+    except RecordingError:
+        return 0  # not begun yet
 
 
 def children(pid: int) -> dict[str, int]:
     """Return the node processes below ``hsv run`` with process id ``pid``, by executable name."""
     found = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-                words = (entry / "cmdline").read_bytes().split(b"\0")
-            except (OSError, IndexError):
-                continue
-            if parent == pid and b"--ros-args" in words:
-                executable = words[words.index(b"--ros-args") - 1].decode()
-                found[Path(executable).name] = int(entry.name)
+    for child in [child for child, parent in parents().items() if parent == pid]:
+        try:
+            words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if b"--ros-args" in words:
+            found[Path(words[words.index(b"--ros-args") - 1].decode()).name] = child
     return found

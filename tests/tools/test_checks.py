@@ -22,7 +22,6 @@ def check(path, **variables):
         env={"PATH": str(path), "PYTHON": sys.executable, **variables},
         capture_output=True,
         text=True,
-        timeout=30,
     )
 
 

@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(
 def shell(name, script, cwd="/", **variables):
     path = "/usr/local/bin:/usr/bin:/bin"
     return subprocess.run(
-        [name, "-c", script], cwd=cwd, env={"PATH": path, **variables}, capture_output=True, text=True, timeout=30
+        [name, "-c", script], cwd=cwd, env={"PATH": path, **variables}, capture_output=True, text=True
     )
 
 

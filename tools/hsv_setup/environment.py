@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
+from hsv_setup.bytecode import compile_packages
 from hsv_setup.console import Stage
 from hsv_setup.interpreter import Interpreter
 from hsv_setup.paths import BUILD, INSTALL, ROOT, STAMPS, VENV, fingerprint, read_stamp, write_stamp
@@ -28,7 +29,7 @@ def identity(route: Route, python: Interpreter) -> str:
 def contents(route: Route) -> str:
     """Return a fingerprint of all that decides what is installed."""
     files = [ROOT / name for name in (*route.requirements, route.constraints)]
-    files += [_HERE / "environment.py", _HERE / "relocate.py"]
+    files += [_HERE / "environment.py", _HERE / "bytecode.py", _HERE / "relocate.py"]
     return fingerprint(*(path.read_bytes() for path in files))
 
 
@@ -54,7 +55,7 @@ def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: St
     _CONTENTS.unlink(missing_ok=True)
 
     pip: list[str | Path] = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
-    # Byte code is written at first import; doing it here, for all the modules nobody imports, takes half a minute.
+    # Compiled below, on all cores.
     pip += ["--no-compile", "--progress-bar", "off"]
     pinned = ["--constraint", route.constraints]
     if route.wheels:
@@ -62,6 +63,7 @@ def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: St
         stage.run([*pip, *pinned, "setuptools"], env)
     named = [option for name in route.requirements for option in ("--requirement", name)]
     stage.run([*pip, *pinned, "--use-pep517", "--no-build-isolation", *named], env, _pip_progress)
+    compile_packages(PYTHON, env, stage)
     if route.wheels:
         relocate(VENV, python.include, _numpy_include(env))
         _install_ros2_command()

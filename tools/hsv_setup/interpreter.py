@@ -60,7 +60,7 @@ def probe(command: str, env: Mapping[str, str]) -> Interpreter | None:
     """Return what `command` is, or None when it does not start as a Python interpreter."""
     try:
         result = subprocess.run(
-            [command, "-c", _PROBE], env=dict(env), capture_output=True, text=True, timeout=30, check=False
+            [command, "-c", _PROBE], env=dict(env), capture_output=True, text=True, timeout=300, check=False
         )
         found = json.loads(result.stdout)
     except (OSError, ValueError, subprocess.TimeoutExpired):

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-from hsv_setup import checks, compiled, environment, interpreter, routes, workspace
+from hsv_setup import bytecode, checks, compiled, environment, interpreter, routes, workspace
 from hsv_setup.console import SetupError, Stage
 from hsv_setup.paths import ROOT
 
@@ -60,10 +60,12 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
             stage = Stage("[2/3] Workspace", "build")
             workspace.build(route, wanted, env, stage)
             stage.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
-        if not compiled.is_current():
+        if not (bytecode.sources_are_current() and compiled.is_current()):
             stage = Stage("[3/3] Compiled caches", "compile")
-            compiled.warm(env, stage)
-            stage.done("numerical code compiled")
+            bytecode.compile_sources(environment.PYTHON, env, stage)
+            if not compiled.is_current():
+                compiled.warm(env, stage)
+            stage.done("byte code and numerical code compiled")
     print(f"Set up ({time.monotonic() - start:.1f} s). To use it in this shell: source env.sh", flush=True)
 
 

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_file import ControlDesign, find_design, read_design, read_parameters
 from hsv.design.certificate import certificate_path, read_certificate, write_certificate
 from hsv.design.verification.preflight import preflight
 from hsv.errors import DesignError
@@ -19,12 +19,13 @@ def shipped():
 
 
 def with_entry(values, name, index, factor):
-    return values | {name: [v * factor if i == index else v for i, v in enumerate(values[name])]}
+    changed = [v * factor if i == index else v for i, v in enumerate(values[name])]
+    return ControlDesign.from_parameters(values | {name: changed})
 
 
 @pytest.mark.parametrize("name", ["baseline", "baseline_single_k", "baseline_derived", "adjustable"])
 def test_shipped_designs_fly_without_a_word(name):
-    assert preflight(read_parameters(find_design(name))) == ""
+    assert preflight(read_design(find_design(name))) == ""
 
 
 def test_a_design_that_was_tuned_a_little_flies_with_a_warning(shipped):
@@ -57,18 +58,18 @@ def test_a_set_that_is_not_invariant_is_refused(shipped, tmp_path):
     described["half_width"] = (np.sqrt(0.9) * np.array(described["half_width"])).tolist()
     write_certificate(tmp_path / "small.json", small)
     values = shipped | {
-        "design.certificate": str(tmp_path / "small.json"),
         "tube.shape": (np.array(shipped["tube.shape"]) / 0.9).tolist(),
         "tube.half_width": described["half_width"],
     }
     with pytest.raises(DesignError, match="claim fails: invariance, smallest eigenvalue over the vertices"):
-        preflight(values)
+        preflight(ControlDesign.from_parameters(values), str(tmp_path / "small.json"))
 
 
 def test_a_design_without_a_certificate_flies_with_a_warning(shipped):
-    assert preflight(shipped | {"design.name": "mine"}) == "design 'mine': no certificate found, not verified"
+    mine = ControlDesign.from_parameters(shipped | {"design.name": "mine"})
+    assert preflight(mine) == "design 'mine': no certificate found, not verified"
     with pytest.raises(DesignError, match=r"absent\.json: cannot be read"):
-        preflight(shipped | {"design.certificate": "absent.json"})
+        preflight(mine, "absent.json")
 
 
 def test_the_check_needs_neither_solvers_nor_units():

@@ -19,6 +19,7 @@ from hsv.errors import ParameterError, RecordingError
 from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos
+from hsv_node.lockstep import SAY_AFTER
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
 from hsv_node.process import ProcessNode
@@ -51,6 +52,8 @@ class PlayerNode(ProcessNode):
         self._instants = _instants(bag, topics)
         self._next = 0
         self._begins = time.monotonic() + delay
+        self._says = self._begins
+        """When to say again that listeners are slow."""
         self._anchor: tuple[float, int] | None = None
         """Wall time (s) and simulated time (ns) from which the pace is counted."""
         self.create_service(Trigger, "~/pause", self._pause)
@@ -62,9 +65,7 @@ class PlayerNode(ProcessNode):
         while not self._paused and self._next < len(self._instants) and self._delay() <= 0.0:
             self._publish()
         if self._next >= len(self._instants):
-            for publisher in self._talkers.values():
-                publisher.wait_for_all_acked(Duration(seconds=5.0))
-            self.finish(0)
+            self._end()
 
     def patience(self) -> float:
         """Wake in time for the next message."""
@@ -80,6 +81,15 @@ class PlayerNode(ProcessNode):
         if self._anchor is None:
             self._anchor = now, instant
         return self._anchor[0] + (instant - self._anchor[1]) * 1e-9 / self._rate - now
+
+    def _end(self) -> None:
+        """End once all listeners have everything; one that is gone or hangs is given up by DDS itself, in time."""
+        slow = [t for t, p in self._talkers.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
+        if not slow:
+            self.finish(0)
+        elif time.monotonic() > self._says:
+            self._says = time.monotonic() + SAY_AFTER
+            self.get_logger().info("waiting for slow listeners of " + ", ".join(slow))
 
     def _publish(self) -> None:
         for topic, data in self._instants[self._next][1]:

@@ -15,23 +15,37 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.utilities import remove_ros_args
 
+from hsv.graph.progress import Standstill
+from hsv_node.lockstep import SAY_AFTER
+
 PATIENCE = 30.0
-"""Seconds to wait for the node, and for its answer."""
+"""Seconds to wait for a node that is not there while nothing else changes on its ROS domain either."""
 
 
 def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
-    """Return what the node says to a new ``value``; not successful as well where no such node answers."""
+    """Return what the node says to a new ``value``; not successful as well where no such node comes.
+
+    A node that is there may take its time to answer: its absence is an error, slowness is only told.
+    """
     parameter = Parameter(name, value=value).to_parameter_msg()
     node = rclpy.create_node("set_parameter", enable_rosout=False)
     try:
         client = AsyncParameterClient(node, node_name)
-        deadline = time.monotonic() + PATIENCE
-        if client.wait_for_services(PATIENCE):
-            future = client.set_parameters([parameter])
-            rclpy.spin_until_future_complete(node, future, timeout_sec=max(0.0, deadline - time.monotonic()))
-            if future.done():
-                return future.result().results[0]
-        return SetParametersResult(successful=False, reason=f"no answer from node {node_name!r} in {PATIENCE:g} s")
+        answer = None
+        standstill, begun, said = Standstill(), time.monotonic(), 0
+        while not (answer and answer.done()):
+            if answer is None and client.services_are_ready():
+                answer = client.set_parameters([parameter])
+            rclpy.spin_once(node, timeout_sec=0.1)
+            names = sorted(space.rstrip("/") + "/" + other for other, space in node.get_node_names_and_namespaces())
+            is_there = "/" + node_name.lstrip("/") in names
+            # While it is there, time itself is progress.
+            if standstill.look(time.monotonic() if is_there else names) > PATIENCE:
+                return SetParametersResult(successful=False, reason=f"no node {node_name!r} in {PATIENCE:g} s")
+            if time.monotonic() - begun > (said + 1) * SAY_AFTER:
+                said += 1
+                print(f"waiting for {'an answer of ' if is_there else ''}{node_name}", file=sys.stderr, flush=True)
+        return answer.result().results[0]
     except NameValidationException:
         expected = "expected the name of a node, such as tube_mpc"
         return SetParametersResult(successful=False, reason=f"node = {node_name!r}: {expected}")

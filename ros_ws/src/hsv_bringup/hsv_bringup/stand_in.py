@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -14,6 +13,7 @@ from rclpy.node import Node
 
 from hsv.graph import description
 from hsv.graph.part_parameters import STAND_IN_PARAMETERS
+from hsv.graph.progress import Standstill
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
@@ -60,7 +60,7 @@ class StandInNode(LockstepNode):
             self.create_subscription(message_class(name), topic, answer, STEP, raw=True)
         self._run = next((message for _, message in bag.decode("/hsv/run")), None)
         self._ready = self._join()
-        self._heard = time.monotonic()
+        self._standstill = Standstill()
 
     def _peer(self, name: str) -> Node:
         if name not in self._peers:
@@ -92,7 +92,6 @@ class StandInNode(LockstepNode):
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
         self._output.write(topic, seconds * 1_000_000_000 + nanoseconds, data)
         self._answered[topic] += 1
-        self._heard = time.monotonic()
         self._feed()
 
     def _feed(self) -> None:
@@ -113,9 +112,12 @@ class StandInNode(LockstepNode):
     def poll(self) -> None:
         """Start when the links stand; give up on a node that does not answer."""
         if not self._is_plant and self._ready and self._fed == 0 and self._heard_by_node():
-            self._heard = time.monotonic()
             self._feed()
-        if time.monotonic() - self._heard > self._limit:
+        answers = sum(self._answered.values())
+        if not answers and not self._fed:
+            # However long it takes to start: whoever has started it sees it end or hang.
+            self.say_waiting([self._under_test], decides=True)
+        elif self._standstill.look((self._fed, answers)) > self._limit:
             silent = [topic for topic, count in self._answered.items() if count <= min(self._answered.values())]
             self.get_logger().fatal(
                 f"step {min(self._answered.values())}: no {', '.join(silent)} from {self._under_test} "

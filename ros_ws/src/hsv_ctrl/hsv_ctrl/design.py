@@ -6,25 +6,34 @@ from typing import Any
 
 from rclpy.node import Node
 
-from hsv.control.design_file import DESIGN_PARAMETERS, digest, find_design, read_parameters
+from hsv.control.design_file import DESIGN_PARAMETERS, ControlDesign, find_design, read_parameters
 from hsv.errors import DesignError
 from hsv.parameters import Parameter
-from hsv_node.parameters import declare
+from hsv_node.parameters import declare, given
 
 DEFAULT_DESIGN = "baseline"
 
 
-def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> dict[str, Any]:
-    """Declare ``extra`` and the design's parameters on ``node``, the shipped baseline as default; return their values.
+def declare_design(node: Node, extra: tuple[Parameter, ...] = ()) -> tuple[dict[str, Any], ControlDesign]:
+    """Declare ``extra`` and the design's parameters on ``node``; return the values of all, and the design in them.
 
-    A design that was changed since it was written is told in a warning: people tune.
+    A design that is not given is the shipped baseline. One that was changed since it was written is told in a warning:
+    people tune.
+
+    Raises:
+        ParameterError, DesignError: A wrong value, named.
     """
+    # A whole design is known by its digest: there is nothing to fill in, and the shipped one need not be parsed.
+    values = declare(node, (*extra, *DESIGN_PARAMETERS), {} if given(node, "design.hash") else _shipped(node))
+    design = ControlDesign.from_parameters(values)
+    if design.modified:
+        node.get_logger().warning(f"design {design.name!r}: modified since design")
+    return values, design
+
+
+def _shipped(node: Node) -> dict[str, Any]:
     try:
-        shipped = read_parameters(find_design(DEFAULT_DESIGN))
+        return read_parameters(find_design(DEFAULT_DESIGN))
     except DesignError as error:
         node.get_logger().debug(f"no default design: {error}")
-        shipped = {}
-    values = declare(node, (*extra, *DESIGN_PARAMETERS), shipped)
-    if values["design.hash"] != digest(values):
-        node.get_logger().warning(f"design {values['design.name']!r}: modified since design")
-    return values
+        return {}

@@ -20,7 +20,7 @@ class NominalTrajectoryNode(PeerNode):
 
     def __init__(self) -> None:
         super().__init__("nominal_trajectory")
-        self.trajectory = NominalTrajectory.from_parameters(declare_design(self, NOMINAL_PARAMETERS))
+        self.trajectory = NominalTrajectory.from_parameters(*declare_design(self, NOMINAL_PARAMETERS))
         self._times, self._failed = StepTimes(), False
         self._message = NominalState()
         self._nominal = self.talk("/hsv/nominal")

@@ -17,7 +17,7 @@ class RobustMpcNode(ControllerNode):
 
     def __init__(self) -> None:
         super().__init__("robust_mpc")
-        self.law = RobustMpc.from_parameters(declare_design(self, ROBUST_MPC_PARAMETERS))
+        self.law = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -24,15 +24,15 @@ class TubeMpcNode(ControllerNode):
 
     def __init__(self) -> None:
         super().__init__("tube_mpc")
-        values = declare_design(self, (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
-        if warning := preflight(values):
+        values, design = declare_design(self, (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
+        if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)
-        certified, flown = values["design.coupling"], values["vehicle.coupling"]
+        certified, flown = design.coupling, values["vehicle.coupling"]
         if certified not in ("", flown):
             self.get_logger().warning(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
-        self.law: TubeLaw | IntegralTubeLaw = tube_law(values)
+        self.law: TubeLaw | IntegralTubeLaw = tube_law(values, design)
         self.add_on_set_parameters_callback(self._on_change)
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:

@@ -19,6 +19,12 @@ from hsv_node.qos import LATCHED, STEP
 SAY_AFTER = 2.0
 """Seconds of waiting for peers before this is said, and between saying it again."""
 
+LINK_LOOK = 0.05
+"""Seconds between looks at the links before they stand; each takes a millisecond from those that still start."""
+
+WARN_AFTER = 10.0
+"""Seconds after which whoever waits for all says it as a warning: slow, and going on."""
+
 
 class LockstepNode(ProcessNode):
     """A node of the graph description that reacts to the messages of a step and never to timers."""
@@ -31,7 +37,8 @@ class LockstepNode(ProcessNode):
         self._outputs: dict[str, Any] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
         self._diagnosed_second = -1
-        self._patience_ends = time.monotonic() + SAY_AFTER
+        self._made = time.monotonic()
+        self._patience_ends = self._made + SAY_AFTER
 
     def listen(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe a step topic of the graph description."""
@@ -60,11 +67,16 @@ class LockstepNode(ProcessNode):
                 missing.append(f"{peer} ({topic})")
         return missing
 
-    def say_waiting(self, missing: Sequence[str]) -> None:
-        """Log now and then for whom this node waits."""
-        if missing and time.monotonic() > self._patience_ends:
-            self._patience_ends = time.monotonic() + SAY_AFTER
-            self.get_logger().info("waiting for " + ", ".join(missing))
+    def say_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
+        """Log now and then for whom this node waits; in the end as a warning if its waiting ``decides`` the start."""
+        now = time.monotonic()
+        if missing and now > self._patience_ends:
+            self._patience_ends = now + SAY_AFTER
+            words = "waiting for " + ", ".join(missing)
+            if decides and now - self._made > WARN_AFTER:
+                self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
+            else:
+                self.get_logger().info(words)
 
     def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""
@@ -109,7 +121,7 @@ class PeerNode(LockstepNode):
 
     def patience(self) -> float:
         """Look at the links more often until they stand."""
-        return 0.25 if self._announced else 0.02
+        return 0.25 if self._announced else LINK_LOOK
 
     def _on_run(self, run: Run) -> None:
         period = self.get_parameter("period").value if self.has_parameter("period") else run.period

@@ -41,6 +41,11 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
     return values
 
 
+def given(node: Node, name: str) -> bool:
+    """Return whether the parameter ``name`` was given to ``node`` at its start, in a file or on the command line."""
+    return name in node._parameter_overrides
+
+
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(

@@ -13,8 +13,9 @@ from rosgraph_msgs.msg import Clock
 from hsv.graph.description import EXIT_DIVERGED, peers
 from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
 from hsv.graph.part_parameters import PACE_PARAMETERS
+from hsv.graph.progress import Standstill
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
-from hsv_node.lockstep import LockstepNode
+from hsv_node.lockstep import LINK_LOOK, LockstepNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
@@ -49,7 +50,10 @@ class PlantNode(LockstepNode):
         self._recorded_step = -1
         self._actuator: np.ndarray | None = None
         self._flown = False
-        self._heard = self._begun = time.monotonic()
+        self._begun = time.monotonic()
+        self._messages = 0
+        """Answers of the nodes so far: what must not stand still."""
+        self._standstill = Standstill()
 
     def _on_ready(self, ready: Ready) -> None:
         if ready.run_id == self._run.run_id:
@@ -57,14 +61,14 @@ class PlantNode(LockstepNode):
 
     def _on_progress(self, progress: RecorderProgress) -> None:
         self._recorded_step = progress.step
-        self._heard = time.monotonic()
+        self._messages += 1
         self._continue()
 
     def _on_actuator(self, message: ControlInput) -> None:
         if message.step != self._result.step:
             self.get_logger().error(f"/hsv/actuator of step {message.step}: expected {self._result.step}, ignored")
             return
-        self._heard = time.monotonic()
+        self._messages += 1
         if self._result.status is FlightStatus.RUNNING:
             self._actuator = input_vector(message)
         else:
@@ -110,14 +114,14 @@ class PlantNode(LockstepNode):
             self._try_start()
         else:
             self._continue()
-            waited = time.monotonic() - self._heard
+            waited = self._standstill.look(self._messages)
             if waited > self.values["step_timeout"] + max(self._delay(), 0.0):
                 self._give_up(waited)
 
     def patience(self) -> float:
         """Wake in time for the next state when paced."""
         if not self._started:
-            return 0.02
+            return LINK_LOOK
         return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
 
     def stopped(self, signal_number: int) -> int:
@@ -128,10 +132,11 @@ class PlantNode(LockstepNode):
         missing = [f"{peer} (/hsv/ready)" for peer in self._peers if peer not in self._ready] or self.missing_links()
         if not missing:
             self._started = True
-            self._heard = self._begun = time.monotonic()
+            self._begun = time.monotonic()
+            self._standstill = Standstill()
             self._publish()
             return
-        self.say_waiting(missing)
+        self.say_waiting(missing, decides=True)
         limit = self.values["start_timeout"]
         if limit and time.monotonic() - self._begun > limit:
             self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(missing))

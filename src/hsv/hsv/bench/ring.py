@@ -41,7 +41,7 @@ def ring_lap(laps: int, loop: str, *, composed: bool = False) -> float:
             seconds = {name: float(_line(process)) for name, process in zip(names, processes, strict=True)}
             for process in processes:
                 _say(process)
-                process.wait(30.0)
+                process.wait()
         finally:
             for process in processes:
                 process.kill()

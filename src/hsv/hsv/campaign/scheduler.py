@@ -9,7 +9,7 @@ from typing import Any
 
 from hsv.errors import CampaignError
 
-ANSWER, WORKERS = 10.0, 300.0
+ANSWER, WORKERS = 60.0, 300.0
 """Seconds to wait for the scheduler, and for the first of its workers: a cluster may have to start machines."""
 
 _LOGS = ("distributed", "distributed.client", "tornado", "tornado.application")

@@ -32,6 +32,7 @@ def run(
     from hsv.cli.summary import report_flight
     from hsv.errors import QuantityError, RecordingError
     from hsv.graph.flight import fly_graph
+    from hsv.graph.launcher import WARNING
     from hsv.graph.preparation import prepare
     from hsv.recording.flight import flight_data, flight_fingerprint
     from hsv.recording.reader import Bag
@@ -46,7 +47,7 @@ def run(
     clock: dict[str, float] = {}
 
     def line(node: str, text: str) -> None:
-        if verbose or " [WARN] " in text:
+        if verbose or WARNING in text:
             report_line(node, text)
 
     with flight_bar(loaded.name, loaded.duration, prepared.steps) as show:

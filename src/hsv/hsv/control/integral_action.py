@@ -37,10 +37,14 @@ class IntegralTubeLaw:
         self._integral = np.zeros(2)
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Build from the design's parameters and :data:`INTEGRAL_PARAMETERS`; a wrong one is named."""
+    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
+        """Build from the design's parameters and :data:`INTEGRAL_PARAMETERS`; a wrong one is named.
+
+        ``design``: the one in ``values``, where it is known already.
+        """
         v = check_all(INTEGRAL_PARAMETERS, values)
-        return cls(TubeLaw.from_parameters(values), ControlDesign.from_parameters(values).period, v["integral.rate"])
+        design = design or ControlDesign.from_parameters(values)
+        return cls(TubeLaw.from_parameters(values, design), design.period, v["integral.rate"])
 
     def reset(self) -> None:
         """Empty the integral and start a new run."""

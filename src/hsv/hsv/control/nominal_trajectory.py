@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.design_file import ControlDesign
-from hsv.control.nominal_law import FamilyLaw, NominalData, NominalLaw, NominalStatus
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.lpv.polytope import schedule
 from hsv.parameters import Parameter, check_all
@@ -66,6 +66,11 @@ class NominalResult:
     gain_index: int
     status: NominalStatus
 
+    @property
+    def in_family(self) -> bool:
+        """Whether the gain is one of the design's nested family, which its index names."""
+        return self.gain_index != NOT_IN_FAMILY
+
 
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
@@ -85,14 +90,18 @@ class NominalTrajectory:
         nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, reference.data.defect[0], S, new)
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+    def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
         """Build from the design's parameters and :data:`NOMINAL_PARAMETERS`; the design model is never perturbed.
+
+        Args:
+            values: Flat parameters.
+            design: The design in ``values``, where it is known already.
 
         Raises:
             ParameterError, DesignError, TrimError: A wrong value, named.
         """
         v = check_all(NOMINAL_PARAMETERS, values)
-        design = ControlDesign.from_parameters(values)
+        design = design or ControlDesign.from_parameters(values)
         reference = ReferenceTrajectory.from_parameters(values, design.period)
         return cls(design, reference, _law(v, design, reference))
 

@@ -43,10 +43,13 @@ class RobustMpc:
         self.step(x, 0.0, np.empty(0), x, u, x, u)  # compile now: a cold cache must not stall a flight
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Build from the design's parameters and :data:`ROBUST_MPC_PARAMETERS`; a wrong one is named."""
+    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
+        """Build from the design's parameters and :data:`ROBUST_MPC_PARAMETERS`; a wrong one is named.
+
+        ``design``: the one in ``values``, where it is known already.
+        """
         v = check_all(ROBUST_MPC_PARAMETERS, values)
-        return cls(ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
+        return cls(design or ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
 
     def reset(self) -> None:
         """Nothing to forget."""

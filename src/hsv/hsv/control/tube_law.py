@@ -155,10 +155,13 @@ class TubeLaw:
         self.reset()
 
     @classmethod
-    def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Build from the design's parameters and :data:`TUBE_PARAMETERS`; a wrong one is named in the error."""
+    def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
+        """Build from the design's parameters and :data:`TUBE_PARAMETERS`; a wrong one is named in the error.
+
+        ``design``: the one in ``values``, where it is known already.
+        """
         coupling = check_all(TUBE_PARAMETERS, values)["vehicle.coupling"]
-        design = ControlDesign.from_parameters(values)
+        design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
         return cls(design, coupling, flown_sections(values), changes)
 

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.nominal_law import NOT_IN_FAMILY
-
 if TYPE_CHECKING:  # a node imports its own component alone
     from hsv.control.control_law import ControlLaw
     from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
@@ -117,7 +115,7 @@ def plan_nominal(trajectory: NominalTrajectory, state: Message, nominal: Message
     fill_input(nominal.reference_input, result.reference_input)
     fill_state(nominal.deviation, result.deviation)
     fill_input(nominal.input, result.input)
-    nominal.gain = result.gain.ravel() if result.gain_index == NOT_IN_FAMILY else NO_GAIN
+    nominal.gain = NO_GAIN if result.in_family else result.gain.ravel()
     nominal.gain_index, nominal.status = result.gain_index, int(result.status)
     return result
 

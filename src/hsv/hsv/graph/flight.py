@@ -37,7 +37,8 @@ def fly_graph(
     failures = []
     code = 0
     try:
-        with Launcher(started, parameter_arguments(prepared.parameter_files), on_step, on_line) as launcher:
+        arguments = parameter_arguments(prepared.parameter_files)
+        with Launcher(started, arguments, on_step, on_line, prepared.step_timeout) as launcher:
             code = launcher.wait()
     except RunError as error:
         failures.append(str(error))

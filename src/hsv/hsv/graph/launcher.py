@@ -16,9 +16,16 @@ from pathlib import Path
 
 from hsv.errors import RunError
 from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, NodeDescription
+from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
 
-GRACE = 5.0
-"""Seconds between asking a process to end and forcing it."""
+GRACE = 20.0
+"""Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
+
+WARNING = "[WARN] "
+"""What ROS nodes begin a warning with, and so does the launcher."""
+
+_LOOK = 0.02
+"""Seconds between two looks at the processes."""
 
 _FLYING = (PLANT, COMPOSED)
 """Processes that report the steps of the flight."""
@@ -53,6 +60,13 @@ class _Process:
     popen: subprocess.Popen[str]
     words: deque[str] = field(default_factory=lambda: deque(maxlen=10))
     reader: threading.Thread | None = None
+    standstill: Standstill = field(default_factory=Standstill)
+    hung: bool = False
+
+    def idle(self) -> float:
+        """Return for how long (s) it has used no processor time; 0 where that cannot be found out."""
+        used = processor_time(self.popen.pid)
+        return 0.0 if used is None else self.standstill.look(used)
 
 
 class Launcher:
@@ -64,12 +78,23 @@ class Launcher:
         arguments: Sequence[str],
         on_step: Callable[[int], None],
         on_line: Callable[[str, str], None],
+        patience: float = 10.0,
     ) -> None:
-        """Prepare to start ``nodes`` with ``arguments``, the one that ends the run last; report steps, other lines."""
+        """Prepare to start processes.
+
+        Args:
+            nodes: What to start, the one that ends the run last.
+            arguments: Command line of each.
+            on_step: Called with the steps that are reported.
+            on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
+            patience: For how long (s) a process may do nothing at all, where no other node would end the run.
+        """
         self._nodes = list(nodes)
         self._arguments = list(arguments)
         self._on_step = on_step
         self._on_line = on_line
+        self._patience = max(patience, HUNG_AFTER)
+        self._flying = False
         self._processes: list[_Process] = []
 
     def __enter__(self) -> Launcher:
@@ -90,8 +115,12 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
+        A process that hangs is named, and again when it goes on. In flight the plant finds out for itself whom it waits
+        for in vain, and ends.
+
         Raises:
-            RunError: It failed, or another ended before it (a plant that has landed may); with its last words.
+            RunError: It failed, or another ended before it (a plant that has landed may); with its last words. Or it
+                hung, or another before the flight had begun.
         """
         *others, last = self._processes
         while True:
@@ -99,12 +128,25 @@ class Launcher:
                 code = process.popen.poll()
                 if code is not None and not _landed(process, code):
                     raise self._failure(process, code)
+            for process in self._processes:
+                self._watch(process, process is last or not self._flying)
             code = last.popen.poll()
             if code is not None:
                 if code == 0 or _landed(last, code):
                     return code
                 raise self._failure(last, code)
-            time.sleep(0.02)
+            time.sleep(_LOOK)
+
+    def _watch(self, process: _Process, decides: bool) -> None:
+        """Tell a process that does nothing at all; it ends the run only if it ``decides``."""
+        idle = process.idle()
+        name = process.description.name
+        if idle > self._patience and decides:
+            raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
+        if process.hung != (idle > HUNG_AFTER):
+            process.hung = not process.hung
+            words = f"hangs: no progress for {HUNG_AFTER:g} s" if process.hung else "goes on"
+            self._on_line(name, WARNING + words)
 
     def stop(self) -> None:
         """End all processes: ask, then force; the plant first, so that the recorder gets everything."""
@@ -112,12 +154,11 @@ class Launcher:
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]
             for process in running:
                 process.popen.send_signal(number)
-            deadline = time.monotonic() + patience
-            for process in running:
-                try:
-                    process.popen.wait(max(0.0, deadline - time.monotonic()))
-                except subprocess.TimeoutExpired:
-                    continue
+            begun = time.monotonic()
+            while time.monotonic() - begun < patience and any(
+                p.popen.poll() is None and p.idle() < HUNG_AFTER for p in running
+            ):
+                time.sleep(_LOOK)
         for process in self._processes:
             if process.reader:
                 process.reader.join(1.0)
@@ -146,6 +187,7 @@ class Launcher:
         assert process.popen.stdout is not None
         for line in process.popen.stdout:
             text = line.rstrip()
+            self._flying |= text.startswith("step ")
             if process.description in _FLYING and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
             elif text:
@@ -158,6 +200,8 @@ class Launcher:
         if process.reader:
             process.reader.join(1.0)
         reason = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        # Said now: until the others have ended and the bag is closed, a busy machine may take its time.
+        self._on_line(process.description.name, WARNING + reason)
         words = "".join(f"\n  {word}" for word in process.words)
         return RunError(f"{process.description.name} {reason}{'. Its last words:' if words else ''}{words}")
 

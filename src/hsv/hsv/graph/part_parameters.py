@@ -16,7 +16,7 @@ LOCKSTEP_PARAMETERS = (
 
 PACE_PARAMETERS = (
     Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
-    Parameter("start_timeout", 30.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
+    Parameter("start_timeout", 0.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
     Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
@@ -32,6 +32,6 @@ STAND_IN_PARAMETERS = (
     Parameter("stand_in.bag", "", "bag to feed the node from"),
     Parameter("stand_in.node", "", "node under test"),
     Parameter("stand_in.directory", "", "bag to write with its answers, a new directory"),
-    Parameter("stand_in.timeout", 30.0, "wall time to wait for an answer", "s", 0.1, 1e6),
+    Parameter("stand_in.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
 )
 """Of the stand-in for all other nodes, in a replay over DDS."""

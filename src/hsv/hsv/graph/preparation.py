@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from hsv.control.design_file import find_design, read_design_parameters
+from hsv.control.design_file import find_design, read_parameters
 from hsv.errors import RecordingError
 from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble_flight, blamed_on
@@ -31,6 +31,8 @@ class PreparedRun:
     nodes: tuple[NodeDescription, ...]
     steps: int
     """Number of the last step if the flight does not diverge."""
+    step_timeout: float
+    """Wall time (s) to wait for a node that does nothing."""
     folder: tempfile.TemporaryDirectory[str]
     """Holds the parameter files; gone with this object."""
 
@@ -55,7 +57,7 @@ def prepare(
     scenario = parse_scenario(text, Path(scenario_name).stem)
     with blamed_on(scenario):
         design_file = find_design(scenario.design)
-        design = read_design_parameters(design_file)
+        design = read_parameters(design_file)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
@@ -97,9 +99,8 @@ def prepare(
     }
     (folder / "run.yaml").write_text(parameter_yaml(run), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(
-        scenario, run_id, bag, parameter_files, graph(scenario.controller), components.plant.steps, temporary
-    )
+    nodes = graph(scenario.controller)
+    return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:

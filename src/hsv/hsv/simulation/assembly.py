@@ -8,10 +8,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from hsv.control.control_law import control_law
-from hsv.control.design_file import find_design, read_design_parameters
+from hsv.control.design_file import ControlDesign, find_design, read_design, read_parameters
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
-from hsv.errors import HsvError, ScenarioError, TrimError
+from hsv.errors import DesignError, HsvError, ScenarioError, TrimError
 from hsv.faults.actuator import FaultInjector
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
@@ -28,12 +28,12 @@ _FIELDS = {
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the design's parameters with those of ``scenario`` over them.
+    """Return the design's parameters with those of ``scenario`` over them; :func:`assemble` checks them.
 
     Raises:
-        DesignError: Names the design's file and the parameter that is wrong.
+        DesignError: There is no such design, or its file holds no parameters.
     """
-    return {**read_design_parameters(find_design(scenario.design)), **scenario.parameters()}
+    return {**read_parameters(find_design(scenario.design)), **scenario.parameters()}
 
 
 def assemble(values: Mapping[str, Any]) -> Components:
@@ -42,11 +42,12 @@ def assemble(values: Mapping[str, Any]) -> Components:
     Raises:
         ParameterError, DesignError, TrimError: Names the parameter that is wrong.
     """
+    design = ControlDesign.from_parameters(values)
     return Components(
         Plant.from_parameters(values),
         NotchFilter.from_parameters(values),
-        NominalTrajectory.from_parameters(values),
-        control_law(values),
+        NominalTrajectory.from_parameters(values, design),
+        control_law(values, design),
         FaultInjector.from_parameters(values),
     )
 
@@ -70,15 +71,26 @@ def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None)
 def blamed_on(scenario: Scenario) -> Iterator[None]:
     """Turn errors of components into errors of ``scenario``, with its name and its names of the parameters.
 
+    What is wrong with the design by itself is said with its file.
+
     Raises:
         ScenarioError: In place of any other error of the library.
     """
     try:
         yield
     except HsvError as error:
-        text = str(error)
+        text = (isinstance(error, DesignError) and _wrong_in_file(scenario.design)) or str(error)
         for parameter, field in _FIELDS.items():
             text = re.sub(parameter, field, text)
         if isinstance(error, TrimError):
             text = f"{'command' if scenario.command else 'initial'}: {text}"
         raise ScenarioError(f"scenario {scenario.name!r}: {text}") from error
+
+
+def _wrong_in_file(design: str) -> str:
+    """Return what is wrong with a design whatever the scenario, with its file; nothing where that is not the reason."""
+    try:
+        read_design(find_design(design))
+    except DesignError as error:
+        return str(error)
+    return ""

@@ -2,34 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from hsv.control.design_file import ControlDesign, find_design
-from hsv.design.certificate import CERTIFICATE_PARAMETERS, certificate_path, read_certificate
+from hsv.design.certificate import certificate_path, read_certificate
 from hsv.design.verification.claims import Subject, gathered, require
 from hsv.design.verification.quick import QUICK
 from hsv.errors import DesignError
-from hsv.parameters import check_all
 
 
-def preflight(values: Mapping[str, Any]) -> str:
-    """Return what is to be warned of before the design in the parameters ``values`` flies, mostly nothing.
+def preflight(design: ControlDesign, certificate: str = "") -> str:
+    """Return what is to be warned of before ``design`` flies, mostly nothing.
 
     A design that differs from the one that was certified may fly, people tune, as long as what its safety rests on
     holds for it: sizes and types; gains stable at every vertex; one Lyapunov function for F with (24), one for every K
     with (34); the invariant set that is watched in flight is the certified one, and invariant at every vertex under the
     gain that flies. Each of these refuses. Everything else that no longer agrees with the certificate is a warning, and
-    so is a design without a certificate.
+    so is a design without a certificate. That is the file ``certificate`` or, where none is named, the one beside the
+    design's own file.
 
     Raises:
         DesignError: Names the claim that refuses, or the certificate that cannot be read.
     """
-    design = ControlDesign.from_parameters(values)
-    given = check_all(CERTIFICATE_PARAMETERS, values)["design.certificate"]
-    path = Path(given) if given else _beside(design.name)
+    path = Path(certificate) if certificate else _beside(design.name)
     if path is None:
         return f"design {design.name!r}: no certificate found, not verified"
     subject = Subject(design, read_certificate(path))

@@ -1,0 +1,48 @@
+"""Slow or hung: whether anything has moved lately, as far as somebody was there to see it.
+
+On a busy machine everything may take any time. So nothing in the graph is given up for being late, but for standing
+still: no step, no message, no processor time used.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time
+
+HUNG_AFTER = 5.0
+"""Seconds without any progress after which a process is called hung."""
+
+_LONGEST_GAP = 1.0
+"""Seconds between two looks that count at most: who did not get to look for longer was kept from it, as all were."""
+
+
+class Standstill:
+    """How long something has not changed."""
+
+    def __init__(self) -> None:
+        self._looked = time.monotonic()
+        self._value: object = None
+        self._seconds = 0.0
+
+    def look(self, value: object) -> float:
+        """Return for how long (s) the looks have found this same ``value``; look a few times a second."""
+        now = time.monotonic()
+        self._seconds += min(now - self._looked, _LONGEST_GAP)
+        self._looked = now
+        if value != self._value:
+            self._value, self._seconds = value, 0.0
+        return self._seconds
+
+
+def processor_time(pid: int) -> float | None:
+    """Return the processor time (s) that process ``pid`` has used in all threads; ``None``: not to be found out.
+
+    To the nanosecond: a node that only waits uses some ten microseconds whenever it looks around, a stopped one none.
+    """
+    clock = ctypes.c_int()
+    if ctypes.CDLL(None).clock_getcpuclockid(pid, ctypes.byref(clock)):
+        return None
+    try:
+        return time.clock_gettime(clock.value)
+    except OSError:
+        return None

@@ -1,0 +1,54 @@
+"""Byte code of everything that a process of the bench imports, written by the set-up.
+
+Python writes it at the first import, but not where PYTHONDONTWRITEBYTECODE is set, as in many containers, nor for
+another user than the one who set the bench up: there, every node would compile a thousand modules at every start, four
+of its five seconds of processor time. What is up to date is left as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from hsv_setup.console import Stage
+from hsv_setup.paths import ROOT, STAMPS, VENV, fingerprint, read_stamp, write_stamp
+
+SOURCES = (ROOT / "src", ROOT / "ros_ws" / "src", ROOT / "tools")
+"""Packages of the workspace are installed as links to these; ament compiles the generated messages itself."""
+
+_STAMP = STAMPS / "bytecode"
+
+# Some packages bring templates and samples for other versions of Python: what does not compile is left out.
+_COMPILE = "import compileall, sys; [compileall.compile_dir(path, quiet=2, workers=0) for path in sys.argv[1:]]"
+
+
+def compile_packages(python: Path, env: Mapping[str, str], stage: Stage) -> None:
+    """Compile what pip has installed into the virtual environment, on all cores.
+
+    Raises:
+        SetupError: the interpreter does not run.
+    """
+    stage.run([python, "-c", _COMPILE, *VENV.glob("lib/python3*/site-packages")], env)
+
+
+def compile_sources(python: Path, env: Mapping[str, str], stage: Stage) -> None:
+    """Compile the bench's own modules.
+
+    Raises:
+        SetupError: the interpreter does not run.
+    """
+    stage.run([python, "-c", _COMPILE, *SOURCES], env)
+    write_stamp(_STAMP, _key())
+
+
+def sources_are_current() -> bool:
+    """Return whether no module of the bench has changed since :func:`compile_sources`."""
+    return read_stamp(_STAMP) == _key()
+
+
+def _key() -> str:
+    # Byte code is good for a time of change, not for a content.
+    modules = sorted(path for folder in SOURCES for path in folder.rglob("*.py"))
+    return fingerprint(
+        read_stamp(STAMPS / "identity"), *(f"{path.relative_to(ROOT)} {path.stat().st_mtime_ns}" for path in modules)
+    )
