@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 
 def design(
     name: Annotated[str, typer.Argument(help="Name of a design input in offline_design/, or path of a TOML file.")],
-    out: Annotated[Path | None, typer.Option(help="Parameter file to write; default: beside the input.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Parameter file to write; default: NAME.yaml in this folder.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     compare_sets: Annotated[
         bool, typer.Option("--compare-sets", help="Also compute the set in the other ways, and print a table.")
     ] = False,
@@ -31,7 +34,9 @@ def design(
 ) -> None:
     """Compute a controller offline, with its tube; write its parameter file and, beside it, its certificate.
 
-    Example: hsv design baseline; hsv design adjustable --tau 0.8
+    Both are written to the current folder, or where --out says; files that exist are kept unless --force is given.
+
+    Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml
     """
     from hsv.cli.progress import stages
     from hsv.control.design_file import write_design
@@ -39,16 +44,19 @@ def design(
     from hsv.design.baseline import design_baseline
     from hsv.design.certificate import certificate_path, write_certificate
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
+    from hsv.errors import ParameterError
 
-    if out:
-        check_target(out, "out")
     source = find_inputs(name)
     inputs = read_inputs(source)
     if tau:
         inputs = with_tau(inputs, _factors(tau))
+    target = out or Path(f"{source.stem}.yaml")
+    for path in (target, certificate_path(target)):
+        check_target(path, "out")
+        if path.exists() and not force:
+            raise ParameterError(f"out = {str(path)!r}: exists, expected a new file, or --force to write over it")
     with stages() as progress:
         result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
-    target = out or source.with_suffix(".yaml")
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
     with writing(target, "out"):
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
