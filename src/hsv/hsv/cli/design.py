@@ -9,46 +9,60 @@ import typer
 from rich.table import Table
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import console, print_json, report_error
 from hsv.cli.targets import check_target, writing
 
 if TYPE_CHECKING:
     from hsv.control.design_file import ControlDesign
+    from hsv.design.baseline import DesignResult
     from hsv.design.inputs import DesignInputs
     from hsv.design.sets.compare import Row
 
 
 def design(
     name: Annotated[str, typer.Argument(help="Name of a design input in offline_design/, or path of a TOML file.")],
-    out: Annotated[Path | None, typer.Option(help="Parameter file to write; default: beside the input.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Parameter file to write; default: NAME.yaml in this folder.")
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
     compare_sets: Annotated[
         bool, typer.Option("--compare-sets", help="Also compute the set in the other ways, and print a table.")
     ] = False,
     tau: Annotated[
         str, typer.Option(help="Adjustable factor in place of the input's: one number, or five with commas between.")
     ] = "",
+    check: Annotated[
+        bool, typer.Option("--check", help="Write nothing; compare with the parameter file beside the input.")
+    ] = False,
     json: JsonOption = False,
 ) -> None:
     """Compute a controller offline, with its tube; write its parameter file and, beside it, its certificate.
 
-    Example: hsv design baseline; hsv design adjustable --tau 0.8
+    Both are written to the current folder, or where --out says; files that exist are kept unless --force is given.
+    --check fails, with the entry that is farthest off, where the design does not come out as it was shipped.
+
+    Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
-    from hsv.cli.progress import stages
     from hsv.control.design_file import write_design
-    from hsv.design.adjustable import design_adjustable
-    from hsv.design.baseline import design_baseline
     from hsv.design.certificate import certificate_path, write_certificate
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
+    from hsv.errors import ParameterError
 
-    if out:
-        check_target(out, "out")
     source = find_inputs(name)
     inputs = read_inputs(source)
     if tau:
         inputs = with_tau(inputs, _factors(tau))
-    with stages() as progress:
-        result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
-    target = out or source.with_suffix(".yaml")
+    if check:
+        if out or force or tau or compare_sets:
+            raise ParameterError("check: --out, --force, --tau or --compare-sets given, too, expected --check alone")
+        _check(source, inputs, json)
+        return
+    target = out or Path(f"{source.stem}.yaml")
+    for path in (target, certificate_path(target)):
+        check_target(path, "out")
+        if path.exists() and not force:
+            raise ParameterError(f"out = {str(path)!r}: exists, expected a new file, or --force to write over it")
+    result = _computed(inputs)
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
     with writing(target, "out"):
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
@@ -69,6 +83,36 @@ def design(
         for row in rows:
             if row.note:
                 console.print(f"{row.name}: {row.note}")
+
+
+def _computed(inputs: DesignInputs) -> DesignResult:
+    from hsv.cli.progress import stages
+    from hsv.design.adjustable import design_adjustable
+    from hsv.design.baseline import design_baseline
+
+    with stages() as progress:
+        return (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
+
+
+def _check(source: Path, inputs: DesignInputs, json: bool) -> None:
+    from hsv.design.verification.agreement import deviations
+    from hsv.design.verification.verifier import load_subject
+
+    shipped = load_subject(source.with_suffix(".yaml"))
+    found = deviations(_computed(inputs).design, shipped)
+    worst = max(found, key=lambda deviation: deviation.scaled)
+    if json:
+        print_json({"deviations": [vars(deviation) for deviation in found], "ok": worst.ok})
+    else:
+        table = Table(box=None, pad_edge=False)
+        for column in ("parameter", "largest deviation, scaled", "entry"):
+            table.add_column(column)
+        for d in found:
+            table.add_row(d.parameter, f"{d.scaled:.2g}", ", ".join(map(str, d.index)) if d.scaled else "")
+        console.print(table)
+    if not worst.ok:
+        report_error(str(worst))
+        raise typer.Exit(1)
 
 
 def _factors(text: str) -> list[float]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def verify(
     file: Annotated[Path, typer.Argument(help="Parameter file of a design; its certificate lies beside it.")],
-    quick: Annotated[bool, typer.Option("--quick", help="Without the vehicle, flights and random sequences.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Without flights and random sequences.")] = False,
     scenario: Annotated[
         str, typer.Option(help="Fly this scenario instead, and check level, disturbances and plan of its flight.")
     ] = "",

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
-from cvxpy.atoms.affine.bmat import bmat
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
+from hsv.design.centring import Unknown, minimise
 from hsv.design.lmi import SolverReport, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.solver import solve
+from hsv.design.rounding import rounded_matrix
 from hsv.errors import DesignError
 
 _CONDITION = 1e3
@@ -54,12 +53,16 @@ def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> Co
     L = cholesky(solve_discrete_lyapunov(mean, np.diag(scale**2)), lower=True)
     white = np.linalg.solve(L, closed_loop @ L)
     n = len(mean)
-    N, margin = cp.Variable((n, n), symmetric=True), cp.Variable()
-    constraints = [N >> np.eye(n), N << _CONDITION * np.eye(n)]
-    for A in white:
-        AN = A @ N
-        constraints.append(bmat([[N, AN.T], [AN, N]]) >> margin * np.eye(2 * n))
-    solver = solve(cp.Problem(cp.Maximize(margin), constraints), name)
-    found = L @ np.asarray(N.value) @ L.T
-    found = 0.5 * (found + found.T)
+
+    def inequalities(N: np.ndarray, margin: np.ndarray) -> list[np.ndarray]:
+        blocks = [N - np.eye(n), _CONDITION * np.eye(n) - N]
+        for A in white:
+            AN = A @ N
+            blocks.append(np.block([[N, AN.T], [AN, N]]) - margin * np.eye(2 * n))
+        return blocks
+
+    (N, _), solver = minimise(
+        (Unknown((n, n), symmetric=True), Unknown((1, 1))), lambda N, margin: -margin[0, 0], inequalities, name
+    )
+    found = rounded_matrix(L @ N @ L.T)
     return CommonLyapunov(found, lyapunov_residuals(closed_loop, found, name), solver)

@@ -21,6 +21,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.notch_filter import NotchData, filter_step, rest
+from hsv.design.rounding import outward
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.lpv.polytope import Polytope, schedule
@@ -237,8 +238,8 @@ class DisturbanceSet:
 
 
 def inflated(lower: np.ndarray, upper: np.ndarray, factor: float) -> DisturbanceSet:
-    """Return the set between ``lower`` and ``upper`` (7), widened to hold zero and then scaled by ``factor``."""
-    return DisturbanceSet(factor * np.minimum(lower, 0.0), factor * np.maximum(upper, 0.0))
+    """Return the set between ``lower`` and ``upper`` (7), widened to hold zero, times ``factor``, rounded outwards."""
+    return DisturbanceSet(outward(factor * np.minimum(lower, 0.0)), outward(factor * np.maximum(upper, 0.0)))
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system
+from hsv.design.rounding import BOUND_DIGITS, rounded
 from hsv.design.sets.ellipsoid_set import from_report
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube_problem import channel_model, factors, tube_problem
@@ -35,7 +36,7 @@ def relaxed_bound(
 ) -> np.ndarray:
     """Return the bounds (2) of |u_n| in (52): ``bound``, grown as U minus F' Z' is wider than U minus F Z.
 
-    Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53).
+    Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53), and rounded.
 
     Raises:
         DesignError: No room at all, at tau = 1 or at the factor.
@@ -44,7 +45,7 @@ def relaxed_bound(
     for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
         if not room.min() > 0.0:
             raise DesignError(f"{name}: {room.tolist()} about the trim, expected room above zero")
-    return np.asarray(bound * after / before)
+    return rounded(bound * after / before, 1.0, BOUND_DIGITS)
 
 
 def room_at_one(design: ControlDesign, tube: dict[str, Any]) -> np.ndarray:

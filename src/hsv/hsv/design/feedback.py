@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
-from cvxpy.atoms.affine.bmat import bmat
-from cvxpy.atoms.affine.trace import trace
 
+from hsv.design.centring import Unknown, minimise
 from hsv.design.lmi import SolverReport, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
+from hsv.design.rounding import GAIN_DIGITS, rounded, rounded_matrix
 from hsv.design.scaling import Whitening, lqr_whitening
-from hsv.design.solver import solve
 from hsv.errors import DesignError
 
 METHODS = ("guaranteed_cost", "feasibility")
+
+_NAME = "feedback gain F, LMI (24)"
 
 _LITERAL_CONDITION = 1e4
 """Bound on the condition number of N, whitened, in the literal problem: without one it has no bounded answer."""
@@ -29,9 +29,9 @@ _STRICT = 1e-6
 class FeedbackGain:
     """F = M N^-1 with its evidence.
 
-    ``F`` (m, n), ``M`` (m, n), ``N`` (n, n) in SI; ``residuals`` (r) the smallest eigenvalue of (24) at each vertex,
-    recomputed in coordinates where N is the identity, so that 1 - residual is the contraction of e' N^-1 e's root;
-    ``radii`` (r) the closed-loop spectral radii.
+    ``F`` (m, n) and ``N`` (n, n) in SI, rounded, ``M`` (m, n) = F N; ``residuals`` (r) the smallest eigenvalue of (24)
+    at each vertex, recomputed in coordinates where N is the identity, so that 1 - residual is the contraction of the
+    root of e' N^-1 e; ``radii`` (r) the closed-loop spectral radii.
     """
 
     F: np.ndarray
@@ -82,53 +82,54 @@ def feedback_gain(
         raise DesignError(f"feedback.method = {method!r}: expected one of {', '.join(METHODS)}")
     white = lqr_whitening(A, B, state_scale, input_scale)
     A_white, B_white = white.dynamics(A, B)
-    n, m = B.shape[1:]
-    N = cp.Variable((n, n), symmetric=True)
-    M = cp.Variable((m, n))
-    if method == "guaranteed_cost":
-        problem = _guaranteed_cost(N, M, A_white, B_white, white, disturbance, state_scale)
-    else:
-        problem = _feasibility(N, M, A_white, B_white)
-    solver = solve(problem, "feedback gain F, LMI (24)")
-    N_white, M_white = np.asarray(N.value), np.asarray(M.value)
-    N_si, M_si = white.covariance(N_white), white.cross(M_white)
+    found = (_guaranteed_cost if method == "guaranteed_cost" else _feasibility)(
+        A_white, B_white, white, disturbance, state_scale
+    )
+    (N_white, M_white, *_), solver = found
     F = white.gain(np.linalg.solve(N_white, M_white.T).T)
-    residuals = lyapunov_residuals(A + B @ F, N_si, "feedback gain F, LMI (24)")
-    return FeedbackGain(F, M_si, N_si, residuals, spectral_radii(A + B @ F), method, solver)
+    F = rounded(F, input_scale[:, None] / state_scale, GAIN_DIGITS)
+    N = rounded_matrix(white.covariance(N_white))
+    residuals = lyapunov_residuals(A + B @ F, N, _NAME)
+    return FeedbackGain(F, F @ N, N, residuals, spectral_radii(A + B @ F), method, solver)
+
+
+Found = tuple[list[np.ndarray], SolverReport]
 
 
 def _guaranteed_cost(
-    N: cp.Variable,
-    M: cp.Variable,
-    A: np.ndarray,
-    B: np.ndarray,
-    white: Whitening,
-    disturbance: np.ndarray,
-    state_scale: np.ndarray,
-) -> cp.Problem:
+    A: np.ndarray, B: np.ndarray, white: Whitening, disturbance: np.ndarray, state_scale: np.ndarray
+) -> Found:
     n, m = B.shape[1:]
     columns = white.to_white @ disturbance
     columns = columns / np.linalg.norm(columns, 2)
     d = columns.shape[1]
     root = white.from_white / state_scale[:, None]
-    Z = cp.Variable((d, d), symmetric=True)
-    constraints = [bmat([[Z, columns.T], [columns, N]]) >> 0]
-    for A_i, B_i in zip(A, B, strict=True):
-        S = A_i @ N + B_i @ M
-        blocks = [
-            [N, S.T, (root @ N).T, M.T],
-            [S, N, np.zeros((n, n)), np.zeros((n, m))],
-            [root @ N, np.zeros((n, n)), np.eye(n), np.zeros((n, m))],
-            [M, np.zeros((m, n)), np.zeros((m, n)), np.eye(m)],
-        ]
-        constraints.append(bmat(blocks) >> 0)
-    return cp.Problem(cp.Minimize(trace(Z)), constraints)
+
+    def inequalities(N: np.ndarray, M: np.ndarray, Z: np.ndarray) -> list[np.ndarray]:
+        blocks = [np.block([[Z, columns.T], [columns, N]])]
+        for A_i, B_i in zip(A, B, strict=True):
+            S = A_i @ N + B_i @ M
+            rows = [
+                [N, S.T, (root @ N).T, M.T],
+                [S, N, np.zeros((n, n)), np.zeros((n, m))],
+                [root @ N, np.zeros((n, n)), np.eye(n), np.zeros((n, m))],
+                [M, np.zeros((m, n)), np.zeros((m, n)), np.eye(m)],
+            ]
+            blocks.append(np.block(rows))
+        return blocks
+
+    unknowns = Unknown((n, n), symmetric=True), Unknown((m, n)), Unknown((d, d), symmetric=True)
+    return minimise(unknowns, lambda N, M, Z: float(np.trace(Z)), inequalities, _NAME)
 
 
-def _feasibility(N: cp.Variable, M: cp.Variable, A: np.ndarray, B: np.ndarray) -> cp.Problem:
-    n = A.shape[1]
-    constraints = [N >> np.eye(n), N << _LITERAL_CONDITION * np.eye(n)]
-    for A_i, B_i in zip(A, B, strict=True):
-        S = A_i @ N + B_i @ M
-        constraints.append(bmat([[N, S.T], [S, N]]) >> _STRICT * np.eye(2 * n))
-    return cp.Problem(cp.Minimize(0), constraints)
+def _feasibility(A: np.ndarray, B: np.ndarray, *_: object) -> Found:
+    n, m = B.shape[1:]
+
+    def inequalities(N: np.ndarray, M: np.ndarray) -> list[np.ndarray]:
+        blocks = [N - np.eye(n), _LITERAL_CONDITION * np.eye(n) - N]
+        for A_i, B_i in zip(A, B, strict=True):
+            S = A_i @ N + B_i @ M
+            blocks.append(np.block([[N, S.T], [S, N]]) - _STRICT * np.eye(2 * n))
+        return blocks
+
+    return minimise((Unknown((n, n), symmetric=True), Unknown((m, n))), lambda N, M: 0.0, inequalities, _NAME)

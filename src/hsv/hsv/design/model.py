@@ -11,6 +11,7 @@ import numpy as np
 
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import ModelInputs
+from hsv.design.rounding import VERTEX_DIGITS, rounded
 from hsv.errors import DesignError
 from hsv.lpv.accuracy import model_accuracy, off_grid
 from hsv.lpv.discretisation import zero_order_hold
@@ -102,6 +103,9 @@ def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequ
         "singular_values": [values[:8].tolist() for values in singular_values],
     }
     polytope = whole if inputs.system == "DM" else _vehicle(whole, Filter(*series(continuous(notch))))
+    polytope = _rounded(polytope, scales[0][:N_STATES], scales[1])
+    if inputs.system == "DM":
+        whole = polytope
     return DesignModel(polytope, whole, interpolation, altitude_samples, velocity_samples, report)
 
 
@@ -124,6 +128,13 @@ def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequenc
         inputs.period,
     )
     return replace(model, report=model.report | {"accuracy": accuracy.report()})
+
+
+def _rounded(polytope: Polytope, state_scale: np.ndarray, input_scale: np.ndarray) -> Polytope:
+    """Return the vertices without the digits on which processors differ; what no physics makes becomes zero."""
+    A = rounded(polytope.A, state_scale[:, None] / state_scale, VERTEX_DIGITS)
+    B = rounded(polytope.B, state_scale[:, None] / input_scale, VERTEX_DIGITS)
+    return Polytope(A, B, polytope.altitude, polytope.velocity)
 
 
 def _vehicle(whole: Polytope, notch: Filter) -> Polytope:

@@ -12,30 +12,24 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
-from cvxpy.atoms.affine.bmat import bmat
 
+from hsv.design.centring import Unknown, minimise
 from hsv.design.lmi import SolverReport, smallest_eigenvalues, spectral_radii
 from hsv.design.nominal_problem import NominalProblem, certified_cost
+from hsv.design.rounding import GAIN_DIGITS, rounded, rounded_matrix
 from hsv.design.scaling import Whitening, lqr_whitening
-from hsv.design.solver import solve
 from hsv.errors import DesignError
-
-_MARGIN = 1e-5
-"""Relative margin inside which (33) and the nesting are solved, so that they hold exactly afterwards."""
-
-_INPUT_MARGIN = 1e-3
-"""The same for (35), of which the solver's accuracy is lower where the bound is tight."""
 
 
 @dataclass(frozen=True)
 class NominalGain:
     """K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
 
-    ``K`` (m, n), ``Y`` (m, n), ``Q`` (n, n) in SI; ``gamma`` (s) the bound of (32) as solved, ``certified_gamma`` (s)
-    as recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those of the returned
-    matrices: ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit diagonal;
+    ``K`` (m, n) and ``Q`` (n, n) in SI, rounded, ``Y`` (m, n) = K Q; ``gamma`` (s) the bound of (32) as solved,
+    ``certified_gamma`` (s) as recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those
+    of the returned matrices: ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit
+    diagonal;
     ``state`` 1 minus the level of the design state, (33); ``input`` (m) 1 minus the largest squared input over its
     squared bound, (35); ``nesting`` smallest eigenvalue of 1 - Q, Q measured in the ellipsoid outside; ``radii`` (r)
     closed-loop spectral radii.
@@ -119,39 +113,43 @@ def _solve(
 ) -> NominalGain:
     n, m = problem.B.shape[1:]
     # With the state at unit length and inputs in units of their bounds, everything sought comes out near one.
-    x = (1.0 + _MARGIN) * white.to_white @ state
+    x = white.to_white @ state
     size = float(np.linalg.norm(x))
     x /= size
-    bound = (1.0 - _INPUT_MARGIN) * problem.input_bound / (white.input_scale * size)
+    bound = problem.input_bound / (white.input_scale * size)
     A, B = white.dynamics(problem.A, problem.B)
     B = B * bound
     state_root = white.from_white / problem.state_scale[:, None]
     input_root = np.diag(bound)
-    Q = cp.Variable((n, n), symmetric=True)
-    Y = cp.Variable((m, n))
-    gamma = cp.Variable()
-    # X of (35) at its bound, which loses nothing.
-    constraints = [
-        bmat([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]) >> 0,
-        bmat([[np.eye(m), Y], [Y.T, Q]]) >> 0,
-    ]
-    for A_i, B_i in zip(A, B, strict=True):
-        S = A_i @ Q + B_i @ Y
+    limit = None if outside is None else white.to_white @ outside @ white.to_white.T / size**2
+
+    def inequalities(Q: np.ndarray, Y: np.ndarray, gamma: np.ndarray) -> list[np.ndarray]:
+        # X of (35) at its bound, which loses nothing.
         blocks = [
-            [Q, S.T, (state_root @ Q).T, (input_root @ Y).T],
-            [S, Q, np.zeros((n, n)), np.zeros((n, m))],
-            [state_root @ Q, np.zeros((n, n)), gamma * np.eye(n), np.zeros((n, m))],
-            [input_root @ Y, np.zeros((m, n)), np.zeros((m, n)), gamma * np.eye(m)],
+            np.block([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]),
+            np.block([[np.eye(m), Y], [Y.T, Q]]),
         ]
-        constraints.append(bmat(blocks) >> 0)
-    if outside is not None:
-        limit = white.to_white @ outside @ white.to_white.T / size**2
-        constraints.append(Q << (1.0 - _MARGIN) * 0.5 * (limit + limit.T))
-    solver = solve(cp.Problem(cp.Minimize(gamma), constraints), name)
-    Q_white, Y_white = np.asarray(Q.value) * size**2, bound[:, None] * np.asarray(Y.value) * size**2
-    K = white.gain(np.linalg.solve(Q_white, Y_white.T).T)
-    cost = float(np.asarray(gamma.value)) * size**2 * problem.period
-    return _verified(problem, state, outside, K, white.cross(Y_white), white.covariance(Q_white), cost, solver, name)
+        for A_i, B_i in zip(A, B, strict=True):
+            S = A_i @ Q + B_i @ Y
+            rows = [
+                [Q, S.T, (state_root @ Q).T, (input_root @ Y).T],
+                [S, Q, np.zeros((n, n)), np.zeros((n, m))],
+                [state_root @ Q, np.zeros((n, n)), gamma * np.eye(n), np.zeros((n, m))],
+                [input_root @ Y, np.zeros((m, n)), np.zeros((m, n)), gamma * np.eye(m)],
+            ]
+            blocks.append(np.block(rows))
+        return blocks if limit is None else [*blocks, limit - Q]
+
+    (Q, Y, gamma), solver = minimise(
+        (Unknown((n, n), symmetric=True), Unknown((m, n)), Unknown((1, 1))),
+        lambda Q, Y, gamma: gamma[0, 0],
+        inequalities,
+        name,
+    )
+    K = white.gain(np.linalg.solve(Q, (bound[:, None] * Y).T).T)
+    K = rounded(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
+    Q_si = rounded_matrix(white.covariance(Q * size**2))
+    return _verified(problem, state, outside, K, Q_si, gamma[0, 0] * size**2 * problem.period, solver, name)
 
 
 def _verified(
@@ -159,7 +157,6 @@ def _verified(
     state: np.ndarray,
     outside: np.ndarray | None,
     K: np.ndarray,
-    Y: np.ndarray,
     Q: np.ndarray,
     gamma: float,
     solver: SolverReport,
@@ -181,4 +178,4 @@ def _verified(
         if nesting < 0.0:
             raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
     radii = spectral_radii(problem.A + problem.B @ K)
-    return NominalGain(K, Y, Q, gamma, certified, level, decrease, inputs, nesting, radii, solver)
+    return NominalGain(K, K @ Q, Q, gamma, certified, level, decrease, inputs, nesting, radii, solver)

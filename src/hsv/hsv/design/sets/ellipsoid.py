@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-import cvxpy as cp
 import numpy as np
-from cvxpy.atoms.affine.bmat import bmat
-from cvxpy.atoms.affine.diag import diag
-from cvxpy.atoms.affine.hstack import hstack
-from cvxpy.atoms.affine.trace import trace
 from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
+from hsv.design.centring import Unknown, minimise
+from hsv.design.rounding import MATRIX_DIGITS, rounded, rounded_matrix
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.design.solver import solve
 from hsv.errors import DesignError
 
 _INFLATION = 1.002
-"""Factor on the solver's Q, so that the inequality holds in spite of the solver's accuracy."""
-
-_LEAST_MULTIPLIER = 1e-5
-"""Least multiplier of a channel, share of 1 - lam."""
+"""Factor on Q, so that the set is invariant for gains, too, that are tuned in their sixth digit."""
 
 
 def ellipsoid(
@@ -65,31 +58,29 @@ def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> Elli
     A = inverse @ problem.system.A @ T
     G = inverse @ G0
     r, n, d = G.shape
-    Q = cp.Variable((n, n), symmetric=True)
-    shift = cp.Variable(n)
-    multipliers = cp.Variable((r, d), nonneg=True)
     weighted = weight.T @ T
-    constraints = [cp.sum(multipliers, axis=1) <= 1.0 - contraction]
-    for i in range(r):
-        drift = G[i, :, -1] + (A[i] - np.eye(n)) @ shift
-        columns = hstack([G[i, :, :-1], cp.reshape(drift, (n, 1), order="C")])
-        AQ = A[i] @ Q
-        constraints.append(
-            bmat(
-                [
-                    [contraction * Q, np.zeros((n, d)), AQ.T],
-                    [np.zeros((d, n)), diag(multipliers[i]), columns.T],
-                    [AQ, columns, Q],
-                ]
-            )
-            >> 0
-        )
-    objective = cp.Minimize(trace(weighted @ Q @ weighted.T))
-    solver = solve(cp.Problem(objective, constraints), f"ellipsoid, contraction {contraction}")
-    Q_si = T @ np.asarray(Q.value) @ T.T
-    Q_si = _INFLATION * 0.5 * (Q_si + Q_si.T)
-    centre = guess + T @ np.asarray(shift.value)
-    # A share for every channel: the smallest disturbances are at the level of the solver's accuracy.
-    values = np.maximum(np.asarray(multipliers.value), 0.0) + _LEAST_MULTIPLIER * (1.0 - contraction)
-    values *= (1.0 - contraction) / values.sum(axis=1, keepdims=True)
-    return from_shape(problem, centre, Q_si, contraction, values, solver)
+
+    def inequalities(Q: np.ndarray, shift: np.ndarray, multipliers: np.ndarray) -> list[np.ndarray]:
+        blocks = [np.diag(1.0 - contraction - multipliers.sum(axis=1))]
+        for A_i, G_i, l_i in zip(A, G, multipliers, strict=True):
+            drift = G_i[:, -1:] + (A_i - np.eye(n)) @ shift
+            columns = np.hstack((G_i[:, :-1], drift))
+            AQ = A_i @ Q
+            rows = [
+                [contraction * Q, np.zeros((n, d)), AQ.T],
+                [np.zeros((d, n)), np.diag(l_i), columns.T],
+                [AQ, columns, Q],
+            ]
+            blocks.append(np.block(rows))
+        return blocks
+
+    (Q, shift, multipliers), solver = minimise(
+        (Unknown((n, n), symmetric=True), Unknown((n, 1)), Unknown((r, d))),
+        lambda Q, shift, multipliers: float(np.trace(weighted @ Q @ weighted.T)),
+        inequalities,
+        f"ellipsoid, contraction {contraction}",
+    )
+    Q_si = rounded_matrix(_INFLATION * T @ Q @ T.T)
+    centre = rounded(guess + T @ shift[:, 0], np.sqrt(np.diag(Q_si)), MATRIX_DIGITS)
+    multipliers = rounded(multipliers, 1.0 - contraction, MATRIX_DIGITS)
+    return from_shape(problem, centre, Q_si, contraction, multipliers, solver)

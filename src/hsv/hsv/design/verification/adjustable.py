@@ -15,7 +15,7 @@ from hsv.design.factor import relaxed_bound
 from hsv.design.nominal_problem import certified_cost
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, vertex_residuals
 from hsv.design.tightening import tighten
-from hsv.design.verification.claims import Claim, Subject, above, at_most, same
+from hsv.design.verification.claims import Claim, Subject, above, at_most, same, same_parameter
 from hsv.design.verification.invariant_set import stored_set
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.parameters import vehicle_parameters
@@ -31,33 +31,34 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     complete = yield from _set_claims("Z at tau = 1", one, stored["complete"])
     incomplete = yield from _set_claims("Z' of the unrelaxed plan", design, stored["incomplete"])
     tau = np.append(design.tau_minimum, np.full(len(complete.half_width) - N_RIGID, design.tau_minimum[-1]))
-    yield same("tau Z, half-widths", stored["scaled_half_width"], tau * complete.half_width)
+    yield same("tau Z, half-widths", stored["scaled_half_width"], tau * complete.half_width, "half-widths")
+    yield same_parameter(subject, "feedback.tau", design.tau, stored["tau"])
     inputs = subject.inputs
     target = inputs.nominal.target
     trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
     bounds = (tighten(found, design.input_minimum, design.input_maximum) for found in (complete, incomplete))
     relaxed = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, *bounds)
-    yield same("(52) bounds of |u_n|", stored["input_bound"], relaxed)
+    yield same("(52) bounds of |u_n|", stored["input_bound"], relaxed, "relaxed bounds")
     single = stored["single_gain"]
     Q = np.array(single["Q"])
     K = np.linalg.solve(Q, np.array(single["Y"]).T).T
     gamma, _ = certified_cost(nominal_problem(inputs, design.polytope, relaxed), K, Q, "single nominal gain K'")
-    yield same("certified cost of the single K'", gamma, single["certified_gamma"], 1e-6)
+    yield same("certified cost of the single K'", gamma, single["certified_gamma"], "certified costs")
     full = stored["full_state"]
     parts = largest_real_parts(design, np.array(full["gain"]), (target.altitude, target.velocity))
     for coupling, value in parts["structured"].items():
         yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", value, 0.0)
     derived = parts["full_state"]["derived"]
     yield above("the same with the full-state F', derived coupling", derived, 0.0)
-    yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], 1e-6)
+    yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], "rightmost poles")
 
 
 def _set_claims(name: str, design: ControlDesign, stored: dict[str, Any]) -> Generator[Claim, None, EllipsoidSet]:
     found = stored_set(design, stored)
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield above(f"{name}, invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0)
-    yield same(f"{name}, half-widths from Q", stored["invariant_set"]["half_width"], found.half_width)
+    yield same(f"{name}, half-widths from Q", stored["invariant_set"]["half_width"], found.half_width, "half-widths")
     bounds, kept = tighten(found, design.input_minimum, design.input_maximum), stored["tightening"]
-    yield same(f"{name}, what it leaves of the inputs, lower", kept["lower"], bounds.lower)
-    yield same(f"{name}, what it leaves of the inputs, upper", kept["upper"], bounds.upper)
+    yield same(f"{name}, what it leaves of the inputs, lower", kept["lower"], bounds.lower, "tightened bounds")
+    yield same(f"{name}, what it leaves of the inputs, upper", kept["upper"], bounds.upper, "tightened bounds")
     return found

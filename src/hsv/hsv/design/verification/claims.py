@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsv.control.design_file import ControlDesign
+from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.errors import DesignError
 
 if TYPE_CHECKING:
     from hsv.design.inputs import DesignInputs
+    from hsv.design.model import DesignModel
 
 
 @dataclass(frozen=True)
@@ -52,27 +54,41 @@ class Subject:
 
         return inputs_from_report(self.certificate["inputs"])
 
+    @cached_property
+    def model(self) -> DesignModel:
+        """The polytopic model recomputed from those inputs and the vehicle; a second or two. Not for nodes."""
+        from hsv.design.model import polytopic_model
+        from hsv.vehicle.parameters import vehicle_parameters
+
+        return polytopic_model(self.inputs.model, vehicle_parameters("decoupled"), self.design.notch)
+
 
 def required(claim: Claim) -> Claim:
     """Return ``claim`` as one without which a design must not fly."""
     return replace(claim, required=True)
 
 
-def same(name: str, value: Any, expected: Any, tolerance: float = 1e-9, floor: Any = 0.0) -> Claim:
-    """Claim that every entry of ``value`` is that of ``expected`` to a relative ``tolerance``, or to ``floor``."""
+def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Claim:
+    """Claim that every entry of ``value`` is that of ``expected``, within a tolerance named in the table."""
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:
         return Claim(name, f"shape {value.shape}", f"shape {expected.shape}", False)
-    allowed = tolerance * np.abs(expected) + floor
-    difference = np.abs(value - expected)
-    excess = np.where(difference <= allowed, 0.0, difference)
-    excess[np.isnan(excess)] = np.inf
-    worst = np.unravel_index(int(np.argmax(excess)), excess.shape) if excess.size else ()
-    if excess.size == 0 or excess[worst] == 0.0:
-        relative = float(np.max(difference / np.maximum(np.abs(expected), 1e-300), initial=0.0, where=expected != 0.0))
-        return Claim(name, relative, f"a relative difference of at most {tolerance:g}", True)
+    allowed = TOLERANCES[tolerance].allowed(expected, size)
+    shares = np.abs(value - expected) / allowed
+    shares = np.where(np.isnan(shares), np.inf, shares)
+    if shares.max(initial=0.0) <= 1.0:
+        return Claim(name, float(shares.max(initial=0.0)), "at most 1 tolerance", True)
+    worst = np.unravel_index(int(np.argmax(shares)), shares.shape)
     where = "" if value.ndim == 0 else f"[{', '.join(str(i) for i in worst)}]"
     return Claim(f"{name}{where}", float(value[worst]), f"{float(expected[worst])!r}", False)
+
+
+def same_parameter(
+    subject: Subject, parameter: str, value: Any, expected: Any, name: str = "", index: Any = ...
+) -> Claim:
+    """Claim that every entry of ``value``, a parameter of the design file or its part ``[index]``, is as expected."""
+    size = entry_size(parameter, subject.certificate)[index]
+    return same(name or parameter, value, expected, PARAMETERS[parameter], size)
 
 
 def at_most(name: str, value: float, limit: float) -> Claim:
@@ -85,12 +101,10 @@ def above(name: str, value: float, limit: float) -> Claim:
     return Claim(name, float(value), f"above {limit:g}", bool(value > limit))
 
 
-def inverse(name: str, P: np.ndarray, Q: np.ndarray) -> Claim:
-    """Claim that P = Q^-1, entry by entry; entries that all but vanish beside their diagonal to that size."""
-    expected = np.linalg.inv(Q)
-    expected = 0.5 * (expected + expected.T)
-    size = np.sqrt(np.diag(expected))
-    return same(name, P, expected, 1e-6, 1e-11 * np.outer(size, size))
+def inverse(Q: np.ndarray) -> np.ndarray:
+    """Return Q^-1, symmetric."""
+    P = np.linalg.inv(Q)
+    return np.asarray(0.5 * (P + P.T))
 
 
 def gathered(name: str, claims: Callable[[], Iterable[Claim]]) -> list[Claim]:

@@ -8,23 +8,25 @@ import numpy as np
 
 from hsv.design.factor import certified_loops, room_at_one
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.verification.claims import Claim, Subject, above, required, same
+from hsv.design.verification.claims import Claim, Subject, above, required, same, same_parameter
 from hsv.vehicle.dynamics import N_RIGID
 
 
 def factor_claims(subject: Subject) -> Iterable[Claim]:
     """Recompute what the range of the factor rests on; that of a design without one is 1 alone."""
     design, stored = subject.design, subject.certificate.get("adjustable")
+    filtered = stored is not None
+    yield required(Claim("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
     if stored is None:
-        yield required(same("feedback.tau_minimum", design.tau_minimum, np.ones(N_RIGID)))
+        yield required(same_parameter(subject, "feedback.tau_minimum", design.tau_minimum, np.ones(N_RIGID)))
         return
-    yield required(same("feedback.tau_minimum", design.tau_minimum, stored["tau_minimum"]))
+    yield required(same_parameter(subject, "feedback.tau_minimum", design.tau_minimum, stored["tau_minimum"]))
     effectiveness = subject.certificate["inputs"]["disturbance"]["elevator_effectiveness"]
     residuals = lyapunov_residuals(
         certified_loops(design, effectiveness), np.array(stored["lyapunov"]["N"]), "common Lyapunov function"
     )
     yield required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0))
-    yield same("its eigenvalues as certified", residuals, stored["lyapunov"]["lmi_smallest_eigenvalues"], 1e-6, 1e-9)
+    yield same("its eigenvalues as certified", residuals, stored["lyapunov"]["lmi_smallest_eigenvalues"], "eigenvalues")
     room = room_at_one(design, subject.certificate["tube"])
-    yield same("room of the nominal plan at tau = 1", stored["room_at_one"], room, 1e-6, 1e-9)
+    yield same("room of the nominal plan at tau = 1", stored["room_at_one"], room, "room of plans")
     yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))

@@ -16,6 +16,7 @@ from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most, same
 from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.tolerances import ROUNDING, TOLERANCES
 
 _FLIGHTS, _FLIGHT_SEED = 48, 7
 """How many corners, drawn with which seed, are flown again beside those that set a bound."""
@@ -32,7 +33,7 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
     setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
     again = measure(region, model, [seen[i] for i in setters]).channels
     for side, value in (("lower", again.lower), ("upper", again.upper)):
-        yield same(f"measured disturbances, {side}", value, measured[side], 1e-6, 1e-12)
+        yield same(f"measured disturbances, {side}", value, measured[side], "flights")
     found = certified_set(subject)
     flown = _sample(region, found, model)
     yield from _worst("flown corners", flown, stored["flights"])
@@ -40,8 +41,8 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
     low, high = plan["pitch_acceleration"]
     least, most = np.append(plan["lowest"], low), np.append(plan["highest"], high)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
-    yield above("nominal plan of flown corners, lowest", float(np.min(lowest - least)), -1e-9)
-    yield above("nominal plan of flown corners, highest", float(np.min(most - highest)), -1e-9)
+    yield above("nominal plan of flown corners, lowest", float(np.min(lowest - least)), -ROUNDING)
+    yield above("nominal plan of flown corners, highest", float(np.min(most - highest)), -ROUNDING)
     if "adjustable" in subject.certificate:
         flown = _sample(Region(design, subject.inputs, 1.0), found, model)
         yield from _worst("flown corners, whole fault", flown, subject.certificate["adjustable"]["complete_fault"])
@@ -57,10 +58,11 @@ def _sample(region: Region, found: EllipsoidSet, model: ChannelModel) -> list[Fl
 
 
 def _worst(name: str, flown: list[FlightEvidence], kept: dict[str, Any]) -> Iterable[Claim]:
+    allowance = 1.0 + TOLERANCES["flights"].relative
     level = max(f.level or 0.0 for f in flown)
-    yield at_most(f"level of {name}", level, min(1.0, kept["worst_level"] * (1.0 + 1e-6)))
+    yield at_most(f"level of {name}", level, min(1.0, kept["worst_level"] * allowance))
     ratio = max(f.membership.ratio for f in flown)
-    yield at_most(f"disturbances of {name}", ratio, kept["disturbance_membership"]["worst_ratio"] * (1.0 + 1e-6))
+    yield at_most(f"disturbances of {name}", ratio, kept["disturbance_membership"]["worst_ratio"] * allowance)
 
 
 def sequence_claims(subject: Subject) -> Iterable[Claim]:
@@ -68,4 +70,6 @@ def sequence_claims(subject: Subject) -> Iterable[Claim]:
     kept: dict[str, Any] = subject.certificate["tube"]["invariant_set"]["sampling"]
     drawn = sample(certified_set(subject), kept["sequences"], kept["steps"], kept["seed"])
     yield at_most("worst level of random sequences", drawn["worst_level"], 1.0)
-    yield same("worst level of random sequences as certified", drawn["worst_level"], kept["worst_level"], 1e-6)
+    yield same(
+        "worst level of random sequences as certified", drawn["worst_level"], kept["worst_level"], "random sequences"
+    )

@@ -10,8 +10,9 @@ import numpy as np
 from hsv.design.lmi import smallest_eigenvalues, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.nominal_problem import NominalProblem, certified_cost, step_deviation
-from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same
-from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, STATE_NAMES
+from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
+from hsv.design.verification.tolerances import ROUNDING
+from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
 from hsv.vehicle.parameters import vehicle_parameters
 
 
@@ -20,13 +21,13 @@ def feedback_claims(subject: Subject) -> Iterable[Claim]:
     design, stored = subject.design, subject.certificate["feedback"]
     A, B, F = design.polytope.A, design.polytope.B, design.feedback_gain
     N = np.array(stored["N"])
-    yield same("feedback.gain = M N^-1", F[:, :N_RIGID], _quotient(np.array(stored["M"]), N))
-    yield same("feedback.gain on flexible states", F[:, N_RIGID:], np.zeros_like(F[:, N_RIGID:]))
+    yield same_parameter(subject, "feedback.gain", F, _quotient(np.array(stored["M"]), N), "feedback.gain = M N^-1")
     rigid = A[:, :N_RIGID, :N_RIGID] + B[:, :N_RIGID] @ F[:, :N_RIGID]
     residuals = lyapunov_residuals(rigid, N, "feedback gain F, LMI (24)")
     yield required(above("(24) smallest eigenvalue", residuals.min(), 0.0))
-    yield same("(24) eigenvalues as certified", residuals, stored["lmi_smallest_eigenvalues"], 1e-6, 1e-9)
-    yield same("spectral radii of A + BF as certified", spectral_radii(rigid), stored["spectral_radii"], 1e-9)
+    yield same("(24) eigenvalues as certified", residuals, stored["lmi_smallest_eigenvalues"], "eigenvalues")
+    radii = stored["spectral_radii"]
+    yield same("spectral radii of A + BF as certified", spectral_radii(rigid), radii, "spectral radii")
     yield required(at_most("spectral radius of A + BF, all states", spectral_radii(A + B @ F).max(), 1.0 - 1e-6))
 
 
@@ -42,23 +43,24 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         _sizes(inputs["input_scale"], INPUT_NAMES),
         input_bound(subject),
     )
-    yield same("nominal.state_scale", design.nominal_state_scale, problem.state_scale)
-    yield same("nominal.input_scale", design.nominal_input_scale, problem.input_scale)
-    yield same("nominal.input_bound", design.nominal_input_bound, problem.input_bound)
+    yield same_parameter(subject, "nominal.state_scale", design.nominal_state_scale, problem.state_scale)
+    yield same_parameter(subject, "nominal.input_scale", design.nominal_input_scale, problem.input_scale)
+    yield same_parameter(subject, "nominal.input_bound", design.nominal_input_bound, problem.input_bound)
     stored = subject.certificate["nominal"]
     sizes = [float(len(design.nominal_gains)), float(len(design.nominal_ellipsoids))]
-    yield same("number of nominal gains and ellipsoids", sizes, [float(len(inputs["scales"]))] * 2)
+    yield same("number of nominal gains and ellipsoids", sizes, [float(len(inputs["scales"]))] * 2, "copied")
     points = [(inputs[point]["altitude"], inputs[point]["velocity"]) for point in ("start", "target")]
     start = step_deviation(vehicle_parameters("decoupled"), points[0], points[1])
     ellipsoids = [np.array(one["Q"]) for one in stored]
     for i, (one, Q, scale) in enumerate(zip(stored, ellipsoids, inputs["scales"], strict=True)):
         K = design.nominal_gains[i]
-        yield same(f"nominal.gains[{i}] = Y Q^-1", K[:, :N_RIGID], _quotient(np.array(one["Y"]), Q))
-        yield same(f"nominal.gains[{i}] on flexible states", K[:, N_RIGID:], np.zeros_like(K[:, N_RIGID:]))
-        yield inverse(f"nominal.ellipsoids[{i}] = Q^-1", design.nominal_ellipsoids[i], Q)
+        quotient = _quotient(np.array(one["Y"]), Q)
+        yield same_parameter(subject, "nominal.gains", K, quotient, f"nominal.gains[{i}] = Y Q^-1")
+        P, name = design.nominal_ellipsoids[i], f"nominal.ellipsoids[{i}] = Q^-1"
+        yield same_parameter(subject, "nominal.ellipsoids", P, inverse(Q), name, i)
         gamma, residuals = certified_cost(problem, K[:, :N_RIGID], Q, f"nominal gain {i}")
-        yield same(f"certified cost of gain {i}", gamma, one["certified_gamma"], 1e-6)
-        yield above(f"(34) smallest eigenvalue of gain {i}", residuals.min(), -1e-9)
+        yield same(f"certified cost of gain {i}", gamma, one["certified_gamma"], "certified costs")
+        yield above(f"(34) smallest eigenvalue of gain {i}", residuals.min(), -ROUNDING)
         x = scale * start
         yield at_most(f"(33) level of the design state, gain {i}", float(x @ np.linalg.solve(Q, x)), 1.0)
         reach = np.einsum("ij,jk,ik->i", K[:, :N_RIGID], Q, K[:, :N_RIGID]) / problem.input_bound**2
@@ -68,7 +70,7 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
     for i, (outer, inner) in enumerate(pairwise(ellipsoids)):
         factor = np.linalg.inv(np.linalg.cholesky(outer))
         room = float(smallest_eigenvalues(np.eye(len(outer)) - factor @ inner @ factor.T))
-        yield above(f"ellipsoid {i + 1} inside the one before", room, -1e-12)
+        yield above(f"ellipsoid {i + 1} inside the one before", room, 0.0)
 
 
 def input_bound(subject: Subject) -> np.ndarray:
@@ -84,6 +86,8 @@ def _sizes(table: dict[str, float], names: tuple[str, ...]) -> np.ndarray:
 
 
 def _quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
-    """Return M N^-1, N scaled to a unit diagonal first."""
+    """Return the gain (2, 9) M N^-1, N scaled to a unit diagonal first; nothing acts on the flexible states."""
     scale = np.sqrt(np.diag(N))
-    return np.asarray(np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale)
+    gain = np.zeros((len(M), N_STATES))
+    gain[:, :N_RIGID] = np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale
+    return gain

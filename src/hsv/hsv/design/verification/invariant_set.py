@@ -12,7 +12,7 @@ from hsv.design.disturbance import DisturbanceSet, Extremes
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
-from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same
+from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
 
 
 def certified_set(subject: Subject) -> EllipsoidSet:
@@ -34,23 +34,24 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     yield Claim("tube parameters", str(design.tube is not None), "True", design.tube is not None)
     found = certified_set(subject)
     if design.tube is not None:
-        yield required(same("tube.centre", design.tube.centre, found.centre))
-        yield required(inverse("tube.shape = Q^-1", design.tube.shape, found.Q))
-        yield required(same("tube.half_width from Q", design.tube.half_width, found.half_width))
-    yield same("certified half-widths from Q", s["half_width"], found.half_width)
-    yield same("feedback half-ranges from Q", s["feedback_half_range"], found.feedback)
+        yield required(same_parameter(subject, "tube.centre", design.tube.centre, found.centre))
+        yield required(same_parameter(subject, "tube.shape", design.tube.shape, inverse(found.Q), "tube.shape = Q^-1"))
+        half_width, name = design.tube.half_width, "tube.half_width from Q"
+        yield required(same_parameter(subject, "tube.half_width", half_width, found.half_width, name))
+    yield same("certified half-widths from Q", s["half_width"], found.half_width, "half-widths")
+    yield same("feedback half-ranges from Q", s["feedback_half_range"], found.feedback, "half-widths")
     measured, inputs = stored["disturbance"]["measured"], subject.certificate["inputs"]["disturbance"]
     extremes = Extremes(*(np.array(measured[k]) for k in ("lower", "upper", "lower_flight", "upper_flight")))
     expected = extremes.structured(inputs["inflation"]).scaled(inputs["share"])
     given = found.problem.disturbance
-    yield same("disturbance bounds, lower", given.lower, expected.lower)
-    yield same("disturbance bounds, upper", given.upper, expected.upper)
+    yield same("disturbance bounds, lower", given.lower, expected.lower, "disturbance bounds")
+    yield same("disturbance bounds, upper", given.upper, expected.upper, "disturbance bounds")
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield required(above("invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0))
     yield required(at_most("level of e = 0", float(found.level(np.zeros(len(found.Q)))), 1.0))
     bounds, kept = tighten(found, design.input_minimum, design.input_maximum), stored["tightening"]
-    yield same("tightened bounds, lower", kept["lower"], bounds.lower)
-    yield same("tightened bounds, upper", kept["upper"], bounds.upper)
+    yield same("tightened bounds, lower", kept["lower"], bounds.lower, "tightened bounds")
+    yield same("tightened bounds, upper", kept["upper"], bounds.upper, "tightened bounds")
     plan = kept["plan"]
     margins = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
     yield above("room of the nominal plan", margins.min(), 0.0)
@@ -59,4 +60,6 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     yield Claim("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
     if design.plan_bounds is not None:
         for name, value in vars(design.plan_bounds).items():
-            yield same(f"nominal.{name} from the tightened bounds and plans", value, getattr(allowed, name))
+            parameter = f"nominal.{name}"
+            claimed = f"{parameter} from the tightened bounds and plans"
+            yield same_parameter(subject, parameter, value, getattr(allowed, name), claimed)

@@ -1,0 +1,187 @@
+"""The one table of tolerances of designs: ``python -m hsv.design.verification.tolerances > docs/tolerances.md``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far an entry may be from what it is recomputed to: the larger of two bounds.
+
+    ``relative`` to the recomputed entry, or ``absolute`` in scaled coordinates, a share of the entry's size; the latter
+    is what counts for entries that are zero, exactly or to rounding. ``size`` and ``reason`` are for the page.
+    """
+
+    relative: float
+    absolute: float
+    size: str
+    reason: str
+
+    def allowed(self, expected: np.ndarray, size: Any = 1.0) -> np.ndarray:
+        """Return the largest difference allowed of each entry, given the ``size`` that counts as one; both SI."""
+        return np.maximum(self.relative * np.abs(expected), self.absolute * np.asarray(size, float))
+
+
+_HEADER = """# Tolerances of designs
+Made by `python -m hsv.design.verification.tolerances > docs/tolerances.md`, the table that `hsv verify` computes with.
+
+Two processors do not round alike, and what a solver or an eigenvalue routine returns they do not even round in the same
+order. So what `hsv verify` recomputes may differ from what is written, an entry by the larger of two bounds: the
+*relative* one, of the recomputed entry, and the *absolute* one, a share of the entry's size in scaled coordinates. The
+second is for entries that are zero, or would be without rounding. An entry that is changed by ten times that fails, for
+every entry of every shipped design (`tests/design/verification/test_every_entry.py`).
+
+A design computed anew agrees with the shipped one if no entry is farther from it than 1e-3 of the larger of the entry
+and its size (`hsv design NAME --check`); found are 1e-6 and less ([why](design.md)).
+
+| entries | relative | absolute | of the size | reason |
+| --- | ---: | ---: | --- | --- |"""
+
+_GAIN = "scale of the input over that of the state, `[model.tensor_product]`"
+_DIAGONAL = "root of the product of the two diagonal entries"
+_ONE = "1 (SI)"
+
+TOLERANCES: dict[str, Tolerance] = {
+    "copied": Tolerance(1e-12, 1e-12, _ONE, "The same numbers, but for the rounding of a change of units."),
+    "model.a": Tolerance(
+        1e-7,
+        5e-12,
+        "scale of the row's state over that of the column's, `[model.tensor_product]`",
+        "The last function kept has a relative singular value of 1e-9: processors that round differently agree on its "
+        "direction to 1e-7, and on vertices to 1e-8. They are rounded to 1e-12 of their size, which "
+        "leaves zero of what no physics makes.",
+    ),
+    "model.b": Tolerance(
+        1e-7, 5e-12, "scale of the row's state over that of the input, `[model.tensor_product]`", "As model.a."
+    ),
+    "weights": Tolerance(
+        1e-6,
+        4e-8,
+        _ONE,
+        "As model.a; weights see that direction itself: 1.3e-8 between processors. The least that is not zero is 7e-6.",
+    ),
+    "sums": Tolerance(1e-9, 1e-9, _ONE, "Weights of a point sum to one."),
+    "feedback gain": Tolerance(1e-9, 1e-12, _GAIN, "M N^-1, with N scaled to a unit diagonal."),
+    "nominal gains": Tolerance(1e-8, 1e-11, _GAIN, "Y Q^-1, with Q scaled to a unit diagonal."),
+    "ellipsoids": Tolerance(
+        1e-6, 1e-10, _DIAGONAL, "Q^-1, with Q scaled to a unit diagonal; its least entries cancel."
+    ),
+    "relaxed bounds": Tolerance(
+        1e-7, 1e-9, _ONE, "A copy of the inputs' (baseline), or (52) recomputed from two sets (adjustable)."
+    ),
+    "centre": Tolerance(1e-9, 1e-9, "half-width of the set", "A copy of the certificate's."),
+    "half-widths": Tolerance(1e-9, 1e-12, "half-width of the set", "Roots of quadratic forms of Q."),
+    "plans": Tolerance(1e-9, 1e-9, "range of the certified plans", "Tightened bounds and plans, added up."),
+    "tightened bounds": Tolerance(1e-9, 1e-12, _ONE, "Limits of the inputs less half-ranges of the feedback."),
+    "disturbance bounds": Tolerance(1e-9, 1e-12, _ONE, "Measured ones, inflated."),
+    "eigenvalues": Tolerance(
+        1e-6,
+        1e-9,
+        _ONE,
+        "Of symmetric matrices scaled to a unit diagonal, through factors of condition 1e5.",
+    ),
+    "spectral radii": Tolerance(1e-8, 1e-8, _ONE, "Eigenvalues of matrices that are far from normal."),
+    "certified costs": Tolerance(1e-6, 1e-12, _ONE, "A largest eigenvalue, through two Cholesky factors."),
+    "rightmost poles": Tolerance(1e-6, 1e-6, _ONE, "Logarithms of eigenvalues near 1, over a period."),
+    "room of plans": Tolerance(1e-6, 1e-9, _ONE, "Differences of tightened bounds and plans."),
+    "inequalities": Tolerance(
+        0.0, 1e-9, _ONE, "Of (34) and of weights, which are at zero by construction; all others hold with room."
+    ),
+    "flights": Tolerance(
+        1e-6,
+        1e-12,
+        _ONE,
+        "Differences of states over a period: rounding is 1e-7 of the least channel.",
+    ),
+    "random sequences": Tolerance(1e-6, 1e-12, _ONE, "Levels after 600 contracting steps."),
+}
+"""By what is compared."""
+
+RECOMPUTED_DESIGN = 1e-3
+"""Largest deviation, in scaled coordinates, of a design that is computed anew."""
+
+PARAMETERS = {
+    "period": "copied",
+    "notch.zero_frequency": "copied",
+    "notch.zero_damping": "copied",
+    "notch.pole_frequency": "copied",
+    "notch.pole_damping": "copied",
+    "model.a": "model.a",
+    "model.b": "model.b",
+    "scheduling.altitude.breakpoints": "copied",
+    "scheduling.altitude.weights": "weights",
+    "scheduling.velocity.breakpoints": "copied",
+    "scheduling.velocity.weights": "weights",
+    "feedback.gain": "feedback gain",
+    "feedback.tau": "copied",
+    "feedback.tau_minimum": "copied",
+    "nominal.gains": "nominal gains",
+    "nominal.ellipsoids": "ellipsoids",
+    "nominal.state_scale": "copied",
+    "nominal.input_scale": "copied",
+    "nominal.input_bound": "relaxed bounds",
+    "input.minimum": "copied",
+    "input.maximum": "copied",
+    "tube.centre": "centre",
+    "tube.shape": "ellipsoids",
+    "tube.half_width": "half-widths",
+    "nominal.input_minimum": "plans",
+    "nominal.input_maximum": "plans",
+    "nominal.region_minimum": "plans",
+    "nominal.region_maximum": "plans",
+}
+"""The tolerance of every number of a design file."""
+
+
+ROUNDING = TOLERANCES["inequalities"].absolute
+"""By how much an inequality that is at zero by construction may seem to fail."""
+
+
+def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
+    """Return what counts as one for each entry of ``parameter``, an array that its own broadcasts to, SI.
+
+    Raises:
+        KeyError: A field that the certificate lacks.
+    """
+    kind = PARAMETERS[parameter]
+    if parameter.startswith("model.") or kind in ("feedback gain", "nominal gains"):
+        table = certificate["inputs"]["model"]["tensor_product"]
+        states = np.array([table["state_scale"][name] for name in STATE_NAMES])
+        inputs = np.array([table["input_scale"][name] for name in INPUT_NAMES])
+        rows, columns = {"model.a": (states, states), "model.b": (states, inputs)}.get(parameter, (inputs, states))
+        return np.asarray(rows[:, None] / columns)
+    described = certificate["tube"]["invariant_set"]
+    if kind == "ellipsoids":
+        Q = described["Q"] if parameter == "tube.shape" else [gain["Q"] for gain in certificate["nominal"]]
+        P = np.linalg.inv(np.array(Q))
+        roots = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
+        return np.asarray(roots[..., :, None] * roots[..., None, :])
+    if kind in ("centre", "half-widths"):
+        return np.array(described["half_width"])
+    if kind == "plans":
+        plan = certificate["tube"]["tightening"]["plan"]
+        low, high = plan["pitch_acceleration"]
+        ranges = np.append(np.subtract(plan["highest"], plan["lowest"]), high - low)
+        return ranges if "region" in parameter else ranges[: len(INPUT_NAMES)]
+    return np.ones(1)
+
+
+def page() -> str:
+    """Return the table as a page."""
+    lines = [_HEADER]
+    for kind, t in TOLERANCES.items():
+        names = [f"`{name}`" for name, its in PARAMETERS.items() if its == kind]
+        entries = f"{kind}: {', '.join(names)}" if names else kind
+        lines.append(f"| {entries} | {t.relative:g} | {t.absolute:g} | {t.size} | {t.reason} |")
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    print(page(), end="")
