@@ -67,7 +67,8 @@ def written(kit: SimpleNamespace, tmp_path: Path) -> Written:
             names["/clock"] = "rosgraph_msgs/msg/Clock"
         for name, kind in names.items():
             if not kind.endswith("/Ready") or step == 0:
-                data = kit.messages.serialize(kit.messages.make(kind))
+                given = {"clock": kit.messages.time(step * 10**7)} if name == "/clock" else {}
+                data = kit.messages.serialize(kit.messages.make(kind, **given))
                 log.append((name, step * 10**7, data))
                 writer.write(*log[-1])
     writer.close({"outcome": ""})
@@ -215,7 +216,7 @@ def _cut(length: int) -> Callable[[Path, SimpleNamespace], Path]:
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda path, kit: path, "holds 0 files"),
+        (lambda path, kit: path, "holds no file"),
         (lambda path, kit: path / "nowhere", "does not exist"),
         (_foreign, "no topic below /hsv/"),
         (_file(b""), "is empty"),
@@ -236,7 +237,7 @@ def test_unusable_input_is_one_clear_line(
 
 
 def test_missing_topic_and_damage_are_named(written: Written) -> None:
-    path, _ = written
+    path, log = written
     bag = Bag(path)
     for ask in (bag.columns, bag.messages, bag.times, bag.constants):
         with pytest.raises(RecordingError, match="no topic /hsv/nowhere, only /clock"):
@@ -247,14 +248,17 @@ def test_missing_topic_and_damage_are_named(written: Written) -> None:
     data = bytearray(file.read_bytes())
     data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0xFF
     file.write_bytes(data)
-    with pytest.raises(RecordingError, match=f"chunk at byte {chunk.chunk_start_offset} is damaged") as error:
-        Bag(path)
-    assert "\n" not in str(error.value)
+    damaged = Bag(path)
+    ((where, damage),) = damaged.loss.damages
+    assert (where, damage.offset, damage.what) == (file, chunk.chunk_start_offset, "a chunk")
+    found = sum(topic.count for topic in damaged.topics.values())
+    assert damaged.complete and damaged.loss.counted
+    assert 0 < damaged.loss.messages == len(log) - found < len(log) // 5
 
 
 def test_message_that_does_not_fit_its_definition_is_named(kit: SimpleNamespace, tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
-    writer.write("/hsv/state", 5, b"\x00\x01\x00\x00" + bytes(20))
+    writer.write("/hsv/state", 5, b"\x00\x01\x00\x00" + bytes(4) + b"\x05" + bytes(15))
     writer.close()
     with pytest.raises(RecordingError, match="topic /hsv/state: message at 5 ns") as error:
         Bag(tmp_path / "bag").columns("/hsv/state")
@@ -270,20 +274,26 @@ def _record(data: bytes, opcode: Opcode) -> int:
 
 
 def test_damage_outside_of_the_messages_is_named(written: Written) -> None:
-    file = written[0] / "run_0.mcap"
+    path, log = written
+    file = path / "run_0.mcap"
     data = file.read_bytes()
     attached, chunk = _record(data, Opcode.ATTACHMENT), _record(data, Opcode.CHUNK)
     name = len("scenario.toml")
+    length = attached + 9 + 16 + 4 + name + 4 + len("application/toml")
     places = {
-        "an attachment's content": (data.index(b"duration = '4 s'"), b"f"),
-        "an attachment's length": (attached + 9 + 16 + 4 + name + 4 + len("application/toml"), b"\xff" * 8),
-        "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8),
+        "an attachment's content": (data.index(b"duration = '4 s'"), b"f", attached, (0, 1)),
+        "an attachment's length": (length, b"\xff" * 8, attached, (0, 1)),
+        "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8, chunk, (None, 0)),
+        "the kind of a chunk": (chunk, b"\x86", None, (0, 0)),
+        "the beginning": (0, b"nothing", 0, (0, 0)),
     }
-    for what, (position, wrong) in places.items():
+    for what, (position, wrong, offset, (messages, attachments)) in places.items():
         file.write_bytes(data[:position] + wrong + data[position + len(wrong) :])
-        with pytest.raises(RecordingError, match="is damaged") as error:
-            Bag(file)
-        assert "\n" not in str(error.value), what
+        bag = Bag(file)
+        assert [damage.offset for _, damage in bag.loss.damages] == [offset] * (offset is not None), what
+        found = sum(topic.count for topic in bag.topics.values())
+        assert bag.loss.messages == len(log) - found and bag.loss.attachments == attachments, what
+        assert messages is None or bag.loss.messages == messages, what
 
 
 def _two_channels(path: Path, kit: SimpleNamespace, kinds: tuple[str, str]) -> Path:

@@ -113,7 +113,7 @@ def test_swapped_messages_are_a_difference_of_order(bag: Bag, tmp_path: Path) ->
         tracks["/hsv/filtered_state"] = replace(track, data=data)
 
     first = replay_all(tampered(bag, tmp_path, swap))["notch_filter"].topics[0].first
-    assert first is not None and first.field == "header.stamp"
+    assert first is not None and first.field == "time (ns)"
     assert first.expected - first.actual == 20_000_000
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
-from hsv.recording.steps import cut_off
+from hsv.recording.shortcomings import shortcomings
+from hsv.recording.steps import complete_stamps, cut_off
 
 FAULT_STATUS = "/hsv/fault_status"
 STATE = "/hsv/state"
@@ -22,8 +22,8 @@ def describe(bag: Bag) -> dict[str, Any]:
     Returns:
     -------
     dict
-        ``path``, ``complete``, ``start_s``, ``duration_s``, ``messages``, ``topics``, ``custom_data``,
-        ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
+        ``path``, ``folder``, ``complete``, ``shortcomings`` (in words), ``start_s``, ``duration_s``, ``messages``,
+        ``topics``, ``custom_data``, ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
         channel), ``saturation`` and ``tube``; the last four are None without the topic that tells. Times are
         simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
@@ -31,7 +31,9 @@ def describe(bag: Bag) -> dict[str, Any]:
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     return {
         "path": str(bag.path),
+        "folder": str(bag.folder),
         "complete": bag.complete,
+        "shortcomings": shortcomings(bag),
         "start_s": start / 1e9,
         "duration_s": (end - start) / 1e9,
         "messages": sum(topic["messages"] for topic in topics),
@@ -57,7 +59,7 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
 
 def _ending(bag: Bag) -> str:
     status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
-    if cut_off(bag) and any(bag.topics[topic].count < len(status) for topic in TOPICS if topic in bag.topics):
+    if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
         return "broken off"  # the last state may be there, but not what was made of it
     endings = {constants["FINISHED"]: "finished", constants["DIVERGED"]: "diverged"}
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
