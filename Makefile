@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-viewers lint references bench docs clean
+.PHONY: help setup run test test-long test-viewers lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -26,7 +26,10 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
-	python3 -m pytest -n 2 -m "not graph" && exec python3 -m pytest -n 2 --dist loadfile -m graph
+	python3 -m pytest -n 2 -m "not graph and not long" && exec python3 -m pytest -n 2 --dist loadfile -m "graph and not long"
+
+test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
+	@$(IN_ENVIRONMENT) python3 -m pytest -m long $(ARGS)
 
 # Browser and node come from Debian, node's readers of bags from npm; where apt-get is not wanted, install them before.
 test-viewers: setup ## set up, install a browser, node and npm packages, then run the tests that need them
@@ -42,7 +45,7 @@ lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
-	@source ./env.sh && python3 -m pytest -m "not reference" && python3 tools/references.py
+	@source ./env.sh && python3 -m pytest -m "not reference and not long" && python3 tools/references.py
 
 # Without a package index everything else is measured all the same.
 bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")

@@ -20,6 +20,7 @@ from rosbags.rosbag2 import Reader
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
+from hsv.recording.recover import recover
 from hsv.recording.topic import INFINITE, Qos
 from hsv.recording.writer import BagWriter
 
@@ -119,6 +120,55 @@ def test_metadata_has_every_key_that_jazzy_demands(written: Written) -> None:
         assert profile["durability"] == ("transient_local" if topic["type"].endswith("/Ready") else "volatile")
         assert profile["deadline"] == profile["lifespan"] == profile["liveliness_lease_duration"] == endless
         assert topic["type_description_hash"].startswith("RIHS01_") and len(topic["type_description_hash"]) == 71
+
+
+def test_the_file_itself_holds_the_metadata_for_reindexing(written: Written) -> None:
+    path, _ = written
+    with (path / "run_0.mcap").open("rb") as stream:
+        (record,) = (r.metadata for r in make_reader(stream).iter_metadata() if r.name == "rosbag2")
+    told = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert yaml.safe_load(record["serialized_metadata"]) == told
+
+
+def test_custom_data_of_rosbag2_are_read(kit: SimpleNamespace, tmp_path: Path) -> None:
+    told = {"custom_data": {"pilot": "nobody"}, "ros_distro": "kilted"}
+    path = tmp_path / "bag"
+    path.mkdir()
+    with (path / "bag_0.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        topic = kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")
+        schema = writer.register_schema(topic.type, "ros2msg", topic.definition.encode())
+        channel = writer.register_channel(topic.name, "cdr", schema, {})
+        writer.add_message(channel, 7, kit.messages.stamped(topic.type, 0, 0), 7)
+        writer.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(told)})
+        writer.finish()
+    bag = Bag(path)
+    assert (bag.custom_data, bag.distro) == (told["custom_data"], "kilted")
+    made = yaml.safe_load((recover(path).path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert made["ros_distro"] == "kilted" and made["custom_data"] == {"pilot": "nobody", "recovered": "true"}
+
+
+@pytest.mark.parametrize("encoding", ["ros2msg", "ros2idl"])
+def test_topics_of_others_that_cannot_be_decoded_are_left_alone(
+    kit: SimpleNamespace, tmp_path: Path, encoding: str
+) -> None:
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        topic = kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")
+        foreign = writer.register_schema("other_msgs/msg/Odd", encoding, b"Nowhere what\n")
+        ours = writer.register_schema(topic.type, "ros2msg", topic.definition.encode())
+        channels = [writer.register_channel("/odd", "cdr", foreign), writer.register_channel(topic.name, "cdr", ours)]
+        for step in range(3):
+            writer.add_message(channels[0], step, b"\0\1\0\0", step)
+            writer.add_message(channels[1], step, kit.messages.stamped(topic.type, step, step), step)
+        writer.finish()
+    bag = Bag(path)
+    assert bag.columns("/hsv/state")["step"].tolist() == [0, 1, 2] and not bag.loss
+    with pytest.raises(RecordingError, match="/odd"):
+        bag.columns("/odd")
 
 
 def test_rosbags_reads_it_all(written: Written) -> None:

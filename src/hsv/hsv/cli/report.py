@@ -30,14 +30,16 @@ def report(
     from hsv.errors import QuantityError
     from hsv.recording.reader import Bag
     from hsv.recording.report.page import write_report
-    from hsv.replay.attached import supply
 
     if out.suffix not in (".html", ".htm"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
     check_target(out, "out")
     opened = [Bag(bag) for bag in bags]
-    for bag in opened:
-        supply(bag, design, scenario)
+    if design or scenario:
+        from hsv.replay.attached import supply
+
+        for bag in opened:
+            supply(bag, design, scenario)
     write_report(opened, out, paper_units=units is Units.paper)
     print_written([out], json)
     warn_of_shortcomings(*opened)

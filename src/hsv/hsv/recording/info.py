@@ -23,9 +23,9 @@ def describe(bag: Bag) -> dict[str, Any]:
     -------
     dict
         ``path``, ``folder``, ``complete``, ``shortcomings`` (in words), ``start_s``, ``duration_s``, ``messages``,
-        ``topics``, ``custom_data``, ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
-        channel), ``saturation`` and ``tube``; the last four are None without the topic that tells. Times are
-        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
+        ``topics``, ``custom_data``, ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
+        entry per interval of a channel), ``saturation`` and ``tube``; the last four are None without the topic that
+        tells. Times are simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
     topics = [_topic(bag, name) for name in sorted(bag.topics)]

@@ -308,7 +308,7 @@ class Bag:
                     messages.append(bytes(body[size:]))
                 case Opcode.SCHEMA:
                     schema = Schema.read(content(body))
-                    schemas[schema.id] = schema
+                    schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
                 case Opcode.CHANNEL:
                     channel = Channel.read(content(body))
                     if channel.id not in channels:

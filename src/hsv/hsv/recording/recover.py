@@ -184,9 +184,9 @@ class _Copy:
         numbers: dict[int, tuple[int, Tally]] = {}
         # Definitions first: where the beginning is damaged, they stand at the end only.
         for schema in (Schema.read(content(body)) for opcode, body in found if opcode == Opcode.SCHEMA):
-            schemas[schema.id] = schema
+            schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
         for channel in (Channel.read(content(body)) for opcode, body in found if opcode == Opcode.CHANNEL):
-            if channel.schema_id in schemas:
+            if channel.id not in numbers and channel.schema_id in schemas:
                 numbers[channel.id] = self._channel(channel, schemas[channel.schema_id])
         for opcode, body in found:
             match opcode:
