@@ -143,7 +143,7 @@ def test_bags_that_cannot_be_replayed_say_why(bag: Bag, tmp_path: Path) -> None:
         replay_all(tampered(bag, tmp_path, forget))
     bare = Bag(bag.path)
     del bare.attachments["design.yaml"]
-    with pytest.raises(RecordingError, match=r"no attachment design\.yaml, expected a bag recorded by hsv run"):
+    with pytest.raises(RecordingError, match=r"no attachment design\.yaml: ros2 bag record and convert keep none"):
         flown_parameters(bare)
 
 

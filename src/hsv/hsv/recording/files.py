@@ -16,6 +16,8 @@ COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
+_PART = 4096
+"""Bytes that are decompressed at a time: what lies before a damage is not lost with it."""
 
 
 def find_files(path: Path) -> tuple[list[Path], list[str]]:
@@ -62,37 +64,34 @@ def read_file(path: Path) -> bytes:
     """Return what is in a file of a bag, as far as it can be decompressed.
 
     Raises:
-        RecordingError: It cannot be read, or is empty.
+        RecordingError: It cannot be read.
     """
     try:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
-    if not data:
-        raise RecordingError(f"{path}: is empty, expected an MCAP file")
-    return decompressed(data) if is_compressed(data) else data
+    return decompressed(data)[0]
 
 
-def is_compressed(data: bytes) -> bool:
-    """Return whether rosbag2 has compressed a file or a message."""
-    return data[:_MAGIC] in COMPRESSIONS
+def read_message(data: bytes) -> bytes | None:
+    """Return a message as it was before rosbag2 compressed it, if it did; None if it is damaged."""
+    content, whole = decompressed(data)
+    return content if whole else None
 
 
-def decompressed(data: bytes) -> bytes:
-    """Return the content of compressed data, up to the first damage."""
-    make = zstandard.ZstdDecompressor().decompressobj if COMPRESSIONS[data[:_MAGIC]] == "zstd" else _lz4
-    stream, parts = make(), []
+def decompressed(data: bytes) -> tuple[bytes, bool]:
+    """Return the content of data that may be compressed, up to the first damage, and whether that is all of it."""
+    match COMPRESSIONS.get(data[:_MAGIC]):
+        case "zstd":
+            stream = zstandard.ZstdDecompressor().decompressobj()
+        case "lz4":
+            stream = lz4.frame.LZ4FrameDecompressor()
+        case _:
+            return data, True
+    parts = []
     for start in range(0, len(data), _PART):
         try:
             parts.append(stream.decompress(data[start : start + _PART]))
         except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
-            break
-    return b"".join(parts)
-
-
-def _lz4() -> lz4.frame.LZ4FrameDecompressor:
-    return lz4.frame.LZ4FrameDecompressor()
-
-
-_PART = 4096
-"""Bytes that are decompressed at a time: what lies before a damage in the file is not lost with it."""
+            return b"".join(parts), False
+    return b"".join(parts), bool(stream.eof)

@@ -18,7 +18,7 @@ from rosbags.typesys.store import Typestore
 from hsv.errors import RecordingError
 from hsv.graph.description import OTHER_TOPICS, TOPICS
 from hsv.recording.columns import Columns
-from hsv.recording.files import decompressed, find_files, is_compressed, read_file
+from hsv.recording.files import find_files, read_file, read_message
 from hsv.recording.metadata import (
     CUSTOM_DATA,
     DISTRO,
@@ -271,10 +271,13 @@ class Bag:
         counts = message_counts(metadata)
         recorded_by: dict[str, Any] = metadata
         for file in self.files:
-            scan = Scan(read_file(file))
-            if not scan.is_mcap:
-                start = file.open("rb").read(8).hex(" ")
-                raise RecordingError(f"{file}: is not an MCAP file (starts with {start})")
+            data = read_file(file)
+            scan = Scan(data)
+            # Of several files, one that is nothing any more is a damage.
+            if len(self.files) == 1 and not data:
+                raise RecordingError(f"{file}: is empty, expected an MCAP file")
+            if len(self.files) == 1 and not scan.is_mcap:
+                raise RecordingError(f"{file}: is not an MCAP file (starts with {data[:8].hex(' ')})")
             found, orphans, attachments, rosbag2 = self._read_file(scan)
             recorded_by = rosbag2 or recorded_by
             self.complete &= scan.closed
@@ -330,19 +333,23 @@ class Bag:
                         self.custom_data |= metadata.metadata
                     elif metadata.name == ROSBAG2:
                         rosbag2 = parsed(metadata.metadata.get(SERIALIZED, "")) or rosbag2
-        for channel in channels.values():
-            self._declare(channel, schemas.get(channel.schema_id))
+        for channel in list(channels.values()):
+            try:
+                self._declare(channel, schemas.get(channel.schema_id))
+            except RecordingError:
+                if not scan.damages:
+                    raise
+                del channels[channel.id]  # its definition is lost, or not what it was
         read = 0
-        for topic, number in {c.topic: c.id for c in channels.values() if c.topic in self._topics}.items():
-            times, messages = lists[number]
-            if any(map(is_compressed, messages)):
-                messages = [decompressed(data) if is_compressed(data) else data for data in messages]
-            self._topics[topic].log_times += times
-            self._topics[topic].messages += messages
-            read += len(messages)
-        foreign = sum(len(lists[c.id][0]) for c in channels.values() if c.topic not in self._topics)
+        for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
+            found = [(time, read_message(data)) for time, data in zip(*lists[number], strict=True)]
+            whole = [(time, message) for time, message in found if message is not None]
+            read += len(whole)
+            if topic in self._topics:
+                self._topics[topic].log_times += [time for time, _ in whole]
+                self._topics[topic].messages += [message for _, message in whole]
         orphans = sum(len(times) for number, (times, _) in lists.items() if number not in channels)
-        return read + foreign, orphans, attachments, rosbag2
+        return read, orphans, attachments, rosbag2
 
     def _declare(self, channel: Channel, schema: Schema | None) -> None:
         """Take up the topic of a channel; one of somebody else's whose messages cannot be decoded is left out."""

@@ -15,7 +15,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import Writer
 
 from hsv.errors import RecordingError
-from hsv.recording.files import decompressed, find_files, is_compressed, read_file
+from hsv.recording.files import find_files, read_file, read_message
 from hsv.recording.metadata import (
     CUSTOM_DATA,
     FILE_NAME,
@@ -194,8 +194,9 @@ class _Copy:
                     number, sequence, log_time, publish_time = MESSAGE_HEADER.unpack_from(body)
                     if number not in numbers:
                         continue
-                    found_data = bytes(body[MESSAGE_HEADER.size :])
-                    message = decompressed(found_data) if is_compressed(found_data) else found_data
+                    message = read_message(bytes(body[MESSAGE_HEADER.size :]))
+                    if message is None:
+                        continue
                     channel_id, tally = numbers[number]
                     self._writer.add_message(channel_id, log_time, message, publish_time, sequence)
                     tally.add(log_time)

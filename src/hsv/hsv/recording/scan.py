@@ -140,7 +140,10 @@ class Scan:
                     indexes_count = digest not in self._chunks
                     if indexes_count:
                         self._chunks.add(digest)
+                        damages = len(self.damages)
                         yield from self._unpacked(position, body)
+                        if len(self.damages) > damages:
+                            end = self._chunk_within(position + 1, end)
                 case Opcode.MESSAGE_INDEX:
                     self.indexed += indexes_count * ((len(body) - _INDEX_HEADER.size) // _INDEX_ENTRY)
                 case Opcode.ATTACHMENT if not _fits_checksum(body):
@@ -198,6 +201,11 @@ class Scan:
         """Return where the next whole record begins, None if none does."""
         candidates = _CANDIDATE.finditer(self._data, position)
         return next((m.start() for m in candidates if self._end(m.start(), searching=True) is not None), None)
+
+    def _chunk_within(self, position: int, end: int) -> int:
+        """Return where a chunk begins in a damaged one, because part of it stands there twice; else ``end``."""
+        candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position, end + _FRAME.size))
+        return next((at for at in candidates if self._data[at] == Opcode.CHUNK and self._end(at)), end)
 
     @cached_property
     def _unprotected(self) -> bool:
