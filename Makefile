@@ -28,7 +28,7 @@ test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
 	python3 -m pytest -n auto -m "not graph and not long" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
 
-test-long: setup ## set up, then run the tests that take minutes: every entry of every design, designs on other processors
+test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m long $(ARGS)
 
 # Browser and node come from Debian, node's readers of bags from npm; where apt-get is not wanted, install them before.

@@ -94,8 +94,13 @@ def test_recover_mends_a_cut_bag(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     (cut / "cut_0.mcap").write_bytes(data[: len(data) // 2])
     done = hsv("recover", str(cut), "--json")
     assert done.code == 0 and done.json["changed"] and 3.0 < done.json["duration_s"] < 9.0
-    assert (cut / FILE_NAME).is_file()
-    assert "complete already" in hsv("recover", str(cut)).out
+    assert [file.name for file in cut.iterdir()] == ["cut_0.mcap"], "the old bag stays as it is"
+    new = tmp_path / "cut_recovered"
+    assert (new / FILE_NAME).is_file() and done.json["path"] == str(new)
+    assert "whole already" in hsv("recover", str(new)).out
+    again = hsv("recover", str(cut))
+    assert again.code == 2 and "exists already" in again.error
+    assert hsv("recover", str(cut), "--out", "other").code == 0 and (tmp_path / "other" / "other_0.mcap").is_file()
 
 
 def _empty(folder: Path, bag: Path) -> Path:

@@ -162,7 +162,8 @@ def test_a_recovered_bag_is_replayed_as_far_as_it_is_complete(hsv: Hsv, bag: Pat
     end = max(index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes)
     (ragged / "metadata.yaml").unlink()
     file.write_bytes(file.read_bytes()[: end + 1])
-    assert hsv("recover", str(ragged)).code == 0
+    assert hsv("recover", str(ragged), "--out", "mended").code == 0
+    ragged = tmp_path / "mended"
     ran = hsv("replay", str(ragged))
     assert ran.code == 0 and ran.err == "" and ran.out.count("identical in every byte") == 5
     assert hsv("replay", str(ragged), "--rerun").code == 0
@@ -171,8 +172,8 @@ def test_a_recovered_bag_is_replayed_as_far_as_it_is_complete(hsv: Hsv, bag: Pat
     whole = changed_bag(bag, tmp_path / "whole")
     data = whole / "whole_0.mcap"
     data.write_bytes(data.read_bytes()[:-9])
-    assert hsv("recover", str(whole)).code == 0
-    assert hsv("info", str(whole), "--json").json["ending"] == "finished"
+    assert hsv("recover", str(whole), "--out", "whole_again").code == 0
+    assert hsv("info", "whole_again", "--json").json["ending"] == "finished"
 
 
 def test_flights_whose_folders_have_one_name_are_all_plotted(hsv: Hsv, bag: Path, tmp_path: Path) -> None:

@@ -77,10 +77,12 @@ class Messages:
         }
         return self.store.types[message_type](**values)
 
-    def stamped(self, message_type: str, time_ns: int, step: int, **given: Any) -> bytes:
+    def time(self, time_ns: int) -> Any:
         sec, nanosec = divmod(time_ns, 10**9)
-        time = self.store.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
-        header = self.store.types["std_msgs/msg/Header"](stamp=time, frame_id="")
+        return self.store.types["builtin_interfaces/msg/Time"](sec=sec, nanosec=nanosec)
+
+    def stamped(self, message_type: str, time_ns: int, step: int, **given: Any) -> bytes:
+        header = self.store.types["std_msgs/msg/Header"](stamp=self.time(time_ns), frame_id="")
         return self.serialize(self.make(message_type, header=header, step=step, **given))
 
     def _value(self, field: Field, length: int | None) -> Any:

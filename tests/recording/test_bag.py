@@ -20,6 +20,7 @@ from rosbags.rosbag2 import Reader
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
+from hsv.recording.recover import recover
 from hsv.recording.topic import INFINITE, Qos
 from hsv.recording.writer import BagWriter
 
@@ -67,7 +68,8 @@ def written(kit: SimpleNamespace, tmp_path: Path) -> Written:
             names["/clock"] = "rosgraph_msgs/msg/Clock"
         for name, kind in names.items():
             if not kind.endswith("/Ready") or step == 0:
-                data = kit.messages.serialize(kit.messages.make(kind))
+                given = {"clock": kit.messages.time(step * 10**7)} if name == "/clock" else {}
+                data = kit.messages.serialize(kit.messages.make(kind, **given))
                 log.append((name, step * 10**7, data))
                 writer.write(*log[-1])
     writer.close({"outcome": ""})
@@ -118,6 +120,55 @@ def test_metadata_has_every_key_that_jazzy_demands(written: Written) -> None:
         assert profile["durability"] == ("transient_local" if topic["type"].endswith("/Ready") else "volatile")
         assert profile["deadline"] == profile["lifespan"] == profile["liveliness_lease_duration"] == endless
         assert topic["type_description_hash"].startswith("RIHS01_") and len(topic["type_description_hash"]) == 71
+
+
+def test_the_file_itself_holds_the_metadata_for_reindexing(written: Written) -> None:
+    path, _ = written
+    with (path / "run_0.mcap").open("rb") as stream:
+        (record,) = (r.metadata for r in make_reader(stream).iter_metadata() if r.name == "rosbag2")
+    told = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert yaml.safe_load(record["serialized_metadata"]) == told
+
+
+def test_custom_data_of_rosbag2_are_read(kit: SimpleNamespace, tmp_path: Path) -> None:
+    told = {"custom_data": {"pilot": "nobody"}, "ros_distro": "kilted"}
+    path = tmp_path / "bag"
+    path.mkdir()
+    with (path / "bag_0.mcap").open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        topic = kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")
+        schema = writer.register_schema(topic.type, "ros2msg", topic.definition.encode())
+        channel = writer.register_channel(topic.name, "cdr", schema, {})
+        writer.add_message(channel, 7, kit.messages.stamped(topic.type, 0, 0), 7)
+        writer.add_metadata("rosbag2", {"serialized_metadata": yaml.safe_dump(told)})
+        writer.finish()
+    bag = Bag(path)
+    assert (bag.custom_data, bag.distro) == (told["custom_data"], "kilted")
+    made = yaml.safe_load((recover(path).path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert made["ros_distro"] == "kilted" and made["custom_data"] == {"pilot": "nobody", "recovered": "true"}
+
+
+@pytest.mark.parametrize("encoding", ["ros2msg", "ros2idl"])
+def test_topics_of_others_that_cannot_be_decoded_are_left_alone(
+    kit: SimpleNamespace, tmp_path: Path, encoding: str
+) -> None:
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start(profile="ros2")
+        topic = kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")
+        foreign = writer.register_schema("other_msgs/msg/Odd", encoding, b"Nowhere what\n")
+        ours = writer.register_schema(topic.type, "ros2msg", topic.definition.encode())
+        channels = [writer.register_channel("/odd", "cdr", foreign), writer.register_channel(topic.name, "cdr", ours)]
+        for step in range(3):
+            writer.add_message(channels[0], step, b"\0\1\0\0", step)
+            writer.add_message(channels[1], step, kit.messages.stamped(topic.type, step, step), step)
+        writer.finish()
+    bag = Bag(path)
+    assert bag.columns("/hsv/state")["step"].tolist() == [0, 1, 2] and not bag.loss
+    with pytest.raises(RecordingError, match="/odd"):
+        bag.columns("/odd")
 
 
 def test_rosbags_reads_it_all(written: Written) -> None:
@@ -215,7 +266,7 @@ def _cut(length: int) -> Callable[[Path, SimpleNamespace], Path]:
 @pytest.mark.parametrize(
     ("make", "word"),
     [
-        (lambda path, kit: path, "holds 0 files"),
+        (lambda path, kit: path, "holds no file"),
         (lambda path, kit: path / "nowhere", "does not exist"),
         (_foreign, "no topic below /hsv/"),
         (_file(b""), "is empty"),
@@ -236,7 +287,7 @@ def test_unusable_input_is_one_clear_line(
 
 
 def test_missing_topic_and_damage_are_named(written: Written) -> None:
-    path, _ = written
+    path, log = written
     bag = Bag(path)
     for ask in (bag.columns, bag.messages, bag.times, bag.constants):
         with pytest.raises(RecordingError, match="no topic /hsv/nowhere, only /clock"):
@@ -247,14 +298,17 @@ def test_missing_topic_and_damage_are_named(written: Written) -> None:
     data = bytearray(file.read_bytes())
     data[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0xFF
     file.write_bytes(data)
-    with pytest.raises(RecordingError, match=f"chunk at byte {chunk.chunk_start_offset} is damaged") as error:
-        Bag(path)
-    assert "\n" not in str(error.value)
+    damaged = Bag(path)
+    ((where, damage),) = damaged.loss.damages
+    assert (where, damage.offset, damage.what) == (file, chunk.chunk_start_offset, "a chunk")
+    found = sum(topic.count for topic in damaged.topics.values())
+    assert damaged.complete and damaged.loss.counted
+    assert 0 < damaged.loss.messages == len(log) - found < len(log) // 5
 
 
 def test_message_that_does_not_fit_its_definition_is_named(kit: SimpleNamespace, tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag", [kit.topic("/hsv/state", "hsv_msgs/msg/VehicleState")])
-    writer.write("/hsv/state", 5, b"\x00\x01\x00\x00" + bytes(20))
+    writer.write("/hsv/state", 5, b"\x00\x01\x00\x00" + bytes(4) + b"\x05" + bytes(15))
     writer.close()
     with pytest.raises(RecordingError, match="topic /hsv/state: message at 5 ns") as error:
         Bag(tmp_path / "bag").columns("/hsv/state")
@@ -270,20 +324,26 @@ def _record(data: bytes, opcode: Opcode) -> int:
 
 
 def test_damage_outside_of_the_messages_is_named(written: Written) -> None:
-    file = written[0] / "run_0.mcap"
+    path, log = written
+    file = path / "run_0.mcap"
     data = file.read_bytes()
     attached, chunk = _record(data, Opcode.ATTACHMENT), _record(data, Opcode.CHUNK)
     name = len("scenario.toml")
+    length = attached + 9 + 16 + 4 + name + 4 + len("application/toml")
     places = {
-        "an attachment's content": (data.index(b"duration = '4 s'"), b"f"),
-        "an attachment's length": (attached + 9 + 16 + 4 + name + 4 + len("application/toml"), b"\xff" * 8),
-        "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8),
+        "an attachment's content": (data.index(b"duration = '4 s'"), b"f", attached, (0, 1)),
+        "an attachment's length": (length, b"\xff" * 8, attached, (0, 1)),
+        "a chunk's length": (chunk + 9 + 28 + 4 + len("zstd"), b"\xff" * 8, chunk, (None, 0)),
+        "the kind of a chunk": (chunk, b"\x86", None, (0, 0)),
+        "the beginning": (0, b"nothing", 0, (0, 0)),
     }
-    for what, (position, wrong) in places.items():
+    for what, (position, wrong, offset, (messages, attachments)) in places.items():
         file.write_bytes(data[:position] + wrong + data[position + len(wrong) :])
-        with pytest.raises(RecordingError, match="is damaged") as error:
-            Bag(file)
-        assert "\n" not in str(error.value), what
+        bag = Bag(file)
+        assert [damage.offset for _, damage in bag.loss.damages] == [offset] * (offset is not None), what
+        found = sum(topic.count for topic in bag.topics.values())
+        assert bag.loss.messages == len(log) - found and bag.loss.attachments == attachments, what
+        assert messages is None or bag.loss.messages == messages, what
 
 
 def _two_channels(path: Path, kit: SimpleNamespace, kinds: tuple[str, str]) -> Path:

@@ -81,7 +81,9 @@ def test_counts_order_and_ignored_fields(track: Any) -> None:
     assert shorter.first is not None and str(shorter.first) == "step 2 /hsv/forces number of messages: 3 became 2"
     late = track([1.0, 2.0])
     late = Track(late.topic, late.type, late.types, [0, 1], late.data)
-    assert str(compare(track([1.0, 2.0]), late).first) == "step 1 /hsv/forces time (ns): 20000000 became 1"
+    assert str(compare(track([1.0, 2.0]), late).first) == "step 1 /hsv/forces message: 'missing' became 'recorded'"
+    two = track([1.0, 2.0])
+    assert str(compare(two, two.rows([1, 0])).first) == "step 0 /hsv/forces time (ns): 0 became 20000000"
     assert not differs(compare(track([1.0]), track([2.0]), ignored=["lift"]))
     nothing = compare(track([]), track([]))
     assert nothing.identical
@@ -111,3 +113,13 @@ def test_different_definitions_where_one_track_is_empty(track: Any, kit: SimpleN
     first = compare(track([1.0]), empty).first
     assert first is not None and (first.step, first.time_ns, first.field) == (0, 0, "lift")
     assert (first.expected, first.actual) == (True, False)
+
+
+def test_messages_of_one_step_are_compared(track: Any) -> None:
+    whole = track([1.0, 2.0, 3.0, 4.0])
+    holed = compare(whole, whole.rows([0, 2, 3]))
+    assert str(holed.first) == "step 1 /hsv/forces number of messages: 4 became 3"
+    assert (holed.common_count, holed.different_bytes, holed.largest) == (3, 0, {}) and not holed.identical
+    both = compare(whole.rows([0, 2, 3]), track([1.0, 2.0, 3.5, 4.0]).rows([0, 1, 2]))
+    assert str(both.first) == "step 1 /hsv/forces message: 'missing' became 'recorded'"
+    assert both.common_count == 2 and both.largest == {"lift": 0.5}

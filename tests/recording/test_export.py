@@ -36,7 +36,13 @@ def bag(kit: SimpleNamespace, tmp_path: Path) -> Bag:
 
 def test_csv(bag: Bag, tmp_path: Path) -> None:
     files = export(bag, [STATE, TUBE, FAULTS], Format.csv, tmp_path / "out")
-    assert [file.name for file in files] == ["hsv_state.csv", "hsv_tube_status.csv", "hsv_fault_status.csv"]
+    assert [file.name for file in files] == [
+        "hsv_state.csv",
+        "hsv_tube_status.csv",
+        "hsv_fault_status.csv",
+        "incomplete.txt",
+    ]
+    assert "no topic /clock, /hsv/forces" in files[3].read_text()
     with files[0].open() as stream:
         rows = list(csv.DictReader(stream))
     columns = bag.columns(STATE)
@@ -55,7 +61,7 @@ def test_csv(bag: Bag, tmp_path: Path) -> None:
 
 
 def test_parquet(bag: Bag, tmp_path: Path) -> None:
-    (file,) = export(bag, [STATE], Format.parquet, tmp_path / "out")
+    file, _ = export(bag, [STATE], Format.parquet, tmp_path / "out")
     table = parquet.read_table(file)
     np.testing.assert_array_equal(table["pitch_rate [rad/s]"].to_numpy(), bag.columns(STATE)["pitch_rate"])
 
@@ -67,6 +73,7 @@ def test_npz(bag: Bag, tmp_path: Path) -> None:
             data["hsv_state.elastic_coordinate [kg^0.5 m]"], bag.columns(STATE)["elastic_coordinate"]
         )
         assert data["hsv_fault_status.active"][0] == "[]"
+        assert "no topic /clock" in str(data["incomplete"])
 
 
 def test_refuses(bag: Bag, tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from rosbags.rosbag2 import Reader
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
-from hsv.recording.recover import recover
+from hsv.recording.recover import finalise, recover
 from hsv.recording.writer import CHUNK_BYTES, BagWriter
 
 DATA = 200
@@ -68,24 +68,33 @@ def test_killed_writer_loses_its_last_chunk_only(killed: tuple[Path, int]) -> No
         assert bag.messages(name)[-1][1] == steps[-1].to_bytes(DATA, "little")
 
 
-def test_recovered_bag_is_a_proper_one(killed: tuple[Path, int]) -> None:
+@pytest.mark.parametrize("in_place", [False, True], ids=["new bag", "in place"])
+def test_recovered_bag_is_a_proper_one(killed: tuple[Path, int], in_place: bool) -> None:
     path, _ = killed
     before = Bag(path)
-    recovery = recover(path)
+    data = before.path.read_bytes()
+    messages = sum(topic.count for topic in before.topics.values())
+    if in_place:
+        finalise(path)
+    else:
+        recovery = recover(path)
+        assert recovery.changed and recovery.path == path.with_name("killed_recovered")
+        assert recovery.messages == messages and before.path.read_bytes() == data
+        assert list(path.iterdir()) == [before.path]
+        path = recovery.path
     bag = Bag(path)
-    assert recovery.changed and recovery.path == bag.path and bag.complete
-    assert recovery.messages == sum(topic.count for topic in before.topics.values())
+    assert bag.complete and not bag.loss
     assert bag.topics == before.topics and bag.attachments == before.attachments
     assert bag.custom_data == {"run_id": "killed", "recovered": "true"}
     assert all(bag.messages(name) == before.messages(name) for name in bag.topics)
-    data = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert data["message_count"] == recovery.messages and data["custom_data"] == bag.custom_data
-    topic = data["topics_with_message_count"][0]["topic_metadata"]
+    told = yaml.safe_load((path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert told["message_count"] == messages and told["custom_data"] == bag.custom_data
+    topic = told["topics_with_message_count"][0]["topic_metadata"]
     assert topic["offered_qos_profiles"][0]["durability"] == "transient_local"
     assert topic["type_description_hash"] == bag.topics["/hsv/t0"].type_hash != ""
     with Reader(path) as reader:
-        assert reader.message_count == recovery.messages
-    assert sorted(file.name for file in path.iterdir()) == ["killed_0.mcap", "metadata.yaml"]
+        assert reader.message_count == messages
+    assert sorted(file.name for file in path.iterdir()) == [f"{path.name}_0.mcap", "metadata.yaml"]
     assert not recover(path).changed
 
 
@@ -113,8 +122,9 @@ def test_cut_anywhere_it_opens_recovers_or_says_why(whole: Path, tmp_path: Path)
             assert "\n" not in str(error) and not counts
             continue
         counts.append(recovery.messages)
-        assert Bag(path).complete and Bag(path).messages("/hsv/state") == complete[: recovery.messages]
-        with Reader(path) as reader:
+        bag = Bag(recovery.path)
+        assert bag.complete and bag.messages("/hsv/state") == complete[: recovery.messages]
+        with Reader(recovery.path) as reader:
             assert reader.message_count == recovery.messages
     assert counts == sorted(counts) and counts[0] < 150 and counts[-1] == 300
 
@@ -126,12 +136,21 @@ def test_zeros_after_the_end_are_no_records(whole: Path) -> None:
     assert 0 < recover(whole).messages < 300
 
 
-def test_missing_metadata_is_written_again(whole: Path) -> None:
+def test_missing_or_broken_metadata_are_written_for_the_new_bag(whole: Path) -> None:
     metadata, file = whole / "metadata.yaml", whole / "whole_0.mcap"
     before, data = metadata.read_text(), file.read_bytes()
-    metadata.unlink()
-    assert recover(file).changed
-    assert metadata.read_text() == before and file.read_bytes() == data
+    assert not recover(whole).changed
+    for number, broken in enumerate(
+        (None, "", "no: [metadata", before[: len(before) // 3], before.replace("300", "299"))
+    ):
+        metadata.unlink()
+        if broken is not None:
+            metadata.write_text(broken)
+        recovery = recover(file, whole.with_name(f"new{number}"))
+        assert recovery.changed and file.read_bytes() == data
+        with Reader(recovery.path) as reader:
+            assert reader.message_count == 300
+        metadata.write_text(before)
 
 
 def test_a_bag_that_is_being_recorded_is_left_alone(kit: SimpleNamespace, tmp_path: Path) -> None:
@@ -153,5 +172,8 @@ def test_a_full_disk_leaves_the_bag_as_it_was(killed: tuple[Path, int]) -> None:
     data = file.read_bytes()
     problem = r"killed_0\.mcap: cannot be mended: File too large"
     with pytest.raises(RecordingError, match=problem), files_no_larger_than(len(data) // 2):
-        recover(path)
+        finalise(path)
     assert list(path.iterdir()) == [file] and file.read_bytes() == data
+    with pytest.raises(RecordingError, match="cannot be written: File too large"), files_no_larger_than(len(data) // 2):
+        recover(path)
+    assert list(path.parent.iterdir()) == [path] and file.read_bytes() == data

@@ -39,7 +39,7 @@ class StandInNode(LockstepNode):
         self._limit = values["stand_in.timeout"]
         me = next(n for n in description.graph(self.controller) if n.name == self._under_test)
         self._is_plant = me is description.PLANT
-        self._steps = complete_steps(bag) if broken_off(bag) else min(len(bag.messages(t)) for t in me.subscribes)
+        self._steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, me.subscribes)
         self._recorded = {topic: [data for _, data in bag.messages(topic)] for topic in me.subscribes}
         self._answered = dict.fromkeys(me.publishes, 0)
         self._fed = 0

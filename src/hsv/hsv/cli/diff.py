@@ -21,7 +21,7 @@ def diff(
     tolerance: Annotated[float, typer.Option(help="Absolute and relative at once; 0: every bit counts.")] = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Compare two bags: where they part first, and the largest difference of every field.
+    """Compare two bags step by step: where they part first, and the largest difference of every field.
 
     Exit code 0 if all step topics are equal, 1 if not.
 
@@ -56,6 +56,7 @@ def diff(
                 },
                 "largest_difference": {c.topic: c.largest for c in compared if c.largest},
                 "messages": {c.topic: [c.expected_count, c.actual_count] for c in compared},
+                "messages_of_the_same_step": {c.topic: c.common_count for c in compared},
             }
         )
     else:
@@ -75,6 +76,11 @@ def _print(compared: list[Comparison], earliest: Difference | None) -> None:
         console.print(f"{count} messages: {same}", soft_wrap=True)
     else:
         console.print(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}", soft_wrap=True)
+        common = sum(c.common_count for c in compared)
+        if common < max(sum(c.expected_count for c in compared), sum(c.actual_count for c in compared)):
+            equal = not any(c.largest for c in compared)
+            same = f"{common} messages of the same steps are compared"
+            console.print(f"{same}{', and they are equal' if equal else ''}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for column in ("topic", "field", "largest difference"):
         table.add_column(column, justify="right" if column.startswith("largest") else "left")

@@ -37,7 +37,7 @@ def export(
         raise ParameterError("format: expected one of --csv, --parquet and --npz")
     opened = Bag(bag)
     if out is None:
-        home = opened.path.parent
+        home = opened.folder.absolute()
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
     topics = topic or [name for name in TOPICS if name in opened.topics]
     print_written(tables.export(opened, topics, chosen[0], out), json)

@@ -26,23 +26,25 @@ def info(
     from hsv.recording.flight import flight_data
     from hsv.recording.info import describe
     from hsv.recording.reader import Bag
+    from hsv.recording.shortcomings import completeness
     from hsv.simulation.metrics import METRICS, flight_metrics
 
     opened = Bag(bag)
     description = describe(opened)
-    problem = None
+    problem, remark = None, ""
     try:
-        metrics = flight_metrics(flight_data(opened))
+        metrics, remark = flight_metrics(flight_data(opened)), completeness(opened)
     except RecordingError as error:
         # What else the bag holds is still worth knowing, to see what is wrong with it.
         metrics, problem = {}, error
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
     if json:
-        print_json(description | {"metrics": None if problem else to_json(quantities, units)})
+        measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
+        print_json(description | ({"metrics": None} if problem else measured))
     else:
         _print(description)
         if not problem:
-            print_table("Metrics", quantities, units)
+            print_table(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", quantities, units)
     if problem:
         raise problem
     warn_of_shortcomings(opened)
@@ -57,7 +59,7 @@ def _print(description: dict[str, Any]) -> None:
         "path": description["path"],
         "duration": f"{description['duration_s']:.6g} s",
         "messages": description["messages"],
-        "complete": "yes" if description["complete"] else "no: hsv recover mends it",
+        "complete": f"no: {'; '.join(description['shortcomings'])}" if description["shortcomings"] else "yes",
         "ending": description["ending"] or "not recorded",
         **description["custom_data"],
         "fingerprint": in_words(description["fingerprint"], description["as_published"]),

@@ -16,4 +16,10 @@ VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '790
 CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 BagArgument = Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")]
+SuppliedDesignOption = Annotated[
+    Path | None, typer.Option("--design", help="Design YAML that the flight had, for a bag without attachments.")
+]
+SuppliedScenarioOption = Annotated[
+    str | None, typer.Option("--scenario", help="Scenario (name or TOML file) flown, for a bag without attachments.")
+]
 FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]

@@ -27,13 +27,16 @@ def plot(
     from hsv.recording.flight import flight_data, labels
     from hsv.recording.plots import flight_figure, save_figure
     from hsv.recording.reader import Bag
+    from hsv.recording.shortcomings import shortcomings
 
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")
     check_target(out, "out")
     opened = [Bag(path) for path in bags]
-    flights = {name: flight_data(bag) for name, bag in zip(labels(opened), opened, strict=True)}
+    named = dict(zip(labels(opened), opened, strict=True))
+    flights = {name: flight_data(bag) for name, bag in named.items()}
+    remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := shortcomings(bag))]
     with writing(out, "out"):
-        save_figure(flight_figure(flights, units is Units.paper), out)
+        save_figure(flight_figure(flights, units is Units.paper, remarks), out)
     print_written([out], json)
     warn_of_shortcomings(*opened)

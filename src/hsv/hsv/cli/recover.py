@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
 
 
-def recover(bag: BagArgument, json: JsonOption = False) -> None:
-    """Mend the bag of a killed recorder: keep everything complete, write summary, indexes and metadata.yaml.
+def recover(
+    bag: BagArgument,
+    out: Annotated[
+        Path | None, typer.Option(help="Bag to write; default: beside the old one, with _recovered at its name.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a new bag of everything that is whole in one that is cut off or damaged; the old one stays as it is.
+
+    What is lost is said, in messages and in seconds of simulated time.
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
     from hsv.recording.reader import Bag
     from hsv.recording.recover import recover as mend
+    from hsv.recording.shortcomings import loss_in_words
+    from hsv.recording.steps import irregularities, lost_seconds
 
-    recovery = mend(bag)
-    start, end = Bag(recovery.path).span
-    seconds = (end - start) * 1e-9
+    recovery = mend(bag, out)
+    kept = Bag(recovery.path)
+    start, end = kept.span
+    seconds, lost = (end - start) * 1e-9, lost_seconds(kept)
+    loss = recovery.bag.loss
     if json:
         print_json(
             {
@@ -24,8 +41,19 @@ def recover(bag: BagArgument, json: JsonOption = False) -> None:
                 "changed": recovery.changed,
                 "messages": recovery.messages,
                 "duration_s": seconds,
+                "lost_messages": loss.messages,
+                "lost_messages_counted": loss.counted,
+                "lost_attachments": loss.attachments,
+                "lost_s": lost,
+                "loss": loss_in_words(loss) + irregularities(kept),
             }
         )
         return
-    what = "recovered" if recovery.changed else "complete already:"
-    console.print(f"{recovery.path}: {what} {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
+    if not recovery.changed:
+        console.print(f"{recovery.path}: whole already: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
+        return
+    console.print(f"{recovery.path}: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
+    for words in loss_in_words(loss):
+        console.print(words, soft_wrap=True)
+    if lost:
+        console.print(f"{lost:.2f} s lost: {'; '.join(irregularities(kept))}", soft_wrap=True)

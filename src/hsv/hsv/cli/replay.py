@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from hsv.cli.options import BagArgument, JsonOption
+from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption
 from hsv.cli.output import console, print_json
 from hsv.cli.shortcomings import warn_of_shortcomings
 
@@ -22,6 +22,8 @@ def replay(
     parameters: Annotated[
         Path | None, typer.Option(help="Parameter YAML under test, in place of the attached design.")
     ] = None,
+    design: SuppliedDesignOption = None,
+    scenario: SuppliedScenarioOption = None,
     rerun: Annotated[
         bool, typer.Option("--rerun", help="Repeat the whole loop instead of one node after the other.")
     ] = False,
@@ -38,9 +40,10 @@ def replay(
     from hsv.errors import ParameterError, RunError
     from hsv.recording.reader import Bag
     from hsv.replay import engine
-    from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous
+    from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
 
     opened = Bag(bag)
+    supply(opened, design, scenario)
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)
     controller = controller_of(values)

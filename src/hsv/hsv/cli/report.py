@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.options import JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
 from hsv.cli.output import Units, print_written
 from hsv.cli.shortcomings import warn_of_shortcomings
 from hsv.cli.targets import check_target
@@ -16,6 +16,8 @@ from hsv.cli.targets import check_target
 def report(
     bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are laid over one another.")],
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
+    design: SuppliedDesignOption = None,
+    scenario: SuppliedScenarioOption = None,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
@@ -33,6 +35,11 @@ def report(
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
     check_target(out, "out")
     opened = [Bag(bag) for bag in bags]
+    if design or scenario:
+        from hsv.replay.attached import supply
+
+        for bag in opened:
+            supply(bag, design, scenario)
     write_report(opened, out, paper_units=units is Units.paper)
     print_written([out], json)
     warn_of_shortcomings(*opened)

@@ -39,6 +39,10 @@ def view(
     from hsv.recording.viewers import VIEWERS
 
     opened = Bag(bag)
+    if len(opened.files) != 1 or opened.path.suffix != ".mcap":
+        raise RecordingError(
+            f"{opened.path}: viewers open one MCAP file, expected a bag that is neither split nor compressed by rosbag2"
+        )
     mcap = opened.path.absolute()
     wanted = [VIEWERS[program]] if program else list(VIEWERS.values())
     for viewer in wanted:

@@ -55,10 +55,10 @@ def fly_graph(
 
 def _mend(bag: Path) -> None:
     from hsv.recording.metadata import FILE_NAME
-    from hsv.recording.recover import recover
+    from hsv.recording.recover import finalise
 
     with suppress(OSError):
         bag.rmdir()  # where no recorder has come to write anything
     # A recorder that was killed could not finish its bag.
     if bag.is_dir() and not (bag / FILE_NAME).exists():
-        recover(bag)
+        finalise(bag)

@@ -63,14 +63,7 @@ def prepare(
     run_id = uuid.uuid4().hex
     temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
     folder = Path(temporary.name)
-    files = {
-        "scenario.toml": text,
-        "design.yaml": design_file.read_text(encoding="utf-8"),
-        "scenario.yaml": parameter_yaml(scenario.parameters()),
-    }
-    certificate = design_file.with_suffix(".certificate.json")
-    if certificate.is_file():
-        files["certificate.json"] = certificate.read_text(encoding="utf-8")
+    files = {"scenario.toml": text, "scenario.yaml": parameter_yaml(scenario.parameters()), **design_files(design_file)}
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
@@ -101,6 +94,15 @@ def prepare(
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
     nodes = graph(scenario.controller)
     return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
+
+
+def design_files(design: Path) -> dict[str, str]:
+    """Return what a design brings to the attachments of a bag, by name: parameters and certificate."""
+    files = {"design.yaml": design.read_text(encoding="utf-8")}
+    certificate = design.with_suffix(".certificate.json")
+    if certificate.is_file():
+        files["certificate.json"] = certificate.read_text(encoding="utf-8")
+    return files
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:

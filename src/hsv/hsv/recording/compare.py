@@ -38,6 +38,8 @@ class Comparison:
     topic: str
     expected_count: int
     actual_count: int
+    common_count: int
+    """Messages of the same time, which are compared with each other."""
     different_bytes: int
     """Messages whose bytes differ, among those that both tracks have."""
     different_padding: int = 0
@@ -50,14 +52,14 @@ class Comparison:
     def identical(self) -> bool:
         """Whether the tracks are equal in every byte but padding."""
         return (
-            self.expected_count == self.actual_count
+            self.expected_count == self.actual_count == self.common_count
             and self.different_bytes == self.different_padding
             and self.first is None
         )
 
 
 def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), tolerance: float = 0.0) -> Comparison:
-    """Compare two tracks of one topic.
+    """Compare two tracks of one topic, the messages of one time with each other.
 
     Numbers are equal where |a - b| <= max(tolerance, tolerance max(|a|, |b|)), both are NaN, or both are the same
     infinity; integers, text and lists only where they are the same (lists of messages element by element as numbers).
@@ -68,41 +70,52 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
         ignored: Field paths that do not count.
         tolerance: Absolute and relative at once.
     """
-    count = min(len(expected.data), len(actual.data))
     counts = len(expected.data), len(actual.data)
-    different = sum(a != b for a, b in zip(expected.data, actual.data, strict=False))
-    disordered = np.flatnonzero(np.array(expected.times[:count]) != np.array(actual.times[:count]))
-    padding = sum(
-        a != b and _content(expected, a) == _content(actual, b)
-        for a, b in zip(expected.data, actual.data, strict=False)
-    )
-    if counts[0] == counts[1] and different == padding and not len(disordered):
-        return Comparison(expected.topic, *counts, different, padding)
-    ours, theirs = expected.cut(count).columns(), actual.cut(count).columns()
-    steps = ours.get("step", np.arange(count))
-    found: list[tuple[int, Difference]] = []
+    found: list[Difference] = []
+    apart = []
+    if expected.times != actual.times:
+        apart.append(_apart(expected, actual))
+        _, rows, others = np.intersect1d(expected.times, actual.times, return_indices=True)
+        expected, actual = expected.rows(rows.tolist()), actual.rows(others.tolist())
+    common = len(expected.data)
+    pairs = list(zip(expected.data, actual.data, strict=True))
+    different = sum(a != b for a, b in pairs)
+    padding = sum(a != b and _content(expected, a) == _content(actual, b) for a, b in pairs)
     largest: dict[str, float] = {}
+    if different > padding or (not common and counts != (0, 0)):
+        ours, theirs = expected.columns(), actual.columns()
+        steps = ours.get("step", np.arange(common))
 
-    def note(row: int, name: str, a: Any, b: Any) -> None:
-        step, time = (int(steps[row]), expected.times[row]) if count else (0, 0)
-        found.append((row, Difference(expected.topic, step, time, name, a, b)))
+        def note(row: int, name: str, a: Any, b: Any) -> None:
+            step, time = (int(steps[row]), expected.times[row]) if common else (0, 0)
+            found.append(Difference(expected.topic, step, time, name, a, b))
 
-    if len(disordered):
-        row = int(disordered[0])
-        note(row, "time (ns)", expected.times[row], actual.times[row])
-    for name in dict.fromkeys((*ours, *theirs)):
-        if name in ignored:
-            continue
-        if name not in ours or name not in theirs:
-            note(0, name, name in ours, name in theirs)
-        elif count:
-            _compare_column(name, ours, theirs, tolerance, largest, note)
-    if counts[0] != counts[1]:
-        last = int(steps[count - 1]) + 1 if count else 0
-        time = max(expected.times[count - 1 : count], default=0)
-        found.append((count, Difference(expected.topic, last, time, "number of messages", *counts)))
-    first = min(found, key=lambda entry: entry[0])[1] if found else None
-    return Comparison(expected.topic, *counts, different, padding, first, largest)
+        for name in dict.fromkeys((*ours, *theirs)):
+            if name in ignored:
+                continue
+            if name not in ours or name not in theirs:
+                note(0, name, name in ours, name in theirs)
+            elif common:
+                _compare_column(name, ours, theirs, tolerance, largest, note)
+    first = min(found + apart, key=lambda difference: difference.time_ns, default=None)
+    return Comparison(expected.topic, *counts, common, different, padding, first, largest)
+
+
+def _apart(expected: Track, actual: Track) -> Difference:
+    """Return where two tracks of different times part: at a time that only one has, or where their order differs."""
+    ours, theirs = expected.times, actual.times
+    only = np.setxor1d(ours, theirs)
+    swapped = (a for a, b in zip(ours, theirs, strict=False) if a != b)
+    time = int(only[0]) if len(only) else next(swapped, ours[-1])
+    track = expected if time in ours else actual
+    row = track.times.index(time)
+    step = int(track.rows([row]).columns().get("step", [row])[0])
+    if len(ours) != len(theirs):
+        return Difference(expected.topic, step, time, "number of messages", len(ours), len(theirs))
+    if len(only):
+        words = ("recorded", "missing") if track is expected else ("missing", "recorded")
+        return Difference(expected.topic, step, time, "message", *words)
+    return Difference(expected.topic, step, time, "time (ns)", time, theirs[row])
 
 
 def _content(track: Track, message: bytes) -> bytes:

@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 
 from hsv.errors import RecordingError, reason
 from hsv.recording.reader import Bag
+from hsv.recording.shortcomings import shortcomings
 from hsv.recording.units import units_of
+
+INCOMPLETE = "incomplete"
+"""Where an export says what its bag lacks."""
 
 
 class Format(StrEnum):
@@ -40,7 +44,8 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
             f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
         )
     npz = form is Format.npz
-    contents = _arrays(bag, topics) if npz else {topic: _table(bag, topic) for topic in topics}
+    lacking = "; ".join(shortcomings(bag))
+    contents: dict[str, Any] = _arrays(bag, topics) if npz else {topic: _table(bag, topic) for topic in topics}
     try:
         (target.parent if npz else target).mkdir(parents=True, exist_ok=npz)
     except OSError as error:
@@ -48,10 +53,15 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
     try:
         if npz:
             with target.open("wb") as stream:
-                np.savez_compressed(stream, **contents)
+                said: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
+                np.savez_compressed(stream, **contents, **said)
             return [target]
         write = _write_csv if form is Format.csv else _write_parquet
-        return [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
+        written = [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
+        if lacking:
+            written.append(target / f"{INCOMPLETE}.txt")
+            written[-1].write_text(f"{bag.path}: {lacking}\n", encoding="utf-8")
+        return written
     except BaseException as error:
         # Half an export would be in the way of the next one.
         shutil.rmtree(target, ignore_errors=True)

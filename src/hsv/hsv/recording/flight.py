@@ -20,7 +20,7 @@ def labels(bags: Sequence[Bag]) -> list[str]:
     scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
     names = scenarios
     for details in (
-        [bag.path.absolute().parent.name for bag in bags],
+        [bag.folder.absolute().name for bag in bags],
         [str(bag.path) for bag in bags],
         [f"{bag.path}, {number}" for number, bag in enumerate(bags, 1)],
     ):
@@ -63,7 +63,7 @@ def flight_data(bag: Bag) -> FlightData:
         command=input_columns(command),
         saturated=tube["saturated"],
         gain_index=nominal["gain_index"],
-        fault_start=float(bag.times("/hsv/fault_status")[acting[0]]) * 1e-9 if len(acting) else None,
+        fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )
 
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.errors import RecordingError
-from hsv.graph.description import TOPICS
 from hsv.recording.flight import flight_fingerprint
 from hsv.recording.reader import Bag
-from hsv.recording.steps import cut_off
+from hsv.recording.shortcomings import shortcomings
+from hsv.recording.steps import complete_stamps, cut_off
 from hsv.simulation.fingerprint import as_published
 
 FAULT_STATUS = "/hsv/fault_status"
@@ -25,11 +25,11 @@ def describe(bag: Bag) -> dict[str, Any]:
     Returns:
     -------
     dict
-        ``path``, ``complete``, ``start_s``, ``duration_s``, ``messages``, ``topics``, ``custom_data``,
-        ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is nothing to compare it with),
-        ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one entry per interval of a
-        channel), ``saturation`` and ``tube``; the last four are None without the topic that tells. Times are
-        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
+        ``path``, ``folder``, ``complete``, ``shortcomings`` (in words), ``start_s``, ``duration_s``, ``messages``,
+        ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
+        nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
+        entry per interval of a channel), ``saturation`` and ``tube``; the last four are None without the topic that
+        tells. Times are simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
     fingerprint = _fingerprint(bag)
@@ -37,7 +37,9 @@ def describe(bag: Bag) -> dict[str, Any]:
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     return {
         "path": str(bag.path),
+        "folder": str(bag.folder),
         "complete": bag.complete,
+        "shortcomings": shortcomings(bag),
         "start_s": start / 1e9,
         "duration_s": (end - start) / 1e9,
         "messages": sum(topic["messages"] for topic in topics),
@@ -72,7 +74,7 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
 
 def _ending(bag: Bag) -> str:
     status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
-    if cut_off(bag) and any(bag.topics[topic].count < len(status) for topic in TOPICS if topic in bag.topics):
+    if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
         return "broken off"  # the last state may be there, but not what was made of it
     endings = {constants["FINISHED"]: "finished", constants["DIVERGED"]: "diverged"}
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"

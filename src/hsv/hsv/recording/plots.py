@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
+from textwrap import fill
 
 import matplotlib
 from matplotlib.figure import Figure
@@ -23,9 +24,18 @@ _PANELS = (
     ("elevator deflection", "rad", "command", 1),
 )
 
+_REMARK_WIDTH = 130
+"""Characters in a line of a remark."""
 
-def flight_figure(flights: Mapping[str, FlightData], paper_units: bool) -> Figure:
-    """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on."""
+
+def flight_figure(flights: Mapping[str, FlightData], paper_units: bool, remarks: Sequence[str] = ()) -> Figure:
+    """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
+
+    Args:
+        flights: The flights by label.
+        paper_units: Whether to draw in the paper's units.
+        remarks: What has to be said of the flights, such as that steps are missing; stands above the panels.
+    """
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(10, 9), layout="constrained")
         axes = figure.subplots(4, 2, sharex=True).ravel()
@@ -41,6 +51,8 @@ def flight_figure(flights: Mapping[str, FlightData], paper_units: bool) -> Figur
             axis.set_title(f"{title}{'' if unit == '1' else f' [{_mathtext(shown)}]'}", loc="left", fontsize=9)
             axis.grid(alpha=0.25, linewidth=0.5)
             axis.margins(x=0)
+        if remarks:
+            figure.suptitle("\n".join(fill(remark, _REMARK_WIDTH) for remark in remarks), fontsize=8, color="tab:red")
         axes[0].legend(frameon=False, loc="lower right")
         for axis in axes[-2:]:
             axis.set_xlabel("time [s]")

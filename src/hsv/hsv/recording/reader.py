@@ -1,16 +1,16 @@
-"""Reading a bag, also one whose writer was killed."""
+"""Reading a bag that hsv or ``ros2 bag`` wrote: of one file or several, compressed or not, whole or damaged."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Metadata, Schema
+from mcap.records import Attachment, Channel, Metadata, Schema
 from numpy.typing import NDArray
 from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
@@ -18,14 +18,29 @@ from rosbags.typesys.store import Typestore
 from hsv.errors import RecordingError
 from hsv.graph.description import OTHER_TOPICS, TOPICS
 from hsv.recording.columns import Columns
-from hsv.recording.metadata import CUSTOM_DATA
-from hsv.recording.scan import DAMAGE, MESSAGE_HEADER, attachment, content, records
+from hsv.recording.files import find_files, read_file, read_message
+from hsv.recording.metadata import (
+    CUSTOM_DATA,
+    DISTRO,
+    ROSBAG2,
+    SERIALIZED,
+    custom_data,
+    message_counts,
+    parsed,
+    read_metadata,
+)
+from hsv.recording.scan import MESSAGE_HEADER, Damage, Scan, content
 from hsv.recording.topic import Qos
 from hsv.recording.track import Track
 from hsv.recording.typestore import message_types
 
 NAMESPACE = "/hsv/"
 """A bag of this project has topics below this name."""
+
+_KNOWN = TOPICS | OTHER_TOPICS
+_STAMP_START, _STAMP_END = 4, 12
+"""Where the messages of a step carry their stamp: seconds and nanoseconds, of four bytes each."""
+_BIG_ENDIAN = b"\x00\x00"
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,66 +53,112 @@ class RecordedTopic:
     type_hash: str
 
 
+@dataclass
+class _Recorded:
+    """What files hold of a topic; its channels differ at most in their quality of service."""
+
+    channel: Channel
+    schema: Schema
+    log_times: list[int] = field(default_factory=list)
+    messages: list[bytes] = field(default_factory=list)
+
+
+@dataclass
+class Loss:
+    """What a bag has lost, as far as its files tell."""
+
+    files: list[str] = field(default_factory=list)
+    """Files that the bag should have."""
+    damages: list[tuple[Path, Damage]] = field(default_factory=list)
+    messages: int = 0
+    """Messages that were recorded and cannot be read."""
+    attachments: int = 0
+    counted: bool = True
+    """Whether the numbers are known, not only the least that they can be."""
+
+    def __bool__(self) -> bool:
+        return bool(self.files or self.damages or self.messages or self.attachments)
+
+
 class Bag:
     """A recorded run: its topics, messages, attachments and custom data.
+
+    Times are simulated ones, in nanoseconds: of the step topics the stamp that every message begins with, whenever it
+    was received; of the others that of the last step before them. Damage is skipped and told in :attr:`loss`.
 
     Parameters
     ----------
     path
-        A bag directory, or the MCAP file in it.
+        A bag directory, or a file in it.
 
     Raises:
     ------
     RecordingError
-        If there is no such bag, it is no MCAP file, it is damaged or cut off before its first messages, or it is not
-        of this project.
+        If there is no such bag, it is no MCAP file, nothing of it can be read, or it is not of this project.
     """
 
     def __init__(self, path: Path | str) -> None:
-        self.path = find_mcap(Path(path))
-        self.complete = False
-        """Whether the writer closed the file; a killed writer leaves one that :mod:`hsv.recording.recover` mends."""
+        given = Path(path)
+        self.files, missing = find_files(given)
+        """The files of the bag, in their order."""
+        self.path = self.files[0] if len(self.files) == 1 and not missing else given
+        """The file, or the directory of several."""
+        self.folder = self.files[0].parent
+        """The bag directory."""
+        self.complete = not missing
+        """Whether the writer closed every file; a killed writer leaves one that is cut off."""
+        self.loss = Loss(files=missing)
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
         """Media type of each attachment."""
         self.custom_data: dict[str, str] = {}
-        self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, Channel] = {}
-        self._messages: dict[int, tuple[list[int], list[bytes]]] = {}
-        """By channel; channels of one topic share theirs, in the order of the file."""
+        self.distro = DISTRO
+        """The distribution of ROS 2 that it was recorded with."""
+        self._topics: dict[str, _Recorded] = {}
         self._columns: dict[str, Columns] = {}
-        try:
-            self._read()
-        except (*DAMAGE, KeyError) as error:
-            raise RecordingError(f"{self.path}: is damaged ({str(error) or type(error).__name__})") from None
+        self._read()
         self._check()
 
     @property
     def topics(self) -> dict[str, RecordedTopic]:
         """The topics by name, those without messages included."""
         return {
-            channel.topic: RecordedTopic(
-                channel.topic,
-                self._schemas[channel.schema_id].name,
-                len(self._messages[channel.id][0]),
-                channel.metadata.get("topic_type_hash", ""),
+            name: RecordedTopic(
+                name,
+                recorded.schema.name,
+                len(recorded.messages),
+                recorded.channel.metadata.get("topic_type_hash", ""),
             )
-            for channel in self._channels.values()
+            for name, recorded in self._topics.items()
         }
 
     @cached_property
     def span(self) -> tuple[int, int]:
         """First and last time in the bag in nanoseconds; zeros if it holds no message."""
-        times = [(min(times), max(times)) for times, _ in self._messages.values() if times]
+        times = [(int(times.min()), int(times.max())) for times in map(self.times, self._topics) if len(times)]
         return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
 
     def times(self, topic: str) -> NDArray[np.int64]:
-        """Return the times of the messages of a topic, shape (n,), in nanoseconds."""
-        return np.array(self._of(topic)[0], np.int64)
+        """Return the simulated times of the messages of a topic, shape (n,), in nanoseconds.
+
+        Raises:
+        ------
+        RecordingError
+            If the topic is not in the bag, or a message of a step is too short to have a stamp.
+        """
+        recorded = self._of(topic)
+        if topic in TOPICS:
+            return self._stamps(topic, recorded.messages)
+        log_times = np.array(recorded.log_times, np.int64)
+        received, stamps = self._clock
+        if np.array_equal(received, stamps):
+            return log_times  # of a recorder that goes by simulated time itself
+        before = np.searchsorted(received, log_times, side="right") - 1
+        return np.asarray(stamps[np.maximum(before, 0)])
 
     def messages(self, topic: str) -> list[tuple[int, bytes]]:
-        """Return the messages of a topic as recorded: time in nanoseconds and CDR with its header."""
-        return list(zip(*self._of(topic), strict=True))
+        """Return the messages of a topic as recorded: simulated time in nanoseconds and CDR with its header."""
+        return list(zip(self.times(topic).tolist(), self._of(topic).messages, strict=True))
 
     def columns(self, topic: str) -> Columns:
         """Return all messages of a topic, decoded, one array per field.
@@ -135,8 +196,10 @@ class Bag:
         RecordingError
             If the topic is not in the bag.
         """
-        times, messages = self._of(topic)
-        return Track(topic, self.topics[topic].type, self.types, times, messages, str(self.path))
+        recorded = self._of(topic)
+        if (kind := recorded.schema.name) not in self.types.fielddefs:
+            raise RecordingError(f"{self.path}: topic {topic}: the definition of {kind} cannot be used")
+        return Track(topic, kind, self.types, self.times(topic).tolist(), recorded.messages, str(self.path))
 
     def text(self, name: str) -> str:
         """Return an attachment as text.
@@ -155,99 +218,162 @@ class Bag:
 
     def definition(self, topic: str) -> str:
         """Return the definition of a topic's type as recorded, its dependencies included."""
-        self._of(topic)
-        return next(self._definitions[c.schema_id] for c in self._channels.values() if c.topic == topic)
+        return self._text(self._of(topic).schema)
 
     def qos(self, topic: str) -> Qos:
         """Return the quality of service with which a topic was offered; the default if the bag does not tell."""
-        self._of(topic)
-        metadata = next(c.metadata for c in self._channels.values() if c.topic == topic)
-        return Qos.from_yaml(metadata.get("offered_qos_profiles", ""))
+        return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""))
 
     def constants(self, topic: str) -> dict[str, ConstValue]:
         """Return the constants that the type of a topic defines, as recorded in the bag."""
-        self._of(topic)
-        return {name: value for name, _, value in self.types.fielddefs[self.topics[topic].type][0]}
+        return {name: value for name, _, value in self.types.fielddefs[self._of(topic).schema.name][0]}
 
     @cached_property
     def types(self) -> Typestore:
         """The message types as the bag's own definitions state them."""
-        definitions = [(schema.name, self._definitions[schema.id]) for schema in self._schemas.values()]
-        return message_types(definitions, str(self.path))
+        ours: dict[str, str] = {}
+        others: dict[str, str] = {}
+        for topic, recorded in self._topics.items():
+            (ours if _is_ours(topic) else others)[recorded.schema.name] = self._text(recorded.schema)
+        return message_types(list(ours.items()), str(self.path), list(others.items()))
 
-    @cached_property
-    def _definitions(self) -> dict[int, str]:
-        """Text of each schema, by its id."""
+    def _text(self, schema: Schema) -> str:
         try:
-            return {schema.id: schema.data.decode() for schema in self._schemas.values()}
+            return schema.data.decode()
         except UnicodeDecodeError as error:
             raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
 
-    def _of(self, topic: str) -> tuple[list[int], list[bytes]]:
-        for channel in self._channels.values():
-            if channel.topic == topic:
-                return self._messages[channel.id]
+    def _of(self, topic: str) -> _Recorded:
+        if topic in self._topics:
+            return self._topics[topic]
         raise RecordingError(f"{self.path}: no topic {topic}, only {', '.join(sorted(self.topics))}")
 
+    def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
+        """Return the stamps that the messages of a step topic begin with, right behind the header of the CDR."""
+        if any(len(message) < _STAMP_END for message in messages):
+            raise RecordingError(f"{self.path}: topic {topic}: a message of less than {_STAMP_END} bytes")
+        order = ">" if messages and messages[0].startswith(_BIG_ENDIAN) else "<"
+        raw = b"".join(message[_STAMP_START:_STAMP_END] for message in messages)
+        stamps = np.frombuffer(raw, np.dtype([("sec", f"{order}i4"), ("nanosec", f"{order}u4")]))
+        return np.asarray(stamps["sec"].astype(np.int64) * 10**9 + stamps["nanosec"])
+
+    @cached_property
+    def _clock(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Log times at which steps were received, ascending, and the latest stamp received until then."""
+        steps = [topic for topic in TOPICS if topic in self._topics]
+        received = np.concatenate([np.array([], np.int64), *(self._topics[topic].log_times for topic in steps)])
+        stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
+        order = np.argsort(received, kind="stable")
+        return received[order].astype(np.int64), np.maximum.accumulate(stamps[order].astype(np.int64))
+
     def _read(self) -> None:
+        metadata = read_metadata(self.folder)
+        counts = message_counts(metadata)
+        recorded_by: dict[str, Any] = metadata
+        for file in self.files:
+            data = read_file(file)
+            scan = Scan(data)
+            # Of several files, one that is nothing any more is a damage.
+            if len(self.files) == 1 and not data:
+                raise RecordingError(f"{file}: is empty, expected an MCAP file")
+            if len(self.files) == 1 and not scan.is_mcap:
+                raise RecordingError(f"{file}: is not an MCAP file (starts with {data[:8].hex(' ')})")
+            found, orphans, attachments, rosbag2 = self._read_file(scan)
+            recorded_by = rosbag2 or recorded_by
+            self.complete &= scan.closed
+            self.loss.damages += [(file, damage) for damage in scan.damages]
+            statistics = scan.statistics
+            expected = statistics.message_count if statistics else counts.get(file.name)
+            self.loss.counted &= expected is not None or not scan.damages
+            self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
+            self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
+        self.loss.counted &= not self.loss.files
+        self.custom_data = self.custom_data or custom_data(recorded_by)
+        self.distro = str(recorded_by.get("ros_distro") or DISTRO)
+
+    def _read_file(self, scan: Scan) -> tuple[int, int, int, dict[str, Any]]:
+        """Add what a file holds; return the messages read, those of unknown topics, attachments, rosbag2's metadata."""
         unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
-        for opcode, body in records(self.path):
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Channel] = {}
+        # Channels of one topic share their lists, in the order of the file.
+        lists: dict[int, tuple[list[int], list[bytes]]] = {}
+        attachments = 0
+        rosbag2: dict[str, Any] = {}
+        for opcode, body in scan.records():
             match opcode:
                 case Opcode.MESSAGE:
                     channel_id, _, time, _ = unpack(body)
-                    times, messages = self._messages[channel_id]
+                    if channel_id not in lists:  # its channel is lost, or stands in the summary only
+                        lists[channel_id] = [], []
+                    times, messages = lists[channel_id]
                     times.append(time)
                     messages.append(bytes(body[size:]))
                 case Opcode.SCHEMA:
                     schema = Schema.read(content(body))
-                    self._schemas[schema.id] = schema
+                    schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
                 case Opcode.CHANNEL:
                     channel = Channel.read(content(body))
-                    first = next((c.id for c in self._channels.values() if c.topic == channel.topic), channel.id)
-                    self._channels[channel.id] = channel
-                    self._messages.setdefault(channel.id, self._messages.setdefault(first, ([], [])))
+                    if channel.id not in channels:
+                        channels[channel.id] = channel
+                        first = next(c.id for c in channels.values() if c.topic == channel.topic)
+                        shared, early = lists.setdefault(first, ([], [])), lists.get(channel.id)
+                        if early is not None and early is not shared:
+                            shared[0].extend(early[0])
+                            shared[1].extend(early[1])
+                        lists[channel.id] = shared
                 case Opcode.ATTACHMENT:
-                    attached = attachment(body)
+                    attached = Attachment.read(content(body))
+                    attachments += 1
                     self.attachments[attached.name] = attached.data
                     self.media_types[attached.name] = attached.media_type
                 case Opcode.METADATA:
                     metadata = Metadata.read(content(body))
                     if metadata.name == CUSTOM_DATA:
                         self.custom_data |= metadata.metadata
-                case Opcode.FOOTER:
-                    self.complete = True
+                    elif metadata.name == ROSBAG2:
+                        rosbag2 = parsed(metadata.metadata.get(SERIALIZED, "")) or rosbag2
+        for channel in list(channels.values()):
+            try:
+                self._declare(channel, schemas.get(channel.schema_id))
+            except RecordingError:
+                if not scan.damages:
+                    raise
+                del channels[channel.id]  # its definition is lost, or not what it was
+        read = 0
+        for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
+            found = [(time, read_message(data)) for time, data in zip(*lists[number], strict=True)]
+            whole = [(time, message) for time, message in found if message is not None]
+            read += len(whole)
+            if topic in self._topics:
+                self._topics[topic].log_times += [time for time, _ in whole]
+                self._topics[topic].messages += [message for _, message in whole]
+        orphans = sum(len(times) for number, (times, _) in lists.items() if number not in channels)
+        return read, orphans, attachments, rosbag2
+
+    def _declare(self, channel: Channel, schema: Schema | None) -> None:
+        """Take up the topic of a channel; one of somebody else's whose messages cannot be decoded is left out."""
+        name = channel.topic
+        decodable = schema is not None and (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
+        if not decodable and not _is_ours(name):
+            return
+        if schema is None or not decodable:
+            raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
+        if schema.name != (expected := _KNOWN.get(name, schema.name)):
+            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
+        first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
+        if (schema.name, schema.data) != (first.name, first.data):
+            raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")
 
     def _check(self) -> None:
-        if not self._channels and not self.complete:
+        if not self._topics and self.loss.damages:
+            file, damage = self.loss.damages[0]
+            raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
+        if not self._topics and not self.complete:
             raise RecordingError(f"{self.path}: is cut off before its first messages")
-        if not any(channel.topic.startswith(NAMESPACE) for channel in self._channels.values()):
+        if not any(topic.startswith(NAMESPACE) for topic in self._topics):
             raise RecordingError(f"{self.path}: has no topic below {NAMESPACE}, expected a bag of this project")
-        known = TOPICS | OTHER_TOPICS
-        found: dict[str, Schema] = {}
-        for channel in self._channels.values():
-            schema = self._schemas.get(channel.schema_id)
-            if schema is None or (schema.encoding, channel.message_encoding) != ("ros2msg", "cdr"):
-                raise RecordingError(f"{self.path}: topic {channel.topic}: expected a ROS 2 message in CDR")
-            if schema.name != (expected := known.get(channel.topic, schema.name)):
-                raise RecordingError(f"{self.path}: topic {channel.topic} is {schema.name}, expected {expected}")
-            first = found.setdefault(channel.topic, schema)
-            if (schema.name, schema.data) != (first.name, first.data):
-                raise RecordingError(f"{self.path}: topic {channel.topic}: recorded with two definitions, expected one")
 
 
-def find_mcap(path: Path) -> Path:
-    """Return the MCAP file of a bag directory, or the file itself.
-
-    Raises:
-    ------
-    RecordingError
-        If there is none, or more than one.
-    """
-    if path.is_file():
-        return path
-    if not path.is_dir():
-        raise RecordingError(f"{path}: does not exist, expected a bag directory or an MCAP file")
-    found = sorted(path.glob("*.mcap"))
-    if len(found) != 1:
-        raise RecordingError(f"{path}: holds {len(found)} files *.mcap, expected a bag directory with one")
-    return found[0]
+def _is_ours(topic: str) -> bool:
+    return topic in _KNOWN or topic.startswith(NAMESPACE)

@@ -13,6 +13,8 @@ from hsv.recording.columns import Columns
 from hsv.recording.reader import Bag
 from hsv.recording.recover import RECOVERED
 
+RUN, STATE = "/hsv/run", "/hsv/state"
+
 
 def cut_off(bag: Bag) -> bool:
     """Whether what was recorded last may be missing: the recorder was killed, even if the bag was mended since."""
@@ -41,28 +43,104 @@ def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
     return rows
 
 
+def expected_stamps(bag: Bag) -> NDArray[np.int64]:
+    """Return the stamps, in nanoseconds, of all steps that the bag should hold.
+
+    They are those that the plant announced on /hsv/run, up to the state that it called the last. Of a bag without an
+    announcement they end with the last step that any topic has.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    found = np.unique(np.concatenate([np.array([], np.int64), *_stamps(bag).values()]))
+    announced = _announced(bag) or _numbered(bag)
+    if not announced:
+        return found
+    period, last = announced
+    state = bag.columns(STATE) if STATE in bag.topics else Columns()
+    if {"status", "step"} <= state.keys() and len(ends := np.flatnonzero(state["status"])):
+        last = int(state["step"][ends[0]])
+    return np.union1d(np.round(np.arange(last + 1) * period * 1e9).astype(np.int64), found)
+
+
+def _announced(bag: Bag) -> tuple[float, int] | None:
+    """Return period and last step of the run as the plant announced it, None where it is not in the bag."""
+    columns = bag.columns(RUN) if RUN in bag.topics else Columns()
+    if not {"period", "last_step"} <= columns.keys() or not len(columns["period"]):
+        return None
+    return float(columns["period"][-1]), int(columns["last_step"][-1])
+
+
+def _numbered(bag: Bag) -> tuple[float, int] | None:
+    """Return the period, and the last step, that the recorded steps tell by their number."""
+    last: tuple[float, int] | None = None
+    for topic, stamps in _stamps(bag).items():
+        steps = bag.columns(topic).get("step", np.array([], np.uint64))
+        if len(steps) and (number := int(steps.max())) > (last[1] if last else 0):
+            last = float(stamps[np.argmax(steps)]) * 1e-9 / number, number
+    return last
+
+
+def _stamps(bag: Bag) -> dict[str, NDArray[np.int64]]:
+    return {topic: bag.times(topic) for topic in TOPICS if topic in bag.topics}
+
+
+def complete_stamps(bag: Bag) -> NDArray[np.int64]:
+    """Return the stamps of the steps of which the bag has every step topic that it has at all."""
+    stamps = list(_stamps(bag).values())
+    common = np.unique(stamps[0]) if stamps else np.array([], np.int64)
+    for stamp in stamps:
+        common = np.intersect1d(common, stamp)
+    return common
+
+
+def lost_seconds(bag: Bag) -> float:
+    """Return the simulated time of the steps that the bag lacks, or has without one of its topics.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    stamps = expected_stamps(bag)
+    if len(stamps) < 2:
+        return 0.0
+    missing = len(np.setdiff1d(stamps, complete_stamps(bag)))
+    return missing * float(np.median(np.diff(stamps))) * 1e-9
+
+
 def irregularities(bag: Bag) -> list[str]:
-    """Say which step topics lack steps that others have, or have theirs twice or out of order; nothing of a whole bag.
+    """Say which steps are missing, on all topics or on some, or twice or out of order; nothing of a whole bag.
 
     Of a bag that is cut off, the steps count that all topics have reached.
 
     Raises:
         RecordingError: A message does not fit its definition.
     """
-    stamps: dict[str, NDArray[np.int64]] = {}
-    for topic in TOPICS:
-        if topic in bag.topics:
-            columns = bag.columns(topic)
-            if name := next((name for name in ("clock", "header.stamp") if name in columns), None):
-                stamps[topic] = columns[name]
-    every = np.unique(np.concatenate([np.array([], np.int64), *stamps.values()]))
-    if cut_off(bag):
-        every = every[every <= min((stamp.max(initial=-1) for stamp in stamps.values()), default=-1)]
+    stamps = _stamps(bag)
+    every = expected_stamps(bag)
+    found = np.unique(np.concatenate([np.array([], np.int64), *stamps.values()]))
+    if not len(found):
+        return []
     words = []
+    if (end := int(every[-1])) > found[-1]:
+        words.append(f"ends at t = {found[-1] * 1e-9:.2f} s of {end * 1e-9:.2f} s")
+    if cut_off(bag):
+        reached = min(int(stamp.max(initial=-1)) for stamp in stamps.values())
+        every, found = every[every <= reached], found[found <= reached]
+    nowhere = np.setdiff1d(every, found)
+    if len(nowhere):
+        first = f"the first at t = {nowhere[0] * 1e-9:.2f} s"
+        words.append(f"lacks {len(nowhere)} of {len(every)} steps on all topics, {first}")
+    # Topics that are recorded together lack the same.
+    lacking: dict[tuple[int, ...], list[str]] = {}
     for topic, stamp in stamps.items():
-        if len(missing := np.setdiff1d(every, stamp)):
-            first = f"the first at t = {missing[0] * 1e-9:.2f} s"
-            words.append(f"{topic} lacks {len(missing)} of {len(every)} steps, {first}")
+        if len(missing := np.setdiff1d(found, stamp)):
+            lacking.setdefault(tuple(missing.tolist()), []).append(topic)
+    for missed, topics in lacking.items():
+        first = f"the first at t = {missed[0] * 1e-9:.2f} s"
+        more = "more " if len(nowhere) else ""
+        verb = "lacks" if len(topics) == 1 else "lack"
+        words.append(f"{', '.join(topics)} {verb} {len(missed)} {more}of {len(every)} steps, {first}")
+    for topic, stamp in stamps.items():
         if len(late := stamp[1:][stamp[1:] <= stamp[:-1]]):
             words.append(f"{topic} is out of order at t = {late[0] * 1e-9:.2f} s")
     return words

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -49,7 +49,13 @@ class Track:
 
     def cut(self, count: int) -> Track:
         """Return the first ``count`` messages."""
-        return Track(self.topic, self.type, self.types, self.times[:count], self.data[:count], self.source)
+        return self.rows(range(min(count, len(self.data))))
+
+    def rows(self, rows: Iterable[int]) -> Track:
+        """Return these messages."""
+        chosen = [(self.times[row], self.data[row]) for row in rows]
+        times, data = [time for time, _ in chosen], [message for _, message in chosen]
+        return Track(self.topic, self.type, self.types, times, data, self.source)
 
     def columns(self) -> Columns:
         """Return all messages decoded, one array per field; see :mod:`hsv.recording.columns`.

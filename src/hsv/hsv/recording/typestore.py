@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
@@ -11,12 +12,15 @@ from hsv.errors import RecordingError
 from hsv.recording.fields import TIMES, fields_of
 
 
-def message_types(definitions: Sequence[tuple[str, str]], source: str) -> Typestore:
+def message_types(
+    definitions: Sequence[tuple[str, str]], source: str, optional: Sequence[tuple[str, str]] = ()
+) -> Typestore:
     """Return the types of ``definitions``, complete: none refers to a type that is not there.
 
     Args:
         definitions: Name and text of each, in the ``ros2msg`` format of MCAP.
         source: Where they come from, for errors.
+        optional: More of them; what cannot be used of these is left out.
 
     Raises:
         RecordingError: A definition cannot be parsed, contradicts another, or refers to an unknown type or to itself.
@@ -29,6 +33,12 @@ def message_types(definitions: Sequence[tuple[str, str]], source: str) -> Typest
             raise RecordingError(f"{source}: definition of {name}: {str(error).splitlines()[0]}") from None
     for name, _ in definitions:
         _check(store, name, (), f"{source}: definition of {name}")
+    for name, text in optional:
+        with suppress(TypesysError, RecordingError):
+            alone = get_typestore(Stores.EMPTY)
+            alone.register(get_types_from_msg(text, name))
+            _check(alone, name, (), source)
+            store.register(alone.fielddefs)
     return store
 
 

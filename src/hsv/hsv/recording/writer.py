@@ -10,7 +10,15 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from hsv.errors import RecordingError
-from hsv.recording.metadata import CUSTOM_DATA, write_metadata
+from hsv.recording.metadata import (
+    CUSTOM_DATA,
+    ROSBAG2,
+    Tally,
+    TopicInformation,
+    information,
+    record,
+    write_metadata,
+)
 from hsv.recording.topic import Topic
 
 CHUNK_BYTES = 16 * 1024
@@ -67,6 +75,9 @@ class BagWriter:
         self._writer.start(profile="ros2")
         self._schemas: dict[tuple[str, str], int] = {}
         self._channels: dict[str, int] = {}
+        self._topics: dict[str, Topic] = {}
+        self._tallies: dict[str, Tally] = {}
+        self._custom_data: dict[str, str] = {}
         self._pending = 0
         self._add_custom_data(custom_data or {})
         for topic in topics:
@@ -91,6 +102,8 @@ class BagWriter:
             self._schemas[key],
             {"offered_qos_profiles": topic.qos.as_yaml(), "topic_type_hash": topic.type_hash},
         )
+        self._topics[topic.name] = topic
+        self._tallies[topic.name] = Tally()
 
     def __contains__(self, topic: str) -> bool:
         """Whether messages of this topic can be written."""
@@ -118,6 +131,7 @@ class BagWriter:
         except KeyError:
             raise RecordingError(f"topic {topic}: not in the bag, expected one that was added before") from None
         self._writer.add_message(channel, time_ns, data, time_ns)
+        self._tallies[topic].add(time_ns)
         self._pending += len(data) + _RECORD_OVERHEAD
         if self._pending >= CHUNK_BYTES:
             self.flush()
@@ -143,13 +157,20 @@ class BagWriter:
             What is known only at the end (outcome, wall time); added to that given at the start.
         """
         self._add_custom_data(custom_data or {})
+        topics = [
+            TopicInformation(name, topic.type, topic.qos.as_yaml(), topic.type_hash, self._tallies[name].count)
+            for name, topic in self._topics.items()
+        ]
+        values = information(self.path.name, Tally.of(self._tallies.values()), topics, self._custom_data)
         with self._writing():
+            self._writer.add_metadata(ROSBAG2, record(values))
             self._writer.finish()
             self._stream.close()
-            write_metadata(self.path)
+            write_metadata(self.directory, values)
 
     def _add_custom_data(self, custom_data: Mapping[str, str]) -> None:
         if custom_data:
+            self._custom_data |= custom_data
             with self._writing():
                 self._writer.add_metadata(CUSTOM_DATA, dict(custom_data))
                 self._stream.flush()

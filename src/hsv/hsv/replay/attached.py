@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mimetypes
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +11,18 @@ import numpy as np
 
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import ControlDesign, parse_parameters, read_design_parameters
+from hsv.control.design_file import ControlDesign, find_design, parse_parameters, read_design_parameters
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
 from hsv.graph.description import TOPICS, TUBE_MPC
+from hsv.graph.preparation import design_files, parameter_yaml
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
 from hsv.recording.reader import Bag
-from hsv.recording.steps import cut_off, joined
+from hsv.recording.steps import cut_off, expected_stamps, joined
 from hsv.recording.track import expecting_fields
+from hsv.simulation.assembly import blamed_on
+from hsv.simulation.scenario import parse_scenario, scenario_text
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 """Attachments: the parameters of the design and, over them, those of the scenario."""
@@ -29,17 +34,50 @@ ACTIVE_INPUT = 1e-6
 """Deviation of a command from the reference input (-, rad) from which on the controller does something."""
 
 
+def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
+    """Give a bag attachments that it lacks, in place of those that it has: as if it had been flown with these.
+
+    Args:
+        bag: Any bag of a flight.
+        design: Parameter file of the design; where none is given, that of ``scenario``.
+        scenario: Name of a shipped scenario, or path of a TOML file.
+
+    Raises:
+        ScenarioError: The scenario is not acceptable.
+        DesignError: The design is not acceptable.
+    """
+    files = {}
+    if scenario is not None:
+        text = scenario_text(scenario)
+        parsed = parse_scenario(text, Path(scenario).stem)
+        files = {"scenario.toml": text, SCENARIO: parameter_yaml(parsed.parameters())}
+        with blamed_on(parsed):
+            design = design or find_design(parsed.design)
+    if design is not None:
+        read_design_parameters(design)
+        files |= design_files(design)
+    for name, content in files.items():
+        bag.attachments[name] = content.encode()
+        bag.media_types[name] = mimetypes.guess_type(name)[0] or "text/plain"
+
+
 def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
     """Return the flat parameters of a recorded run; what was changed in flight, faults and tau, is part of them.
 
     Args:
-        bag: A bag of ``hsv run``.
+        bag: A bag of ``hsv run``, or one that :func:`supply` gave what it lacks.
         design: Parameter file to put in place of the attached design.
 
     Raises:
         RecordingError: The bag carries no parameters, or none that are acceptable.
         DesignError: ``design`` is not acceptable.
     """
+    for name in (DESIGN, SCENARIO):
+        if name not in bag.attachments:
+            raise RecordingError(
+                f"{bag.path}: no attachment {name}: ros2 bag record and convert keep none, expected --scenario "
+                "NAME|FILE and, where the flight had another design than the scenario's, --design FILE"
+            )
     attached = {name: parse_parameters(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO)}
     values = attached[DESIGN] | attached[SCENARIO]
     with expecting_fields(bag.path):
@@ -57,13 +95,15 @@ def controller_of(values: dict[str, Any]) -> str:
     return str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
 
 
-def complete_steps(bag: Bag) -> int:
-    """Return the number of steps of which the bag has every topic.
+def complete_steps(bag: Bag, topics: Iterable[str] = TOPICS) -> int:
+    """Return the number of steps, up to the first that is missing, of which the bag has every one of ``topics``.
 
     Raises:
         RecordingError: A topic is missing.
     """
-    return min(len(bag.messages(topic)) for topic in TOPICS)
+    stamps = [bag.times(topic) for topic in topics]
+    present = np.all([np.isin(expected_stamps(bag), stamp) for stamp in stamps], axis=0)
+    return min(*map(len, stamps), len(present) if present.all() else int(np.argmin(present)))
 
 
 def broken_off(bag: Bag) -> bool:

@@ -92,7 +92,7 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
     component = process.build(values)
     outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
     recorded = [bag.track(topic) for topic in process.inputs]
-    steps = complete_steps(bag) if broken_off(bag) else min(len(track.data) for track in recorded)
+    steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
 
     def step(inputs: tuple[Any, ...]) -> None:
         process.step(component, inputs, tuple(outputs.messages.values()), bag.types.types.__getitem__)

@@ -92,7 +92,9 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
         start = time[after][0]
         window = before & (time >= start - PRE_FAULT_WINDOW - 1e-9)
         attitude = flight.state[:, 2:4]
-        values["post_fault_attitude_deviation"] = float(np.max(np.abs(attitude[after] - attitude[window].mean(axis=0))))
+        if window.any():  # of a recording with a gap before the fault there is no mean
+            deviation = attitude[after] - attitude[window].mean(axis=0)
+            values["post_fault_attitude_deviation"] = float(np.max(np.abs(deviation)))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[after]))
         for mode, column in ((1, 6), (2, 8)):
             values[f"elastic_rate_{mode}_decay_time"] = _decay_time(

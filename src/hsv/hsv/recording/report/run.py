@@ -19,6 +19,7 @@ from hsv.recording.report.curves import FlightCurves, flight_curves
 from hsv.recording.report.events import Event, flight_events
 from hsv.recording.report.panels import INPUTS
 from hsv.recording.report.values import Value, parameters, tree
+from hsv.recording.shortcomings import completeness
 from hsv.simulation.limits import Verdict, verdicts
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import Scenario, parse_scenario
@@ -45,6 +46,8 @@ class ReportedRun:
     """Of the scenario and of the design."""
     input_limits: dict[str, tuple[float, float]]
     certificate: Value | None
+    incomplete: str
+    """Of how many of its steps the bag has every topic; empty if of all."""
 
     @property
     def custom(self) -> dict[str, str]:
@@ -54,7 +57,7 @@ class ReportedRun:
     @property
     def folder(self) -> Path:
         """The bag's folder."""
-        return Path(self.description["path"]).parent
+        return Path(self.description["folder"])
 
     @property
     def duration(self) -> float:
@@ -67,9 +70,14 @@ class ReportedRun:
         return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
 
     @property
+    def shortcomings(self) -> list[str]:
+        """What the bag lacks, in words."""
+        return list(self.description["shortcomings"])
+
+    @property
     def good(self) -> bool:
-        """Whether the flight came to its end within every limit."""
-        return not self.failure and all(verdict.within for verdict in self.verdicts.values())
+        """Whether the flight is recorded whole, and came to its end within every limit."""
+        return not self.failure and not self.incomplete and all(verdict.within for verdict in self.verdicts.values())
 
 
 def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
@@ -101,12 +109,13 @@ def _reported_run(bag: Bag, label: str) -> ReportedRun:
         parameters={name: parameters(flat, DECLARED) for name, flat in values.items()},
         input_limits=_input_limits(values["design"]),
         certificate=_certificate(bag),
+        incomplete=completeness(bag),
     )
 
 
 def _scenario(text: str, name: str) -> tuple[Scenario | None, str]:
     if not text:
-        return None, "no scenario is attached to the bag, so there are no limits to judge by"
+        return None, "no scenario is attached to the bag, so there are no limits to judge by: --scenario gives one"
     try:
         return parse_scenario(text, name), ""
     except HsvError as error:

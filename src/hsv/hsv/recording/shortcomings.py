@@ -1,0 +1,51 @@
+"""What a bag lacks although it can be read, in words: for every page, plot, table and line that is made of it."""
+
+from __future__ import annotations
+
+from hsv.errors import RecordingError
+from hsv.graph.description import TOPICS
+from hsv.recording.reader import Bag, Loss
+from hsv.recording.steps import complete_stamps, expected_stamps, irregularities
+
+_DAMAGES_NAMED = 3
+
+
+def shortcomings(bag: Bag) -> list[str]:
+    """Say that a bag is damaged or cut off, which topics of the steps it lacks, and which steps of a topic."""
+    words = loss_in_words(bag.loss)
+    if not bag.complete and not bag.loss.files:
+        words.append(f"cut off after {bag.span[1] * 1e-9:.2f} s, hsv recover mends it")
+    elif bag.loss:
+        words.append("hsv recover makes a whole bag of the rest")
+    if missing := [topic for topic in TOPICS if topic not in bag.topics]:
+        words.append(f"no topic {', '.join(missing)}")
+    try:
+        words += irregularities(bag)
+    except RecordingError as error:
+        words.append(str(error).removeprefix(f"{bag.path}: "))
+    return words
+
+
+def loss_in_words(loss: Loss) -> list[str]:
+    """Say which files a bag lacks, where it is damaged, and how much of it cannot be read."""
+    words = [f"lacks its file {name}" for name in loss.files]
+    if loss.damages:
+        places = "; ".join(f"{path.name}: {damage}" for path, damage in loss.damages[:_DAMAGES_NAMED])
+        more = len(loss.damages) - _DAMAGES_NAMED
+        words.append(f"damaged ({places}{f'; and {more} more places' if more > 0 else ''})")
+    lost = [f"{n} {what}" for n, what in ((loss.messages, "messages"), (loss.attachments, "attachments")) if n]
+    if lost:
+        words.append(f"{'' if loss.counted else 'at least '}{' and '.join(lost)} lost")
+    elif loss:
+        words.append("no message lost" if loss.counted else "an unknown number of messages lost")
+    return words
+
+
+def completeness(bag: Bag) -> str:
+    """Return of how many of its steps a bag has every topic, in words; empty if of all.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    complete, expected = len(complete_stamps(bag)), len(expected_stamps(bag))
+    return f"{complete} of {expected} steps" if complete < expected else ""

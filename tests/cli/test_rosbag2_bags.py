@@ -1,0 +1,202 @@
+"""Bags that the tools of rosbag2 have recorded, split, compressed or converted give what the original gives."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import zstandard
+from mcap.writer import CompressionType
+from rosbag2_bags import converted, recorded
+from rosbags.rosbag2 import CompressionMode
+
+from hsv.recording.reader import Bag
+
+Hsv = Callable[..., Any]
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
+TIMELESS = ("custom_data", "ending", "faults", "saturation", "tube", "messages", "metrics", "metrics_complete")
+"""What ``hsv info`` says that does not depend on when messages without a stamp were received."""
+
+
+def _whole_files(path: Path) -> Path:
+    """The original with its file compressed, attachments and all."""
+    shutil.copytree(REFERENCE, path)
+    file = path / "case1_0.mcap"
+    (path / f"{path.name}_0.mcap.zstd").write_bytes(zstandard.ZstdCompressor().compress(file.read_bytes()))
+    file.unlink()
+    (path / "metadata.yaml").unlink()
+    return path
+
+
+def _reindexed(path: Path) -> Path:
+    """The original without its metadata.yaml: what reindex makes anew comes from the MCAP file."""
+    shutil.copytree(REFERENCE, path)
+    (path / "metadata.yaml").unlink()
+    return path
+
+
+FORMS: dict[str, Callable[[Path], Path]] = {
+    "split": lambda path: recorded(REFERENCE, path, files=3, wall=False),
+    "split, zstd by file": lambda path: recorded(REFERENCE, path, files=2, wall=False, mode="file", compression="zstd"),
+    "lz4 by file": lambda path: recorded(REFERENCE, path, wall=False, mode="file", compression="lz4"),
+    "lz4 by message": lambda path: recorded(REFERENCE, path, wall=False, mode="message", compression="lz4"),
+    "lz4 chunks": lambda path: recorded(REFERENCE, path, wall=False, chunks=CompressionType.LZ4),
+    "zstd by file": lambda path: converted(REFERENCE, path, CompressionMode.FILE),
+    "zstd by message": lambda path: converted(REFERENCE, path, CompressionMode.MESSAGE),
+    "converted": lambda path: converted(REFERENCE, path),
+    "with attachments, zstd by file": _whole_files,
+    "reindexed": _reindexed,
+}
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    return Bag(REFERENCE)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_every_form_gives_what_the_original_gives(hsv: Hsv, original: Bag, tmp_path: Path, form: str) -> None:
+    path = FORMS[form](tmp_path / "given")
+    bag = Bag(path)
+    assert bag.complete and not bag.loss
+    assert bag.topics.keys() == original.topics.keys()
+    for topic in original.topics:
+        assert bag.topics[topic].type == original.topics[topic].type
+        assert bag.messages(topic) == original.messages(topic)
+    ran, expected = hsv("info", str(path), "--json"), hsv("info", str(REFERENCE), "--json")
+    assert ran.code == 0 and ran.err == ""
+    theirs, ours = expected.json, ran.json
+    attached = bool(bag.attachments)
+    for said in (theirs, ours):
+        for name in ("path", "folder", *(() if attached else ("attachments",))):
+            del said[name]
+    if not original.custom_data.items() <= bag.custom_data.items():
+        assert form.startswith(("converted", "zstd by"))  # rosbags keeps none
+        ours["custom_data"] = theirs["custom_data"]
+    assert ours == theirs
+
+
+@pytest.mark.parametrize("form", ["split, zstd by file", "with attachments, zstd by file"])
+def test_tables_and_pages_are_the_same(hsv: Hsv, tmp_path: Path, form: str) -> None:
+    path = FORMS[form](tmp_path / "case1")
+    tables, pages = [], []
+    supplied = [] if Bag(path).attachments else ["--scenario", str(REFERENCE.with_suffix(".toml"))]
+    for name, bag in (("ours", REFERENCE), ("theirs", path)):
+        assert hsv("export", str(bag), "--npz", "--out", f"{name}.npz").code == 0
+        tables.append(np.load(tmp_path / f"{name}.npz"))
+        assert hsv("report", str(bag), "--out", f"{name}.html", *(supplied if bag is path else [])).err == ""
+        pages.append((tmp_path / f"{name}.html").read_text())
+    assert set(tables[0].files) == set(tables[1].files)
+    for name in tables[0].files:
+        np.testing.assert_array_equal(tables[0][name], tables[1][name])
+    for start, end in (
+        ('<section id="metrics"', "</section>"),
+        ('id="numbers">', "</script>"),
+        ("<h3>Scenario", "</details>"),
+    ):
+        parts = [page[page.index(start) :].partition(end)[0] for page in pages]
+        assert len(parts[0]) > 100 and parts[0].replace("case1", "") == parts[1].replace("case1", ""), start
+
+
+def test_wall_clock_log_times_change_nothing(hsv: Hsv, tmp_path: Path) -> None:
+    path = recorded(REFERENCE, tmp_path / "wall", files=2)
+    ran, expected = hsv("info", str(path), "--json"), hsv("info", str(REFERENCE), "--json")
+    assert ran.code == 0 and ran.err == ""
+    for name in TIMELESS:
+        assert ran.json[name] == expected.json[name], name
+    assert ran.json["metrics"]["post_fault_attitude_deviation_rad"] > 0.0
+    assert ran.json["duration_s"] == expected.json["duration_s"]
+    assert ran.json["faults"][0]["start_s"] == 20.0
+    same = hsv("diff", str(REFERENCE), str(path))
+    assert same.code == 0 and same.out.endswith("messages: identical\n")
+    original, bag = Bag(REFERENCE), Bag(path)
+    for topic in original.topics:
+        # What has no stamp of its own counts for the step before, which may be one of another topic of that step.
+        assert np.abs(bag.times(topic) - original.times(topic)).max() <= 20_000_000, topic
+
+
+def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
+    lost = {int(step) for step in np.random.default_rng(3).choice(2001, 400, replace=False)}
+    period = 20_000_000
+    path = recorded(
+        REFERENCE,
+        tmp_path / "lossy",
+        kept=lambda topic, time: (
+            not topic.startswith(("/hsv/", "/clock"))
+            or topic in ("/hsv/run", "/hsv/ready")
+            or time // period not in lost
+        ),
+    )
+    said = f"lacks 400 of 2001 steps on all topics, the first at t = {min(lost) * 0.02:.2f} s"
+    for command, *words in (
+        ("report", "--out", "out.html"),
+        ("plot", "--out", "out.svg"),
+        ("export", "--csv", "--out", "tables"),
+        ("diff", str(REFERENCE)),
+    ):
+        ran = hsv(command, str(path), *words)
+        assert ran.code == (command == "diff"), command
+        assert said in ran.err, command
+    assert f"they part at t = {min(lost) * 0.02:.2f} s: step {min(lost)} " in ran.out
+    assert f"{9 * 1601} messages of the same steps are compared, and they are equal" in ran.out
+    ran = hsv("info", str(path))
+    out = ran.out
+    assert said in ran.err and said in out and "Metrics of an incomplete bag: 1601 of 2001 steps" in out
+    report = hsv("info", str(path), "--json").json
+    assert not report["metrics_complete"] and said in report["shortcomings"]
+    page = (tmp_path / "out.html").read_text()
+    assert said in page and page.count("incomplete: 1601 of 2001 steps") >= 2
+    assert "within all" not in page or "in what is recorded" in page
+    assert "lacks 400 of 2001 steps" in " ".join(
+        (tmp_path / "out.svg").read_text().replace("-->", "<!--").split("<!--")
+    )
+    assert said in (tmp_path / "tables" / "incomplete.txt").read_text()
+
+
+def test_a_missing_file_is_named_and_counted(hsv: Hsv, tmp_path: Path) -> None:
+    path = recorded(REFERENCE, tmp_path / "part", files=4)
+    (path / "part_2.mcap").unlink()
+    ran = hsv("info", str(path))
+    assert ran.code == 0 and "lacks its file part_2.mcap" in ran.err and "steps on all topics" in ran.err
+    (path / "metadata.yaml").unlink()
+    assert "lacks its file part_2.mcap" in hsv("info", str(path)).err
+    made = hsv("recover", str(path))
+    assert made.code == 0 and "lacks its file part_2.mcap" in made.out and " s lost: " in made.out
+    shutil.copy(path / "part_0.mcap", path / "other_0.mcap")
+    assert "of 2 bags, expected a bag directory" in hsv("info", str(path)).error
+
+
+def test_what_needs_attachments_takes_scenario_and_design(hsv: Hsv, tmp_path: Path) -> None:
+    path = recorded(REFERENCE, tmp_path / "bare")
+    ran = hsv("replay", str(path))
+    assert ran.code == 2 and "no attachment design.yaml" in ran.error and "--scenario NAME|FILE" in ran.error
+    scenario = str(REFERENCE.with_suffix(".toml"))
+    design = tmp_path / "flown.yaml"
+    design.write_bytes(Bag(REFERENCE).attachments["design.yaml"])
+    given = hsv("replay", str(path), "--node", "notch_filter", "--scenario", scenario, "--design", str(design))
+    assert given.code == 0 and "identical in every byte" in given.out
+    for words, name in ((["--scenario", "nosuch"], "nosuch"), (["--design", "nosuch.yaml"], "nosuch.yaml")):
+        refused = hsv("replay", str(path), *words)
+        assert refused.code == 2 and name in refused.error
+    assert hsv("report", str(path), "--out", "bare.html").code == 0
+    assert "--scenario gives one" in (tmp_path / "bare.html").read_text()
+    assert hsv("report", str(path), "--out", "given.html", "--scenario", "case1").code == 0
+    assert "no limits to judge by" not in (tmp_path / "given.html").read_text()
+
+
+def test_a_chunk_without_a_checksum_is_read_around_the_damage(tmp_path: Path) -> None:
+    file = recorded(REFERENCE, tmp_path / "bare") / "bare_0.mcap"
+    whole = Bag(file)
+    data = bytearray(file.read_bytes())
+    middle = len(data) // 2 + 4096
+    data[middle : middle + 4096] = bytes(4096)
+    file.write_bytes(data)
+    damaged = Bag(file)
+    for topic in whole.topics:
+        assert set(damaged.messages(topic)) <= set(whole.messages(topic))
+    ((_, damage),) = damaged.loss.damages
+    assert damage.what == "part of a chunk" and 0 < damaged.loss.messages < 60
