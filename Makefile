@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-long test-viewers lint references bench docs clean
+.PHONY: help setup run test test-long test-viewers test-portability lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -11,7 +11,7 @@ IN_ENVIRONMENT := source ./env.sh && exec
 PYTHON_SOURCES := src ros_ws/src tests tools
 
 help: ## list these commands
-	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 22
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' Makefile | expand -t 26
 
 setup: ## set everything up (PYTHON=/path/to/python3 chooses the interpreter)
 	@python="$${PYTHON:-python3}"; \
@@ -26,7 +26,7 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
-	python3 -m pytest -n auto -m "not graph and not long" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
+	python3 -m pytest -n auto -m "not (graph or long or portability)" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m long $(ARGS)
@@ -41,11 +41,17 @@ test-viewers: setup ## set up, install a browser, node and npm packages, then ru
 	@for lock in $$(git ls-files 'tests/*/package-lock.json'); do npm ci --no-audit --no-fund --prefix "$${lock%/*}" || exit; done
 	@$(IN_ENVIRONMENT) python3 -m pytest -m viewer $(ARGS)
 
+# Emulators, another machine's Python and all wheels come into .portability; nothing is installed on the machine.
+test-portability: setup ## set up, then fly on emulated processors, another Python and other packages
+	@source ./env.sh || exit; python3 tools/portability.py; missing=$$?; \
+	python3 -m pytest -n 2 -m portability $(ARGS) && exit "$$missing"
+
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
-	@source ./env.sh && python3 -m pytest -m "not reference and not long" && python3 tools/references.py
+	@source ./env.sh && python3 -m pytest -n auto -m "not (reference or long or portability or graph)" && \
+	python3 -m pytest -n auto --dist loadfile -m "graph and not (reference or long)" && python3 tools/references.py
 
 # Without a package index everything else is measured all the same.
 bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")
@@ -59,5 +65,5 @@ docs: setup ## set up, then build the documentation into docs/_build (open docs/
 	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build
+	rm -rf .venv .portability ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

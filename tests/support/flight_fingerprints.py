@@ -1,0 +1,76 @@
+"""A program: fly scenarios and print, as JSON, what the flights come to and what they were flown on.
+
+Interpreters of every kind run it, emulated ones too, and all of them as ``python -S``: packages of the project's
+environment start Python again, and what an emulator has started would come back as a process of the machine itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import platform
+import sys
+import time
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.registry import cpu_target
+
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.scenario import load_scenario
+
+try:
+    from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+except ModuleNotFoundError:  # numpy 1.26
+    from numpy.core._multiarray_umath import __cpu_dispatch__, __cpu_features__
+
+
+def fingerprint(flight: Flight) -> str:
+    """Return the SHA-256 digest of what a flight came to."""
+    history, digest = flight.history, hashlib.sha256()
+    for part in (
+        history.state,
+        history.filtered_pitch_rate,
+        history.deviation,
+        history.nominal_input,
+        history.command,
+        history.actuator,
+    ):
+        digest.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
+    return digest.hexdigest()
+
+
+def flown_on() -> dict[str, Any]:
+    """Return what the flights must not depend on: versions, processor, and the bits of libm and of BLAS."""
+    _, processor, features = cpu_target.target_context.codegen().magic_tuple()
+    points = np.linspace(0.1, 3.0, 2000)
+    libm = [function(x) for function in (math.sin, math.cos, math.tan, math.exp, math.log) for x in points]
+    matrix = np.sin(np.arange(64.0 * 64.0)).reshape(64, 64)
+    return {
+        "machine": platform.machine(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": numba.__version__,
+        "compiled for": processor,
+        "compiled with": sorted(name[1:] for name in features.split(",") if name.startswith("+")),
+        "numpy dispatches to": [name for name in __cpu_dispatch__ if __cpu_features__[name]],
+        "libm": hashlib.sha256(np.array(libm).tobytes()).hexdigest(),
+        "blas": hashlib.sha256((matrix @ matrix).tobytes()).hexdigest(),
+    }
+
+
+def main(scenarios: list[str]) -> None:
+    """Fly ``scenarios`` and print them."""
+    fingerprints, seconds = {}, {}
+    for name in scenarios:
+        start = time.process_time()
+        fingerprints[name] = fingerprint(fly(assemble_flight(load_scenario(name))))
+        seconds[name] = round(time.process_time() - start, 2)
+    json.dump({"flown on": flown_on(), "fingerprints": fingerprints, "seconds": seconds}, sys.stdout, indent=1)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

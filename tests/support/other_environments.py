@@ -1,0 +1,55 @@
+"""Flying in another process: another Python or packages, another processor, or other choices that libraries make."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from portability import Environment, own
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = Path(__file__).with_name("flight_fingerprints.py")
+SCENARIOS = (
+    "case1",
+    "case1_derived",
+    "case1_rmpc",
+    "case1_tube_dm",
+    "case2",
+    "case2_derived",
+    "case1_integral_heavy",
+)
+"""Both vehicle models and couplings, every law that solves no problem in flight, commands and faults of both cases."""
+
+
+def fly(environment: Environment | None = None, compiled: Path | None = None, **variables: str) -> dict[str, Any]:
+    """Fly all of :data:`SCENARIOS`; return what :mod:`flight_fingerprints` prints.
+
+    Args:
+        environment: The Python to fly on; the project's own where none is given.
+        compiled: Folder for compiled code: with an empty one everything is compiled afresh. Without one, the
+            project's own Python takes what set-up has compiled for this processor.
+        variables: Environment variables over the plain ones: nothing of this process' environment is handed on.
+
+    Raises:
+        AssertionError: The program failed; with what it said.
+    """
+    chosen = environment or own()
+    plain = {
+        "PATH": os.defpath,
+        "HOME": os.environ.get("HOME", "/"),
+        "HSV_DESIGN_PATH": str(ROOT / "offline_design"),
+        "OPENBLAS_NUM_THREADS": "1",
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "src" / "hsv"), chosen.packages]),
+    }
+    if compiled:
+        plain["NUMBA_CACHE_DIR"] = str(compiled)
+    done = subprocess.run(
+        [*chosen.command, "-S", str(PROGRAM), *SCENARIOS], env=plain | variables, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    report: dict[str, Any] = json.loads(done.stdout)
+    return report
