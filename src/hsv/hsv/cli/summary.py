@@ -33,7 +33,7 @@ def report_flight(
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
     judged = verdicts(scenario, metrics, ended=diverged_at is None)
     factor = simulated_time / wall_time if wall_time > 0.0 else 0.0
-    same = as_published(fingerprint, scenario.name, design_hash)
+    same = as_published(fingerprint, scenario, design_hash)
     if json:
         print_json(
             {

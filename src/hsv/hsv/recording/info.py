@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.errors import RecordingError
+from hsv.errors import HsvError, RecordingError
 from hsv.recording.flight import flight_fingerprint
 from hsv.recording.reader import Bag
 from hsv.recording.shortcomings import shortcomings
 from hsv.recording.steps import complete_stamps, cut_off
 from hsv.simulation.fingerprint import as_published
+from hsv.simulation.scenario import Scenario, parse_scenario
 
 FAULT_STATUS = "/hsv/fault_status"
 STATE = "/hsv/state"
@@ -33,7 +34,6 @@ def describe(bag: Bag) -> dict[str, Any]:
     """
     start, end = bag.span
     fingerprint = _fingerprint(bag)
-    flown = bag.custom_data.get("scenario", ""), bag.custom_data.get("design_hash", "")
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
     return {
         "path": str(bag.path),
@@ -46,7 +46,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "topics": topics,
         "custom_data": bag.custom_data,
         "fingerprint": fingerprint,
-        "as_published": as_published(fingerprint, *flown),
+        "as_published": as_published(fingerprint, _scenario(bag), bag.custom_data.get("design_hash", "")),
         "attachments": [
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
@@ -62,6 +62,14 @@ def _fingerprint(bag: Bag) -> str | None:
     try:
         return flight_fingerprint(bag)
     except RecordingError:
+        return None
+
+
+def _scenario(bag: Bag) -> Scenario | None:
+    """Return the scenario attached to ``bag``, ``None`` without one that this version can read."""
+    try:
+        return parse_scenario(bag.text("scenario.toml"), bag.custom_data.get("scenario", ""))
+    except HsvError:
         return None
 
 

@@ -2,7 +2,7 @@
 
 A table of published fingerprints is part of the library: whoever flies a shipped scenario with a shipped design can
 tell whether it is the same flight. It holds no scenario whose nominal law calls a solver in flight: what a solver
-returns depends on the machine within a tolerance.
+returns depends on the machine, within a tolerance.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
+
+from hsv.simulation.scenario import Scenario, load_scenario
 
 FORMAT = 1
 """Version of what is digested, and in which order."""
@@ -38,16 +40,17 @@ def fingerprint(
     return f"v{FORMAT}:{hashlib.sha256(rows.tobytes()).hexdigest()}"
 
 
-def published(scenario: str, design_hash: str) -> str | None:
-    """Return the published fingerprint of ``scenario`` with the design of this digest, ``None`` without one."""
-    entry = _table().get(scenario, {})
-    return entry.get("fingerprint") if entry.get("design_hash") == design_hash else None
+def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
+    """Tell whether the flight of a scenario with the design of this digest has its published fingerprint.
 
-
-def as_published(found: str | None, scenario: str, design_hash: str) -> bool | None:
-    """Tell whether a fingerprint is the published one, ``None`` where there is none to compare or none is published."""
-    expected = published(scenario, design_hash)
-    return None if expected is None or found is None else found == expected
+    ``None`` where nothing can be said: no fingerprint or scenario, one that is not as it is shipped, another design.
+    """
+    entry = _table().get(scenario.name) if scenario else None
+    if found is None or scenario is None or entry is None or entry["design_hash"] != design_hash:
+        return None
+    if load_scenario(scenario.name).parameters() != scenario.parameters():
+        return None
+    return bool(found == entry["fingerprint"])
 
 
 def in_words(found: str | None, same: bool | None) -> str:
