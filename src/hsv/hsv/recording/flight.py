@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsv.recording.reader import Bag
-from hsv.recording.steps import cut_off, joined
+from hsv.recording.steps import cut_off, expected_stamps, joined
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.metrics import FlightData
 
@@ -76,7 +76,9 @@ def flight_fingerprint(bag: Bag) -> str | None:
     topics = ("/hsv/state", "/hsv/filtered_state", "/hsv/nominal", "/hsv/command", "/hsv/actuator")
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))
-    if cut_off(bag) or not all(np.array_equal(bag.columns(topic)["step"], every) for topic in topics):
+    if cut_off(bag) or len(every) < len(expected_stamps(bag)):
+        return None
+    if not all(np.array_equal(bag.columns(topic)["step"], every) for topic in topics):
         return None
     return fingerprint(
         state_columns(state),
