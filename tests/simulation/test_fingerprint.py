@@ -71,7 +71,7 @@ def test_words_say_what_was_compared():
 
 
 SOLVED_IN_FLIGHT = {
-    # Metrics of a flight, and how far another machine's may be from them. The optimum of the QP is unique: other kernels
+    # Metrics, and how far another machine's may be from them. The optimum of the QP is unique: other kernels
     # of OpenBLAS give 1e-11. That of the LMI is flat: what rounding chooses settles 0.5 % later.
     "case1_qp": (
         1e-6,
