@@ -7,11 +7,12 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from hsv.graph import progress
-from hsv.graph.progress import Standstill, processor_time
+from hsv.graph.progress import Standstill, processor_time, processor_time_of
 
 
 def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -37,6 +38,7 @@ def test_processor_time_grows_for_a_process_that_looks_around_and_not_for_a_stop
         assert process.stdout is not None
         process.stdout.readline()
         before = used = processor_time(process.pid)
+        assert processor_time_of((Path(sys.executable).name,)) >= (used or 0.0) > processor_time_of(("nobody",)) == 0.0
         assert before is not None and before > 0.0
         while used == before:
             time.sleep(0.01)

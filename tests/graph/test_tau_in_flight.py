@@ -38,6 +38,7 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     words = ["--bag", bag_path, "--real-time-factor", "4.0", "--no-report"]
     flight = processes.start("hsv", "run", scenario(tmp_path), *words)
     change = ("ros2", "run", "hsv_bringup", "set_parameter", "tube_mpc", "feedback.tau")
+    _fly_until(flight, bag_path, 50)
     refused = processes.run(*change, "[0.4, 0.4, 0.7, 0.7, 1.0]")
     assert refused.returncode == 1
     assert "feedback.tau[0] = 0.4: expected 0.5 to 1, the certified range" in refused.stdout

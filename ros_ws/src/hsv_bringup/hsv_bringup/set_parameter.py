@@ -6,51 +6,63 @@ import argparse
 import sys
 import time
 from collections.abc import Sequence
+from pathlib import Path
 
 import rclpy
 import yaml
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import NameValidationException
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 from rclpy.utilities import remove_ros_args
 
-from hsv.graph.progress import Standstill
-from hsv_node.lockstep import SAY_AFTER
+from hsv.graph.description import COMPOSED
+from hsv.graph.progress import Standstill, processor_time_of
 
 PATIENCE = 30.0
-"""Seconds to wait for a node that is not there while nothing else changes on its ROS domain either."""
+"""Seconds to wait for a node that is not there while no process of its name does anything, nor other nodes come."""
+
+_LOOK = 1.0
+"""Seconds between two looks at what moves."""
 
 
 def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
     """Return what the node says to a new ``value``; not successful as well where no such node comes.
 
-    A node that is there may take its time to answer: its absence is an error, slowness is only told.
+    A node that is there, or on its way, may take its time: its absence is an error, slowness is only told.
     """
     parameter = Parameter(name, value=value).to_parameter_msg()
     node = rclpy.create_node("set_parameter", enable_rosout=False)
     try:
         client = AsyncParameterClient(node, node_name)
         answer = None
-        standstill, begun, said = Standstill(), time.monotonic(), 0
+        standstill, begun, looks = Standstill(), time.monotonic(), 0
         while not (answer and answer.done()):
             if answer is None and client.services_are_ready():
                 answer = client.set_parameters([parameter])
             rclpy.spin_once(node, timeout_sec=0.1)
-            names = sorted(space.rstrip("/") + "/" + other for other, space in node.get_node_names_and_namespaces())
-            is_there = "/" + node_name.lstrip("/") in names
-            # While it is there, time itself is progress.
-            if standstill.look(time.monotonic() if is_there else names) > PATIENCE:
+            if time.monotonic() - begun < looks * _LOOK:
+                continue
+            looks += 1
+            if standstill.look(_moves(node, node_name)) > PATIENCE:
                 return SetParametersResult(successful=False, reason=f"no node {node_name!r} in {PATIENCE:g} s")
-            if time.monotonic() - begun > (said + 1) * SAY_AFTER:
-                said += 1
-                print(f"waiting for {'an answer of ' if is_there else ''}{node_name}", file=sys.stderr, flush=True)
+            if looks % 5 == 0:
+                print(f"waiting for {node_name}", file=sys.stderr, flush=True)
         return answer.result().results[0]
     except NameValidationException:
         expected = "expected the name of a node, such as tube_mpc"
         return SetParametersResult(successful=False, reason=f"node = {node_name!r}: {expected}")
     finally:
         node.destroy_node()
+
+
+def _moves(node: Node, name: str) -> object:
+    """Return what changes as long as node ``name`` is there or may come."""
+    names = sorted(space.rstrip("/") + "/" + other for other, space in node.get_node_names_and_namespaces())
+    if "/" + name.lstrip("/") in names:
+        return time.monotonic()
+    return names, processor_time_of((Path(name).name, COMPOSED.executable))
 
 
 def main(args: Sequence[str] | None = None) -> int:
