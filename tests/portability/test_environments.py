@@ -6,20 +6,12 @@ They take minutes, as everything is compiled afresh by emulated processors; ``ma
 from __future__ import annotations
 
 import pytest
-from other_environments import fly
+from other_environments import as_published, fly
 
 from portability import Environment
 
-# How long an emulated processor takes is a matter of this one and of what else it does.
-pytestmark = [pytest.mark.portability, pytest.mark.timeout(0)]
-
-
 # In this order, because two workers are given two tests each: the emulated ones, which take longest, side by side.
-
-
-@pytest.fixture(scope="session")
-def native():
-    return fly()
+pytestmark = pytest.mark.portability
 
 
 def flown(name, compiled, **variables):
@@ -29,27 +21,27 @@ def flown(name, compiled, **variables):
     return fly(environment, compiled, **variables)
 
 
-def test_x86_64_without_avx_and_fma(native, tmp_path):
+def test_x86_64_without_avx_and_fma(tmp_path):
     report = flown("nehalem", tmp_path)
     processor = report["flown on"]
     assert (processor["machine"], processor["compiled for"]) == ("x86_64", "nehalem")
     assert not {"avx", "avx2", "fma"} & {*processor["compiled with"]} and not processor["numpy dispatches to"]
-    assert report["fingerprints"] == native["fingerprints"]
+    assert report["fingerprints"] == as_published()
 
 
-def test_python_3_12(native, tmp_path):
+def test_python_3_12(tmp_path):
     report = flown("python-3.12", tmp_path)
     assert report["flown on"]["python"].startswith("3.12.")
-    assert report["fingerprints"] == native["fingerprints"]
+    assert report["fingerprints"] == as_published()
 
 
-def test_aarch64(native, tmp_path):
+def test_aarch64(tmp_path):
     report = flown("aarch64", tmp_path, NUMBA_CPU_NAME="generic")
     assert (report["flown on"]["machine"], report["flown on"]["compiled for"]) == ("aarch64", "generic")
-    assert report["fingerprints"] == native["fingerprints"]
+    assert report["fingerprints"] == as_published()
 
 
-def test_numpy_1_26(native, tmp_path):
+def test_numpy_1_26(tmp_path):
     report = flown("numpy-1.26", tmp_path)
     assert report["flown on"]["numpy"].startswith("1.26.")
-    assert report["fingerprints"] == native["fingerprints"]
+    assert report["fingerprints"] == as_published()

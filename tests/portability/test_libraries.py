@@ -4,36 +4,32 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-from other_environments import fly
+from flight_fingerprints import flown_on
+from other_environments import as_published, fly
 
 FMA = "fma" in Path("/proc/cpuinfo").read_text().split()
 """Where there is none, libraries have nothing to choose from."""
 
 
-@pytest.fixture(scope="module")
-def usual():
-    return fly()
-
-
-def test_libm_blas_and_numpy_as_on_an_old_processor(usual):
-    dispatched = usual["flown on"]["numpy dispatches to"]
-    old = fly(
+def test_libm_blas_and_numpy_as_on_an_old_processor():
+    usual = flown_on()
+    report = fly(
         GLIBC_TUNABLES="glibc.cpu.hwcaps=-AVX2_Usable,-FMA_Usable,-AVX2,-FMA",
         OPENBLAS_CORETYPE="Prescott",
-        NPY_DISABLE_CPU_FEATURES=" ".join(dispatched),
+        NPY_DISABLE_CPU_FEATURES=" ".join(usual["numpy dispatches to"]),
     )
-    assert old["fingerprints"] == usual["fingerprints"]
+    assert report["fingerprints"] == as_published()
+    old = report["flown on"]
+    assert old["compiled for"] == usual["compiled for"] and not old["numpy dispatches to"]
     if FMA:
-        assert old["flown on"]["libm"] != usual["flown on"]["libm"]
-        assert old["flown on"]["blas"] != usual["flown on"]["blas"]
-    assert not old["flown on"]["numpy dispatches to"]
+        assert old["libm"] != usual["libm"]
+        assert old["blas"] != usual["blas"]
 
 
-def test_code_compiled_for_any_x86_64(usual, tmp_path):
-    generic = fly(compiled=tmp_path, NUMBA_CPU_NAME="generic", OPENBLAS_CORETYPE="Sandybridge")
-    assert generic["fingerprints"] == usual["fingerprints"]
-    assert generic["flown on"]["compiled for"] == "generic" != usual["flown on"]["compiled for"]
-    assert not generic["flown on"]["compiled with"]
+def test_code_compiled_for_any_x86_64(tmp_path):
+    report = fly(compiled=tmp_path, NUMBA_CPU_NAME="generic", OPENBLAS_CORETYPE="Sandybridge")
+    assert report["fingerprints"] == as_published()
+    generic, usual = report["flown on"], flown_on()
+    assert generic["compiled for"] == "generic" != usual["compiled for"] and not generic["compiled with"]
     if FMA:
-        assert "fma" in usual["flown on"]["compiled with"]
+        assert "fma" in usual["compiled with"]

@@ -19,28 +19,13 @@ import numpy as np
 from numba.core.registry import cpu_target
 
 from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 
 try:
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__
 except ModuleNotFoundError:  # numpy 1.26
     from numpy.core._multiarray_umath import __cpu_dispatch__, __cpu_features__
-
-
-def fingerprint(flight: Flight) -> str:
-    """Return the SHA-256 digest of what a flight came to."""
-    history, digest = flight.history, hashlib.sha256()
-    for part in (
-        history.state,
-        history.filtered_pitch_rate,
-        history.deviation,
-        history.nominal_input,
-        history.command,
-        history.actuator,
-    ):
-        digest.update(np.ascontiguousarray(part, dtype="<f8").tobytes())
-    return digest.hexdigest()
 
 
 def flown_on() -> dict[str, Any]:
@@ -67,7 +52,7 @@ def main(scenarios: list[str]) -> None:
     fingerprints, seconds = {}, {}
     for name in scenarios:
         start = time.process_time()
-        fingerprints[name] = fingerprint(fly(assemble_flight(load_scenario(name))))
+        fingerprints[name] = fly(assemble_flight(load_scenario(name))).fingerprint
         seconds[name] = round(time.process_time() - start, 2)
     json.dump({"flown on": flown_on(), "fingerprints": fingerprints, "seconds": seconds}, sys.stdout, indent=1)
 

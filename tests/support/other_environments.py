@@ -8,6 +8,9 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+from hsv.control.design_file import find_design, read_design_parameters
+from hsv.simulation.fingerprint import published
+from hsv.simulation.scenario import load_scenario
 from portability import Environment, own
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,3 +56,9 @@ def fly(environment: Environment | None = None, compiled: Path | None = None, **
     assert done.returncode == 0, done.stderr
     report: dict[str, Any] = json.loads(done.stdout)
     return report
+
+
+def as_published() -> dict[str, str | None]:
+    """Return the published fingerprints of :data:`SCENARIOS`, with the designs of this checkout."""
+    designs = {name: read_design_parameters(find_design(load_scenario(name).design)) for name in SCENARIOS}
+    return {name: published(name, design["design.hash"]) for name, design in designs.items()}
