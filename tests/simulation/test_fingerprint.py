@@ -1,5 +1,6 @@
 import hashlib
 import struct
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -71,28 +72,29 @@ def test_words_say_what_was_compared():
 
 
 SOLVED_IN_FLIGHT = {
-    # Metrics, and how far another machine's may be from them. The optimum of the QP is unique: other kernels
-    # of OpenBLAS give 1e-11. That of the LMI is flat: what rounding chooses settles 0.5 % later.
+    # Metrics, and how far another machine's may be from them. The optimum of the QP is unique, and so is the point of
+    # the central path to which the LMI is solved: other kernels of OpenBLAS give 1e-11. A gain found in flight begins
+    # to act in a step, though, which may be the next one.
     "case1_qp": (
         1e-6,
         {
-            "altitude_settling_time": 27.16,
-            "altitude_integral_absolute_error": 2995.99695,
-            "velocity_settling_time": 62.02,
-            "velocity_integral_absolute_error": 2102.718836,
-            "fuel_equivalence_ratio_maximum": 0.510553757,
-            "elevator_deflection_maximum": 0.250480216,
+            "altitude_settling_time": 28.82,
+            "altitude_integral_absolute_error": 3156.763565,
+            "velocity_settling_time": 62.46,
+            "velocity_integral_absolute_error": 2135.205808,
+            "fuel_equivalence_ratio_maximum": 0.510128709,
+            "elevator_deflection_maximum": 0.250480799,
         },
     ),
     "case1_kothare_online": (
-        2e-2,
+        1e-3,
         {
-            "altitude_settling_time": 34.1,
-            "altitude_integral_absolute_error": 2244.0,
-            "velocity_settling_time": 63.8,
-            "velocity_integral_absolute_error": 2131.0,
-            "fuel_equivalence_ratio_maximum": 0.5131,
-            "elevator_deflection_maximum": 0.2536,
+            "altitude_settling_time": 34.06,
+            "altitude_integral_absolute_error": 2243.374,
+            "velocity_settling_time": 63.76,
+            "velocity_integral_absolute_error": 2129.747,
+            "fuel_equivalence_ratio_maximum": 0.5131325,
+            "elevator_deflection_maximum": 0.2536490,
         },
     ),
 }
@@ -104,3 +106,8 @@ def test_flights_that_solve_a_problem_in_flight_agree_within_their_tolerance(nam
     assert name not in _table()
     metrics = flight_metrics(fly(assemble_flight(load_scenario(name))).data())
     assert {key: metrics[key] for key in expected} == pytest.approx(expected, rel=tolerance)
+
+
+def test_readme_shows_that_of_case_1():
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    assert f"    {_table()['case1']['fingerprint']}\n" in readme
