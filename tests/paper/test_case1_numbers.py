@@ -1,7 +1,6 @@
 """Case 1 and its variants, flown in process: what the issue and the control study demand of them."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -148,15 +147,3 @@ def test_without_fault_the_flight_ends_at_its_command():
     h = fly(components("case1", **values)).history
     reference = fly(components("case1", duration=0.02)).reference
     assert np.abs(h.state[-1] - reference)[:2].max() < 0.05
-
-
-def test_two_hundred_seconds_fly_in_a_fraction_of_a_second():
-    parts = components("case1")
-    fly(parts)
-    times = []
-    for _ in range(5):
-        started = time.process_time()
-        fly(parts)
-        times.append(time.process_time() - started)
-    # 40 ms is the aim. Processor time: other work on the machine must not fail this test.
-    assert min(times) < 0.2
