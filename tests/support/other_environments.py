@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from hsv.control.design_file import find_design, read_design_parameters
-from hsv.simulation.fingerprint import published
+from hsv.simulation.fingerprint import as_published
 from hsv.simulation.scenario import load_scenario
 from portability import Environment, own
 
@@ -58,7 +58,12 @@ def fly(environment: Environment | None = None, compiled: Path | None = None, **
     return report
 
 
-def as_published() -> dict[str, str | None]:
-    """Return the published fingerprints of :data:`SCENARIOS`, with the designs of this checkout."""
-    designs = {name: read_design_parameters(find_design(load_scenario(name).design)) for name in SCENARIOS}
-    return {name: published(name, design["design.hash"]) for name, design in designs.items()}
+def changed_flights(report: dict[str, Any]) -> dict[str, str]:
+    """Return, of what :func:`fly` returns, the fingerprints that are not those published for these designs."""
+    changed = {}
+    for name in SCENARIOS:
+        found, scenario = report["fingerprints"][name], load_scenario(name)
+        design = read_design_parameters(find_design(scenario.design))
+        if not as_published(found, scenario, design["design.hash"]):
+            changed[name] = found
+    return changed
