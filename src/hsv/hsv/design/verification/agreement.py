@@ -52,7 +52,8 @@ def _largest(parameter: str, given: float | list[float], written: float | list[f
     if value.shape != expected.shape:
         return Deviation(parameter, np.inf, (), float(value.size), float(expected.size))
     if size.ndim > 1:
-        value, expected = (array.reshape(-1, *size.shape[-2:]) for array in (value, expected))
+        shape = size.shape if value.size == size.size else (-1, *size.shape)
+        value, expected = value.reshape(shape), expected.reshape(shape)
     scaled = np.abs(value - expected) / np.maximum(np.abs(expected), size if expected.ndim else size[0])
     scaled = np.where(np.isnan(scaled), np.inf, scaled)
     worst = np.unravel_index(int(np.argmax(scaled)), scaled.shape)
