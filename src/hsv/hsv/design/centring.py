@@ -27,8 +27,11 @@ from hsv.errors import DesignError
 GAP = 1e-3
 """Largest share by which the cost of the answer is above the least one."""
 
-_INSIDE = (1e-5, 1e-8)
-"""Least eigenvalue of the inequalities that a start is asked for; the first for which there is one."""
+_INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
+"""Least eigenvalue of the inequalities that a start is asked for; the first for which the solver returns one inside.
+
+What it calls inaccurate may be off by 1e-5; where there is little room, less has to do.
+"""
 
 _STEPS = 500
 """Newton steps after which the search is given up; some twenty to eighty are taken."""
