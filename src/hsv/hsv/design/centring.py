@@ -176,7 +176,10 @@ def _centre(c: np.ndarray, found: list[_Inequality], x: np.ndarray, name: str) -
             flat = scaled.reshape(len(scaled), -1)
             hessian[np.ix_(one.acting, one.acting)] += flat @ flat.T
         size = 1.0 / np.sqrt(np.diag(hessian))
-        step = -size * cho_solve(cho_factor(hessian * np.outer(size, size)), size * gradient)
+        try:
+            step = -size * cho_solve(cho_factor(hessian * np.outer(size, size)), size * gradient)
+        except np.linalg.LinAlgError:
+            break  # so near a bound that rounding has taken the curvature along it
         decrement = float(np.sqrt(max(-gradient @ step, 0.0)))
         if decrement < _CONVERGED or last <= decrement < _NEAR:
             return np.asarray(x + step)
@@ -188,4 +191,4 @@ def _centre(c: np.ndarray, found: list[_Inequality], x: np.ndarray, name: str) -
             if there and value(x + length * step, there) < now - 0.1 * length * decrement**2:
                 break
         x, factors = x + length * step, there
-    raise DesignError(f"{name}: no centre found in {_STEPS} steps, expected a design inside its inequalities")
+    raise DesignError(f"{name}: no centre found, expected a design inside its inequalities")
