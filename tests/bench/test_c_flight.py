@@ -7,8 +7,9 @@ from hsv.bench.c_flight import FLAGS, CFlight, largest_difference
 from hsv.errors import RunError
 from hsv.simulation.closed_loop import History, fly
 
-TOLERANCE = 1e-12
-"""Relative; zero where the C library's functions and those of the compiled loop are the same."""
+TOLERANCE = 1e-9
+"""Relative. The C library's sines and exponentials, which the processor chooses, differ from ours by an ulp, 1e-16; the
+loop makes up to 7e-12 of it. A term that is wrong moves the flight by far more than 1e-9."""
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -92,15 +92,17 @@ static void derivative(const double *x, const double *u, const Vehicle *p, doubl
         p->elastic_force_1_alpha_squared * alpha2 + p->elastic_force_1_alpha * alpha + p->elastic_force_1_zero;
     const double force_2 = p->elastic_force_2_alpha_squared * alpha2 + p->elastic_force_2_alpha * alpha +
                            p->elastic_force_2_elevator * elevator + p->elastic_force_2_zero;
-    const double psi_1 = p->inertial_coupling_1, psi_2 = p->inertial_coupling_2, inertia = p->moment_of_inertia;
+    const double psi_1 = p->inertial_coupling_1, psi_2 = p->inertial_coupling_2;
+    const double c_1 = psi_1 / p->moment_of_inertia, c_2 = psi_2 / p->moment_of_inertia;
+    const double angular = moment / p->moment_of_inertia;
     const double omega_1 = p->natural_frequency_1, omega_2 = p->natural_frequency_2;
-    const double k_1 = 1.0 + psi_1 * psi_1 / inertia;
-    const double k_2 = 1.0 + psi_2 * psi_2 / inertia;
-    const double k_12 = psi_1 * psi_2 / inertia;
+    const double k_1 = 1.0 + psi_1 * c_1;
+    const double k_2 = 1.0 + psi_2 * c_2;
+    const double k_12 = psi_1 * c_2;
     const double right_1 =
-        -2.0 * p->damping_ratio_1 * omega_1 * x[6] - omega_1 * omega_1 * x[5] + force_1 - psi_1 * moment / inertia;
+        -2.0 * p->damping_ratio_1 * omega_1 * x[6] - omega_1 * omega_1 * x[5] + force_1 - psi_1 * angular;
     const double right_2 =
-        -2.0 * p->damping_ratio_2 * omega_2 * x[8] - omega_2 * omega_2 * x[7] + force_2 - psi_2 * moment / inertia;
+        -2.0 * p->damping_ratio_2 * omega_2 * x[8] - omega_2 * omega_2 * x[7] + force_2 - psi_2 * angular;
     const double determinant = k_1 * k_2 - k_12 * k_12;
     const double acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant;
     const double acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant;
@@ -111,7 +113,7 @@ static void derivative(const double *x, const double *u, const Vehicle *p, doubl
     out[1] = (thrust * cos_alpha - drag) / p->mass - p->gravity * sin_path;
     out[2] = (-thrust * sin_alpha - lift) / (p->mass * velocity) + rate + p->gravity / velocity * cos_path;
     out[3] = rate;
-    out[4] = (moment + psi_1 * acceleration_1 + psi_2 * acceleration_2) / inertia;
+    out[4] = angular + c_1 * acceleration_1 + c_2 * acceleration_2;
     out[5] = x[6];
     out[6] = acceleration_1;
     out[7] = x[8];
