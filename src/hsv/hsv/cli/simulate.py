@@ -27,7 +27,7 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import report_flight
-    from hsv.control.design_file import find_design, read_design_parameters
+    from hsv.control.design_file import digest, find_design, read_design_parameters
     from hsv.simulation.assembly import assemble_flight, blamed_on
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.metrics import flight_metrics
@@ -50,7 +50,7 @@ def simulate(
         loaded,
         flight_metrics(flight.data()),
         fingerprint=flight.fingerprint,
-        design_hash=design["design.hash"],
+        design_hash=digest(design),
         diverged_at=flight.time[-1] if flight.status is FlightStatus.DIVERGED else None,
         wall_time=wall,
         simulated_time=float(flight.time[-1]),

@@ -6,7 +6,7 @@ central path, the minimum of
 
     t c'x - sum_k log det G_k(x)
 
-where t is such that the cost is above its optimum by at most the share :data:`GAP`. That function is smooth and
+where t is such that the cost is above its optimum by about the share :data:`GAP`. That function is smooth and
 strictly convex: of all that cost nearly the least, its minimum is the one farthest from the bounds of all inequalities,
 by the product of their eigenvalues. Newton's method finds it to rounding, from any start inside; Clarabel gives one.
 """
@@ -25,7 +25,7 @@ from hsv.design.solver import solve
 from hsv.errors import DesignError
 
 GAP = 1e-3
-"""Largest share by which the cost of the answer is above the least one."""
+"""Share by which the cost of the answer is above the least one, but for a factor of at most the root of 2."""
 
 _INSIDE = (1e-5, 1e-4, 1e-3, 1e-8)
 """Least eigenvalue of the inequalities that a start is asked for; the first for which the solver returns one inside.
@@ -87,7 +87,7 @@ class _Inequality:
 def minimise(
     unknowns: Sequence[Unknown], cost: Cost, inequalities: Inequalities, name: str
 ) -> tuple[list[np.ndarray], SolverReport]:
-    """Return the unknown matrices on the central path, at most :data:`GAP` above the least cost.
+    """Return the unknown matrices on the central path, about :data:`GAP` above the least cost.
 
     Args:
         unknowns: What is sought.

@@ -1,4 +1,4 @@
-"""Rounding of what one stage of a design hands to the next, to digits that another processor finds, too."""
+"""Rounding of what one stage of a design hands to the next, to the digits that mean something."""
 
 from __future__ import annotations
 

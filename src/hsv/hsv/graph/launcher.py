@@ -160,6 +160,7 @@ class Launcher:
             ):
                 time.sleep(_LOOK)
         for process in self._processes:
+            process.popen.wait(GRACE)
             if process.reader:
                 process.reader.join(1.0)
 
@@ -215,7 +216,11 @@ def _domain_of_its_own() -> socket.socket:
 
     The nodes of two runs would take each other's messages, and both would be lost.
     """
-    number = os.environ.get("ROS_DOMAIN_ID") or "0"
+    text = os.environ.get("ROS_DOMAIN_ID") or "0"
+    try:
+        number = int(text)
+    except ValueError:
+        raise RunError(f"ROS_DOMAIN_ID={text!r}: expected a whole number") from None
     name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         # A name without a file: it is gone with this process, however that ends.

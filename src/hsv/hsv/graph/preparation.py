@@ -13,7 +13,7 @@ from typing import Any
 
 import yaml
 
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_file import digest, find_design, read_parameters
 from hsv.errors import RecordingError
 from hsv.graph.description import NodeDescription, graph
 from hsv.simulation.assembly import assemble_flight, blamed_on
@@ -84,7 +84,7 @@ def prepare(
                 "title": scenario.title,
                 "commit": commit(),
                 "design": scenario.design,
-                "design_hash": str(design.get("design.hash", "")),
+                "design_hash": digest(design),
                 "seed": "none",
                 "started": now.isoformat(timespec="seconds"),
             }.items()

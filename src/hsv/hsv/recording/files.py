@@ -16,6 +16,8 @@ COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
+_MOST_FILES = 100_000
+"""Number from which on that of a file is none of a sequence."""
 _PART = 4096
 """Bytes that are decompressed at a time: what lies before a damage is not lost with it."""
 
@@ -45,7 +47,9 @@ def find_files(path: Path) -> tuple[list[Path], list[str]]:
         found = f"files *.mcap of {len(stems)} bags" if stems else "no file *.mcap"
         raise RecordingError(f"{path}: holds {found}, expected a bag directory")
     numbered = {_number(name): name for name in there}
-    gaps = {number: f"{stems.copy().pop()}_{number}.mcap" for number in range(max(numbered))}
+    # A single file that nothing else tells of is the bag, and what is numbered by dates has no gaps: rosbag2 counts.
+    counted = len(numbered) > 1 and max(numbered) < _MOST_FILES
+    gaps = {number: f"{stems.copy().pop()}_{number}.mcap" for number in range(max(numbered) if counted else 0)}
     expected = gaps | ({_number(name): name for name in listed} if known else {})
     missing = [expected[number] for number in sorted(expected.keys() - numbered.keys())]
     return [path / numbered[number] for number in sorted(numbered)], missing

@@ -123,6 +123,7 @@ def irregularities(bag: Bag) -> list[str]:
     words = []
     if (end := int(every[-1])) > found[-1]:
         words.append(f"ends at t = {found[-1] * 1e-9:.2f} s of {end * 1e-9:.2f} s")
+        every = every[every <= found[-1]]
     if cut_off(bag):
         reached = min(int(stamp.max(initial=-1)) for stamp in stamps.values())
         every, found = every[every <= reached], found[found <= reached]

@@ -103,7 +103,7 @@ PROCESSES = {
             _integrate,
             1e-10,
             "one period from the recorded state: the vehicle alone is unstable, a longer flight without its controller "
-            "would magnify the last bit in which mathematical functions of two processors differ",
+            "would magnify the last bit in which flights from before the portable arithmetic differ",
             restarts=True,
         ),
         Process(
@@ -111,7 +111,7 @@ PROCESSES = {
             NotchFilter.from_parameters,
             _filter,
             1e-12,
-            "a stable filter: roundings that differ between processors (fused multiply-add) die out",
+            "a stable filter: other roundings of its coefficients, as before the portable arithmetic, die out",
         ),
         Process(
             NOMINAL_TRAJECTORY,

@@ -59,8 +59,11 @@ def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTabl
         shares = [c.share(time) for c in commands]
         before = [0.0 if c.start == c.end == time else share for c, share in zip(commands, shares, strict=True)]
         for taken in [before, shares] if time > 0.0 and before != shares else [shares]:
-            climbed = sum(share * c.altitude_change for share, c in zip(taken, commands, strict=True))
-            gained = sum(share * c.velocity_change for share, c in zip(taken, commands, strict=True))
+            # One after the other: from Python 3.12 on, sum() adds numbers with compensation.
+            climbed = gained = 0.0
+            for share, c in zip(taken, commands, strict=True):
+                climbed += share * c.altitude_change
+                gained += share * c.velocity_change
             rows.append((time, rounded(altitude + climbed), rounded(velocity + gained)))
     times, altitudes, velocities = zip(*rows, strict=True)
     return Breakpoints(times, altitudes, velocities)

@@ -39,7 +39,7 @@ second is for entries that are zero, or would be without rounding. An entry that
 every entry of every shipped design (`tests/design/verification/test_every_entry.py`).
 
 A design computed anew agrees with the shipped one if no entry is farther from it than 1e-3 of the larger of the entry
-and its size (`hsv design NAME --check`); found are 2e-8 and less ([why](design.md)).
+and its size (`hsv design NAME --check`); found are 4e-8 and less ([why](design.md)).
 
 | entries | relative | absolute | of the size | reason |
 | --- | ---: | ---: | --- | --- |"""
