@@ -99,7 +99,7 @@ def test_labels_say_what_flies():
     assert paper_like() == pytest.approx(0.25)
 
 
-@pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.70), (WITH_NOTCH, 1.10)])
+@pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.68), (WITH_NOTCH, 1.10)])
 def test_coupling_limits_bracket_the_change_of_sign(controller, near):
     over = corners_of(1.0, 8.0)
     limits = coupling_limits(*feedback(controller), over)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hsv.errors import RunError
+from hsv.errors import ParameterError, RunError
 from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, NodeDescription
 from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
 
@@ -220,7 +220,7 @@ def _domain_of_its_own() -> socket.socket:
     try:
         number = int(text)
     except ValueError:
-        raise RunError(f"ROS_DOMAIN_ID={text!r}: expected a whole number") from None
+        raise ParameterError(f"ROS_DOMAIN_ID={text!r}: expected a whole number") from None
     name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
         # A name without a file: it is gone with this process, however that ends.

@@ -6,7 +6,7 @@ import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,11 @@ from hsv.recording.metadata import (
 )
 from hsv.recording.reader import Bag
 from hsv.recording.scan import MESSAGE_HEADER, Scan, content
+from hsv.recording.topic import readable_profiles
 from hsv.recording.writer import CHUNK_BYTES, mcap_path
+
+_PROFILES = "offered_qos_profiles"
+"""Where the metadata of a channel has the quality of service."""
 
 RECOVERED = {"recovered": "true"}
 """Custom data of a recovered bag: its end is not the end of the run."""
@@ -214,7 +218,7 @@ class _Copy:
             TopicInformation(
                 name,
                 schema.name,
-                channel.metadata.get("offered_qos_profiles", ""),
+                channel.metadata.get(_PROFILES, ""),
                 channel.metadata.get("topic_type_hash", ""),
                 self._tallies[name].count,
                 channel.message_encoding,
@@ -229,6 +233,8 @@ class _Copy:
             self._schemas[key] = self._writer.register_schema(*key)
         name = channel.topic
         if name not in self._channels:
+            if not readable_profiles(channel.metadata.get(_PROFILES, "")):
+                channel = replace(channel, metadata={**channel.metadata, _PROFILES: ""})
             self._topics[name] = channel, schema
             self._tallies[name] = Tally()
             self._channels[name] = self._writer.register_channel(

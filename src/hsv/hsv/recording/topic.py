@@ -48,7 +48,7 @@ class Qos:
     @classmethod
     def from_yaml(cls, text: str) -> Qos:
         """Return the first profile of the text that :meth:`as_yaml` makes; the default for what it does not say."""
-        profiles = yaml.safe_load(text) or [{}]
+        profiles = readable_profiles(text) or [{}]
         given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
         for key, value in given.items():
             if isinstance(value, dict):
@@ -58,6 +58,15 @@ class Qos:
     def as_yaml(self) -> str:
         """Return the profile as the list of one profile that the metadata of an MCAP channel carries as text."""
         return yaml.safe_dump([self.as_dict()], sort_keys=False)
+
+
+def readable_profiles(text: str) -> list[dict[str, Any]]:
+    """Return the profiles in the metadata of a channel; none where a damage has left no such text."""
+    try:
+        profiles = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return []
+    return profiles if isinstance(profiles, list) and all(isinstance(p, dict) for p in profiles) else []
 
 
 @dataclass(frozen=True, slots=True)
