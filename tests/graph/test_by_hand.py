@@ -56,7 +56,7 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
             "hsv_ctrl",
             "tube_mpc",
             ["-p", "tube.centre:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"],
-            ["design 'baseline': claim fails: tube.centre[0]"],
+            ["design 'baseline': claim fails: tube.centre["],
         ),
         ("hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]),
         ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]),
