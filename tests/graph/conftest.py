@@ -17,6 +17,15 @@ def ros_environment() -> Iterator[dict[str, str]]:
         yield environment
 
 
+@pytest.fixture(scope="module")
+def shared_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
+    """Start processes for all tests of a module, in one folder, on a domain of their own."""
+    with own_environment() as environment:
+        started = Processes(environment, tmp_path_factory.mktemp("graph"))
+        yield started
+        started.stop()
+
+
 @pytest.fixture
 def processes(ros_environment: dict[str, str], tmp_path: Path) -> Iterator[Processes]:
     """Start processes in a temporary folder, on a domain of their own."""

@@ -1,16 +1,15 @@
-"""A graph of processes flies exactly what the library flies in one process."""
+"""A graph of shared_processes flies exactly what the library flies in one process."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from node_processes import Processes, short_scenario
-from ros_domain import own_environment
 
 from hsv.graph.description import TOPICS
 from hsv.recording.flight import flight_data, input_columns, state_columns
@@ -23,29 +22,21 @@ pytestmark = pytest.mark.graph
 
 
 @pytest.fixture(scope="module")
-def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
-    with own_environment() as environment:
-        started = Processes(environment, tmp_path_factory.mktemp("lockstep"))
-        yield started
-        started.stop()
-
-
-@pytest.fixture(scope="module")
-def case1(processes: Processes) -> Bag:
+def case1(shared_processes: Processes) -> Bag:
     """Case 1 in five seconds."""
-    return _fly(processes, short_scenario(processes.folder), "case1")
+    return _fly(shared_processes, short_scenario(shared_processes.folder), "case1")
 
 
 @pytest.fixture(scope="module")
-def case2(processes: Processes) -> Bag:
+def case2(shared_processes: Processes) -> Bag:
     """Case 2 in five seconds."""
-    return _fly(processes, _short_case2(processes.folder), "case2")
+    return _fly(shared_processes, _short_case2(shared_processes.folder), "case2")
 
 
-def _fly(processes: Processes, scenario: Path, name: str, *words: str) -> Bag:
-    done = processes.run("hsv", "run", scenario, "--no-report", "--bag", processes.folder / name, *words)
+def _fly(shared_processes: Processes, scenario: Path, name: str, *words: str) -> Bag:
+    done = shared_processes.run("hsv", "run", scenario, "--no-report", "--bag", shared_processes.folder / name, *words)
     assert done.returncode == 0, done.stdout
-    return Bag(processes.folder / name)
+    return Bag(shared_processes.folder / name)
 
 
 def _short_case2(folder: Path) -> Path:
@@ -92,42 +83,44 @@ def test_graph_equals_in_process_bit_for_bit(
     assert all(bag.topics[topic].count == 251 for topic in TOPICS)
 
 
-def test_two_runs_are_bit_identical_whatever_the_load(processes: Processes, case1: Bag) -> None:
-    scenario = short_scenario(processes.folder)
+def test_two_runs_are_bit_identical_whatever_the_load(shared_processes: Processes, case1: Bag) -> None:
+    scenario = short_scenario(shared_processes.folder)
     with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as load:
         try:
-            second = _fly(processes, scenario, "second")
+            second = _fly(shared_processes, scenario, "second")
         finally:
             load.kill()
     for topic in TOPICS:
         assert case1.messages(topic) == second.messages(topic), topic
 
 
-def test_composed_equals_separate_processes_in_every_byte(processes: Processes, case1: Bag) -> None:
-    composed = _fly(processes, short_scenario(processes.folder), "composed", "--composed")
+def test_composed_equals_separate_processes_in_every_byte(shared_processes: Processes, case1: Bag) -> None:
+    composed = _fly(shared_processes, short_scenario(shared_processes.folder), "composed", "--composed")
     # Padding aside: what DDS leaves in it is whatever its buffer held before.
-    compared = processes.run("hsv", "diff", case1.path, composed.path)
+    compared = shared_processes.run("hsv", "diff", case1.path, composed.path)
     assert compared.returncode == 0, compared.stdout
     assert f"{251 * len(TOPICS)} messages: identical in every byte" in compared.stdout
 
 
-def test_a_diverging_flight_ends_cleanly_and_says_so(processes: Processes) -> None:
-    scenario = short_scenario(processes.folder, duration=30, fault=29, coupling="derived", notch=False)
-    words = ["--composed", "--no-report", "--bag", processes.folder / "lost"]
-    done = processes.run("hsv", "run", scenario, *words)
+def test_a_diverging_flight_ends_cleanly_and_says_so(shared_processes: Processes) -> None:
+    scenario = short_scenario(shared_processes.folder, duration=30, fault=29, coupling="derived", notch=False)
+    words = ["--composed", "--no-report", "--bag", shared_processes.folder / "lost"]
+    done = shared_processes.run("hsv", "run", scenario, *words)
     assert done.returncode == 1
     assert "flight diverged at t = 17.5" in done.stdout
-    bag = Bag(processes.folder / "lost")
+    bag = Bag(shared_processes.folder / "lost")
     assert bag.complete
     assert bag.columns("/hsv/state")["status"][-1] == 2
     assert len({bag.topics[topic].count for topic in TOPICS}) == 1
 
 
-def test_pacing_keeps_to_the_wall_clock(processes: Processes) -> None:
+def test_pacing_keeps_to_the_wall_clock(shared_processes: Processes) -> None:
     import json
 
-    scenario = short_scenario(processes.folder, duration=2, fault=1)
-    done = processes.run("hsv", "run", scenario, "--composed", "--no-report", "--real-time-factor", "1", "--json")
+    scenario = short_scenario(shared_processes.folder, duration=2, fault=1)
+    done = shared_processes.run(
+        "hsv", "run", scenario, "--composed", "--no-report", "--real-time-factor", "1", "--json"
+    )
     assert done.returncode == 0, done.stdout
     # A lower bound only: a loaded machine may be late, but never early.
     assert json.loads(done.stdout[done.stdout.index("{") :])["wall_time_s"] >= 1.9

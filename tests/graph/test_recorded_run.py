@@ -5,14 +5,13 @@ from __future__ import annotations
 import subprocess
 import sys
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 import yaml
 from bag_readers import READERS, Messages, assert_equal, ours
 from node_processes import Processes, short_scenario
-from ros_domain import own_environment
 from waiting import exit_code_of
 
 from hsv.control.design_file import find_design, read_parameters
@@ -27,20 +26,12 @@ STEPS = 601
 
 
 @pytest.fixture(scope="module")
-def processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Processes]:
-    with own_environment() as environment:
-        started = Processes(environment, tmp_path_factory.mktemp("recorded"))
-        yield started
-        started.stop()
-
-
-@pytest.fixture(scope="module")
-def bag(processes: Processes) -> Path:
+def bag(shared_processes: Processes) -> Path:
     """A flight of twelve seconds, long enough to be worth a replay."""
-    scenario = short_scenario(processes.folder, duration=12, fault=6)
-    done = processes.run("hsv", "run", scenario, "--bag", processes.folder / "flown")
+    scenario = short_scenario(shared_processes.folder, duration=12, fault=6)
+    done = shared_processes.run("hsv", "run", scenario, "--bag", shared_processes.folder / "flown")
     assert done.returncode == 0, done.stdout
-    return processes.folder / "flown"
+    return shared_processes.folder / "flown"
 
 
 def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
@@ -52,18 +43,18 @@ def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
 
 
 @pytest.mark.parametrize("words", [["--node", "plant"], ["--node", "tube_mpc"], ["--rerun"]], ids=" ".join)
-def test_replay_over_dds_is_identical_in_every_byte(processes: Processes, bag: Path, words: list[str]) -> None:
-    done = processes.run("hsv", "replay", bag, "--over-dds", *words)
+def test_replay_over_dds_is_identical_in_every_byte(shared_processes: Processes, bag: Path, words: list[str]) -> None:
+    done = shared_processes.run("hsv", "replay", bag, "--over-dds", *words)
     assert done.returncode == 0, done.stdout
     assert done.stdout.count("identical in every byte") == (5 if "--rerun" in words else 1), done.stdout
 
 
-def test_a_node_that_does_not_start_is_named(processes: Processes, bag: Path) -> None:
-    wrong = processes.folder / "wrong.yaml"
+def test_a_node_that_does_not_start_is_named(shared_processes: Processes, bag: Path) -> None:
+    wrong = shared_processes.folder / "wrong.yaml"
     values = read_parameters(find_design("baseline")) | {"design.certificate": "absent.json"}
     wrong.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}), encoding="utf-8")
     words = ["--over-dds", "--node", "tube_mpc", "--parameters", str(wrong)]
-    done = processes.run("hsv", "replay", bag, *words)
+    done = shared_processes.run("hsv", "replay", bag, *words)
     assert done.returncode == 1
     assert "tube_mpc ended with exit code 2" in done.stdout and "absent.json" in done.stdout
 
@@ -94,10 +85,10 @@ HASHES = textwrap.dedent(
 )
 
 
-def test_type_hashes_are_those_of_the_running_ros(processes: Processes, bag: Path) -> None:
+def test_type_hashes_are_those_of_the_running_ros(shared_processes: Processes, bag: Path) -> None:
     import json
 
-    done = processes.run(sys.executable, "-c", HASHES, bag)
+    done = shared_processes.run(sys.executable, "-c", HASHES, bag)
     assert done.returncode == 0, done.stdout
     running = json.loads(done.stdout.splitlines()[-1])
     assert running == {name: topic.type_hash for name, topic in Bag(bag).topics.items()}
@@ -153,31 +144,31 @@ LISTEN = textwrap.dedent(
 )
 
 
-def test_player_steps_and_plays_the_recorded_bytes(processes: Processes, bag: Path) -> None:
+def test_player_steps_and_plays_the_recorded_bytes(shared_processes: Processes, bag: Path) -> None:
     topics = ["/hsv/state", "/hsv/command"]
     words = ["--rate", "20", "--paused", "--topics", *topics]
-    player = processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
-    done = processes.run(sys.executable, "-c", LISTEN, bag, ",".join([*topics, "/clock"]))
+    player = shared_processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
+    done = shared_processes.run(sys.executable, "-c", LISTEN, bag, ",".join([*topics, "/clock"]))
     assert done.returncode == 0, done.stdout
     assert "paused, played up to t = 0.040 s" in done.stdout and f"all {3 * STEPS}" in done.stdout
     assert exit_code_of(player) == 0
 
 
-def test_player_keeps_the_pace(processes: Processes, bag: Path) -> None:
+def test_player_keeps_the_pace(shared_processes: Processes, bag: Path) -> None:
     import time
 
     begun = time.monotonic()
-    done = processes.run("hsv", "play", bag, "--rate", "4", "--delay", "0", "--topic", "/hsv/state")
+    done = shared_processes.run("hsv", "play", bag, "--rate", "4", "--delay", "0", "--topic", "/hsv/state")
     assert done.returncode == 0, done.stdout
     assert time.monotonic() - begun >= 3.0
 
 
-def test_bad_words_of_the_player_are_one_line(processes: Processes, bag: Path) -> None:
+def test_bad_words_of_the_player_are_one_line(shared_processes: Processes, bag: Path) -> None:
     for words, said in (
-        ([processes.folder / "nowhere"], "does not exist"),
+        ([shared_processes.folder / "nowhere"], "does not exist"),
         ([bag, "--rate", "-1"], "rate = -1.0"),
         ([bag, "--topics", "/hsv/nowhere"], "no topic /hsv/nowhere"),
     ):
-        done: subprocess.CompletedProcess[str] = processes.run("ros2", "run", "hsv_bringup", "player", *words)
+        done: subprocess.CompletedProcess[str] = shared_processes.run("ros2", "run", "hsv_bringup", "player", *words)
         assert done.returncode == 2 and said in done.stdout
         assert len([line for line in done.stdout.splitlines() if line]) == 1, done.stdout

@@ -78,7 +78,7 @@ class Launcher:
         arguments: Sequence[str],
         on_step: Callable[[int], None],
         on_line: Callable[[str, str], None],
-        patience: float = 10.0,
+        wait_timeout: float = 10.0,
     ) -> None:
         """Prepare to start processes.
 
@@ -87,13 +87,13 @@ class Launcher:
             arguments: Command line of each.
             on_step: Called with the steps that are reported.
             on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
-            patience: For how long (s) a process may do nothing at all, where no other node would end the run.
+            wait_timeout: For how long (s) a process may do nothing at all, where no other node would end the run.
         """
         self._nodes = list(nodes)
         self._arguments = list(arguments)
         self._on_step = on_step
         self._on_line = on_line
-        self._patience = max(patience, HUNG_AFTER)
+        self._wait_timeout = max(wait_timeout, HUNG_AFTER)
         self._flying = False
         self._processes: list[_Process] = []
 
@@ -141,7 +141,7 @@ class Launcher:
         """Tell a process that does nothing at all; it ends the run only if it ``decides``."""
         idle = process.idle()
         name = process.description.name
-        if idle > self._patience and decides:
+        if idle > self._wait_timeout and decides:
             raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
         if process.hung != (idle > HUNG_AFTER):
             process.hung = not process.hung
@@ -150,12 +150,12 @@ class Launcher:
 
     def stop(self) -> None:
         """End all processes: ask, then force; the plant first, so that the recorder gets everything."""
-        for number, patience in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
+        for number, grace in ((signal.SIGINT, GRACE), (signal.SIGTERM, GRACE / 5), (signal.SIGKILL, GRACE)):
             running = [p for p in reversed(self._processes) if p.popen.poll() is None]
             for process in running:
                 process.popen.send_signal(number)
             begun = time.monotonic()
-            while time.monotonic() - begun < patience and any(
+            while time.monotonic() - begun < grace and any(
                 p.popen.poll() is None and p.idle() < HUNG_AFTER for p in running
             ):
                 time.sleep(_LOOK)

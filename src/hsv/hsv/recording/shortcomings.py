@@ -7,7 +7,8 @@ from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag, Loss
 from hsv.recording.steps import complete_stamps, expected_stamps, irregularities
 
-_DAMAGES_NAMED = 3
+_NAMED = 3
+"""Files and damages that are named; of more, how many there are."""
 
 
 def shortcomings(bag: Bag) -> list[str]:
@@ -28,10 +29,12 @@ def shortcomings(bag: Bag) -> list[str]:
 
 def loss_in_words(loss: Loss) -> list[str]:
     """Say which files a bag lacks, where it is damaged, and how much of it cannot be read."""
-    words = [f"lacks its file {name}" for name in loss.files]
+    words = [f"lacks its file {name}" for name in loss.files[:_NAMED]]
+    if (more := len(loss.files) - _NAMED) > 0:
+        words.append(f"lacks {more} more of its files")
     if loss.damages:
-        places = "; ".join(f"{path.name}: {damage}" for path, damage in loss.damages[:_DAMAGES_NAMED])
-        more = len(loss.damages) - _DAMAGES_NAMED
+        places = "; ".join(f"{path.name}: {damage}" for path, damage in loss.damages[:_NAMED])
+        more = len(loss.damages) - _NAMED
         words.append(f"damaged ({places}{f'; and {more} more places' if more > 0 else ''})")
     lost = [f"{n} {what}" for n, what in ((loss.messages, "messages"), (loss.attachments, "attachments")) if n]
     if lost:
