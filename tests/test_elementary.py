@@ -18,7 +18,6 @@ from hsv.elementary import (
     logarithm,
     sine,
     sine_cosine,
-    sines_cosines,
     tangent,
 )
 
@@ -142,12 +141,6 @@ def test_what_is_out_of_range_gives_no_number(function, arguments):
 @pytest.mark.parametrize("point", [(1e141, 1.0), (1.0, 1e-141), (math.inf, 1.0), (1.0, math.nan)])
 def test_points_out_of_range_give_no_angle(point):
     assert math.isnan(arctangent2(*point))
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.3, -0.7, 1.2, -44.0, 99999.0, 2e5])
-def test_two_angles_at_once_give_the_bits_of_each_alone(angle):
-    both = sines_cosines(angle, 0.25)
-    assert np.array_equal(both, (*sine_cosine(angle), *sine_cosine(0.25)), equal_nan=True)
 
 
 @pytest.mark.parametrize("argument", [0.02, -0.6, 1.1, -20.0])

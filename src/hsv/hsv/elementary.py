@@ -158,20 +158,6 @@ def _small_sine_cosine(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
-def sines_cosines(x: Any, y: Any) -> Any:
-    """Return sin x, cos x, sin y, cos y; as two calls of :func:`sine_cosine`, but small angles share the registers."""
-    a, b = x.real, y.real
-    if abs(a) <= _QUARTER_PI_HIGH and abs(b) <= _QUARTER_PI_HIGH:
-        sin_a, cos_a = _small_sine_cosine(a)
-        sin_b, cos_b = _small_sine_cosine(b)
-    else:
-        sin_a, cos_a = sine_cosine(a)
-        sin_b, cos_b = sine_cosine(b)
-    dx, dy = x - a, y - b  # zero where they are real
-    return sin_a + cos_a * dx, cos_a - sin_a * dx, sin_b + cos_b * dy, cos_b - sin_b * dy
-
-
-@njit(cache=True)
 def sine_cosine(x: Any) -> Any:
     """Return the sine and the cosine of ``x`` (rad), real with |x| up to 1e5, or complex as the module says."""
     a = x.real

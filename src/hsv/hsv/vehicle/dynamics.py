@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hsv.elementary import exponential, sines_cosines
+from hsv.elementary import exponential, sine_cosine
 from hsv.vehicle.parameters import VehicleParameters
 
 STATE_NAMES = (
@@ -100,7 +100,8 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
     acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant
     acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant
 
-    sin_alpha, cos_alpha, sin_path, cos_path = sines_cosines(alpha, pitch - alpha)
+    sin_alpha, cos_alpha = sine_cosine(alpha)
+    sin_path, cos_path = sine_cosine(pitch - alpha)
     out[0] = velocity * sin_path
     out[1] = (thrust * cos_alpha - drag) / p.mass - p.gravity * sin_path
     out[2] = (-thrust * sin_alpha - lift) / (p.mass * velocity) + rate + p.gravity / velocity * cos_path
