@@ -5,7 +5,6 @@ import pytest
 
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import DESIGN_PARAMETERS
-from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
@@ -19,7 +18,6 @@ TABLES = (
     NOTCH_PARAMETERS,
     NOMINAL_PARAMETERS,
     CONTROLLER_PARAMETERS,
-    INTEGRAL_PARAMETERS,
     ROBUST_MPC_PARAMETERS,
     FAULT_PARAMETERS,
     DESIGN_PARAMETERS,

@@ -3,6 +3,7 @@ import pytest
 from flights import components
 
 from hsv.campaign.tube_levels import TubeLevels
+from hsv.control.controller import ControllerInput
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
@@ -10,14 +11,16 @@ from hsv.simulation.scenario import load_scenario
 
 def published_levels(parts, flight):
     """Return what the controller says of each step."""
-    h, notch, law = flight.history, parts.notch_filter, parts.tube_law
+    h, notch, law = flight.history, parts.notch_filter, parts.controller
     for part in (notch, law):
         part.reset()
     levels = []
     references = zip(flight.reference, flight.reference_input, strict=True)
-    for x, x_n, u_n, (x_r, u_r) in zip(h.state, h.deviation, h.nominal_input, references, strict=True):
+    rows = zip(h.state, h.deviation, h.nominal_input, references, strict=True)
+    for k, (x, x_n, u_n, (x_r, u_r)) in enumerate(rows):
         filtered = notch.step(float(x[4]))
-        result = law.step(x, filtered.filtered_pitch_rate, filtered.filter_state, x_r, u_r, x_n, u_n)
+        q_f, s = filtered.filtered_pitch_rate, filtered.filter_state
+        result = law.step(ControllerInput(k, x, q_f, s, x_r, u_r, x_n, u_n))
         levels.append(result.level)
     return levels
 

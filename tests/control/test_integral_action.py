@@ -1,9 +1,8 @@
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.control.control_law import tube_law
+from hsv.control.controller import ControllerInput
 from hsv.control.design_file import find_design, read_design, read_parameters
-from hsv.control.integral_action import IntegralTubeLaw
 from hsv.control.tube_law import TubeLaw
 
 PATH = find_design("baseline")
@@ -12,37 +11,33 @@ X_R, U_R = np.array([26000.0, 2400.0, 0.03, 0.03, 0.0, 1.0, 0.0, 1.0, 0.0]), np.
 ERROR = np.array([0.5, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
-def step(law, error):
+def step(law, error, k=0):
     x = X_R + error
-    return law.step(x, float(x[4]), np.empty(0), X_R, U_R, np.zeros(9), np.zeros(2))
-
-
-def test_off_by_default():
-    assert isinstance(tube_law(VALUES), TubeLaw)
+    return law.step(ControllerInput(k, x, float(x[4]), np.empty(0), X_R, U_R, np.zeros(9), np.zeros(2)))
 
 
 def test_acts_on_the_integral_of_altitude_and_velocity_error():
-    plain, law = tube_law(VALUES), tube_law({**VALUES, "integral.rate": 0.1})
-    assert isinstance(law, IntegralTubeLaw)
+    plain, law = TubeLaw.from_parameters(VALUES), TubeLaw.from_parameters({**VALUES, "integral.rate": 0.1})
     assert_allclose(step(law, ERROR).u_unsaturated, step(plain, ERROR).u_unsaturated, rtol=1e-15)
-    for _ in range(49):
-        step(law, ERROR)
-    result = step(law, np.zeros(9))
+    for k in range(1, 50):
+        step(law, ERROR, k)
+        assert_array_equal(step(plain, np.zeros(9), k).u_feedback, 0.0)
+    result = step(law, np.zeros(9), 50)
     expected = 0.1 * DESIGN.feedback_gain[:, :2] @ ERROR[:2] * 50 * 0.02
     assert_allclose(result.u_feedback, expected, rtol=1e-9)
     assert_allclose(result.input, U_R + expected, rtol=1e-12)
 
 
 def test_stands_still_while_an_input_is_limited():
-    law = tube_law({**VALUES, "integral.rate": 0.1})
+    law = TubeLaw.from_parameters({**VALUES, "integral.rate": 0.1})
     far = np.array([-1e5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    for _ in range(100):
-        assert step(law, far).saturated.any()
-    assert_array_equal(step(law, np.zeros(9)).u_feedback, 0.0)
+    for k in range(100):
+        assert step(law, far, k).saturated.any()
+    assert_array_equal(step(law, np.zeros(9), 100).u_feedback, 0.0)
 
 
 def test_reset_empties_the_integral():
-    law = tube_law({**VALUES, "integral.rate": 0.1})
+    law = TubeLaw.from_parameters({**VALUES, "integral.rate": 0.1})
     step(law, ERROR)
     law.reset()
     assert_array_equal(step(law, np.zeros(9)).u_feedback, 0.0)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.control.controller import ControllerInput
 from hsv.control.design_file import ControlDesign, find_design, read_design
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
@@ -23,7 +24,8 @@ def step(law, design, error, state=None):
     x = np.zeros(9)
     x[:5] = error
     filter_state = np.zeros(2) if state is None else state
-    return law.step(x, x[4], filter_state, np.zeros(9), np.array([0.27, 0.21]), np.zeros(9), np.zeros(2))
+    u_r = np.array([0.27, 0.21])
+    return law.step(ControllerInput(0, x, x[4], filter_state, np.zeros(9), u_r, np.zeros(9), np.zeros(2)))
 
 
 def test_error_at_the_centre_has_level_zero_and_on_the_boundary_one(design):
@@ -44,13 +46,12 @@ def test_filter_error_is_the_filter_fed_with_the_rate_error(design):
     law, real, fed = TubeLaw(design), NotchFilter(design.notch, design.period), NotchFilter(design.notch, design.period)
     rates = np.concatenate(([0.0], 0.01 * np.sin(np.arange(40))))
     planned = np.concatenate(([0.0], 0.02 * np.cos(np.arange(40))))
-    for e_q, q_n in zip(rates, planned, strict=True):
+    for k, (e_q, q_n) in enumerate(zip(rates, planned, strict=True)):
         filtered = real.step(e_q + q_n)
         x, x_n = np.zeros(9), np.zeros(9)
         x[4], x_n[4] = e_q + q_n, q_n
-        result = law.step(
-            x, filtered.filtered_pitch_rate, filtered.filter_state, np.zeros(9), np.zeros(2), x_n, np.zeros(2)
-        )
+        q_f, s = filtered.filtered_pitch_rate, filtered.filter_state
+        result = law.step(ControllerInput(k, x, q_f, s, np.zeros(9), np.zeros(2), x_n, np.zeros(2)))
         assert_allclose(result.error[5:], fed.step(e_q).filter_state, atol=1e-15)
 
 

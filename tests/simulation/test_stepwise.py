@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from hsv.control.design_file import ControlDesign
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly, fly_stepwise
 from hsv.simulation.scenario import load_scenario
@@ -43,6 +44,22 @@ def test_robust_mpc_loses_altitude_after_the_fault_and_the_tube_does_not(scenari
     assert robust.status is FlightStatus.FINISHED
     assert least < errors[0] < most
     assert errors[1] < 10.0
+
+
+def test_robust_mpc_is_the_tube_law_about_a_nominal_trajectory_under_its_own_gain():
+    values = {**flight_parameters(load_scenario("case1_rmpc_fourth_k")), "duration": 4.0, "fault.starts": [1.0]}
+    design = ControlDesign.from_parameters(values)
+    gain = design.nominal_gains[values["robust_mpc.gain_index"]].ravel().tolist()
+    # The nominal state drops out of K (x - x_r - x_n) + K x_n + u_r; the invariant set is another loop's.
+    as_tube_law = {name: value for name, value in values.items() if not name.startswith("tube.")} | {
+        "controller": "tube_mpc",
+        "feedback.gain": gain,
+        "nominal.gains": gain,
+        "nominal.ellipsoids": design.nominal_ellipsoids[0].ravel().tolist(),
+    }
+    robust, tube = fly(assemble(values)).history, fly(assemble(as_tube_law)).history
+    np.testing.assert_allclose(tube.state, robust.state, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(tube.command, robust.command, rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("mass", [-0.1, 0.1])

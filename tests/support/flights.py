@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.controller import ControllerInput
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import load_scenario
@@ -20,21 +21,24 @@ def components(scenario: str = "case1", **changes: Any) -> Components:
 
 def step_by_step(parts: Components) -> dict[str, np.ndarray]:
     """Fly ``parts`` to the end; return the histories (n + 1, ...) by the names of ``History``, and the statuses."""
-    for part in (parts.notch_filter, parts.nominal_trajectory, parts.tube_law, parts.fault_injector):
+    for part in (parts.notch_filter, parts.nominal_trajectory, parts.controller, parts.fault_injector):
         part.reset()
     plant = parts.plant.reset()
     rows: list[dict[str, Any]] = []
     while True:
         filtered = parts.notch_filter.step(float(plant.state[4]))
         nominal = parts.nominal_trajectory.step(plant.state)
-        tube = parts.tube_law.step(
-            plant.state,
-            filtered.filtered_pitch_rate,
-            filtered.filter_state,
-            nominal.reference,
-            nominal.reference_input,
-            nominal.deviation,
-            nominal.input,
+        tube = parts.controller.step(
+            ControllerInput(
+                plant.step,
+                plant.state,
+                filtered.filtered_pitch_rate,
+                filtered.filter_state,
+                nominal.reference,
+                nominal.reference_input,
+                nominal.deviation,
+                nominal.input,
+            )
         )
         fault = parts.fault_injector.step(plant.step, tube.input)
         rows.append(

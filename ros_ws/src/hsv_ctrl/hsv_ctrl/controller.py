@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeStatus
 
-from hsv.control.control_law import ControlLaw
-from hsv.control.tube_law import TubeStatusCode
+from hsv.control.robust_mpc import RobustMpc
+from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.graph.exchange import control, fill_tube_status
 from hsv_node.lockstep import PeerNode
 
@@ -13,7 +13,7 @@ from hsv_node.lockstep import PeerNode
 class ControllerNode(PeerNode):
     """Turns /hsv/filtered_state and /hsv/nominal into /hsv/command and /hsv/tube_status."""
 
-    law: ControlLaw
+    law: TubeLaw | RobustMpc
     """Set by the node."""
     follows_nominal = True
     """Whether the nominal input is a part of the command."""

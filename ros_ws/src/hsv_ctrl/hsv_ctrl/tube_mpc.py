@@ -8,8 +8,6 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from hsv.control.adjustable import TAU
-from hsv.control.control_law import tube_law
-from hsv.control.integral_action import INTEGRAL_PARAMETERS, IntegralTubeLaw
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
@@ -24,7 +22,7 @@ class TubeMpcNode(ControllerNode):
 
     def __init__(self) -> None:
         super().__init__("tube_mpc")
-        values, design = declare_design(self, (*INTEGRAL_PARAMETERS, *TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
+        values, design = declare_design(self, (*TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
         if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)
         certified, flown = design.coupling, values["vehicle.coupling"]
@@ -32,7 +30,7 @@ class TubeMpcNode(ControllerNode):
             self.get_logger().warning(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
-        self.law: TubeLaw | IntegralTubeLaw = tube_law(values, design)
+        self.law = self._tube_law = TubeLaw.from_parameters(values, design)
         self.add_on_set_parameters_callback(self._on_change)
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -41,7 +39,7 @@ class TubeMpcNode(ControllerNode):
             if parameter.name == TAU.name:
                 values = list(parameter.value)
                 try:
-                    step = self.law.change_tau(values)
+                    step = self._tube_law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
                 # Logged, and so recorded: what a parameter service answers has no room for the step.

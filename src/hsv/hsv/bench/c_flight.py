@@ -78,8 +78,8 @@ class CFlight:
         Raises:
             RunError: No C compiler, a failed build, or components that the C build does not know.
         """
-        law, nominal = components.tube_law, components.nominal_trajectory
-        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)):
+        law, nominal = components.controller, components.nominal_trajectory
+        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)) or law.data.integral_rate > 0.0:
             raise RunError("C build: it flies the tube law over the nested family, expected a scenario with these")
         self._folder = tempfile.TemporaryDirectory(prefix="hsv_bench_")
         self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), flags)))

@@ -8,12 +8,13 @@ from typing import Any, Self
 
 import numpy as np
 
+from hsv.control.controller import ControllerInput
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_input
+from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
+from hsv.vehicle.dynamics import N_RIGID
 
 ROBUST_MPC_PARAMETERS = (
     Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost, -1 the last", "", -64, 63),
@@ -35,12 +36,13 @@ class RobustMpc:
                 f"parameter robust_mpc.gain_index = {gain_index}: expected {-len(gains)} to {len(gains) - 1}"
             )
         limits = design.input_minimum, design.input_maximum
+        no_notch = discretise((), design.period)
         self.data = TubeData(
-            gains[gain_index][None], np.zeros(1, np.int64), *limits, False, discretise((), design.period)
+            gains[gain_index][None], np.zeros(1, np.int64), *limits, False, False, no_notch, 0.0, design.period
         )
-        self._none = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
-        x, u = self._none
-        self.step(x, 0.0, np.empty(0), x, u, x, u)  # compile now: a cold cache must not stall a flight
+        self._memory = memory_of(self.data)
+        x, u = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
+        self.step(ControllerInput(0, x, 0.0, np.empty(0), x, u, x, u))  # compile now: a cold cache must not stall
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
@@ -54,38 +56,24 @@ class RobustMpc:
     def reset(self) -> None:
         """Nothing to forget."""
 
-    def step(
-        self,
-        state: np.ndarray,
-        filtered_pitch_rate: float,
-        filter_state: np.ndarray,
-        reference: np.ndarray,
-        reference_input: np.ndarray,
-        deviation: np.ndarray,
-        nominal_input: np.ndarray,
-    ) -> TubeResult:
-        """Return the input of this step from x (9), q_f (rad/s), x_r (9) and u_r (2).
+    def step(self, inputs: ControllerInput) -> TubeResult:
+        """Return the input of this step.
 
-        The interface is that of :class:`hsv.control.tube_law.TubeLaw`; the nominal trajectory is not used, there is no
-        set, and the error is the deviation from the reference.
+        The nominal trajectory is not used, there is no set, and the error is the deviation from the reference.
         """
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        x_n, u_n = self._none
-        error = filtered_pitch_rate - float(reference[PITCH_RATE])
-        tube_input(
-            self.data, self.data.gains[0], state, error, reference, x_n, u_n, reference_input, u_feedback, total, u
-        )
+        tube_step(self.data, self._memory, inputs.step, False, *inputs[1:], u_feedback, total, u)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,
-            error=(state - reference)[:N_RIGID],
+            u_unsaturated=total,
+            error=(inputs.state - inputs.reference)[:N_RIGID],
             tube_centre=np.empty(0),
             tube_half_width=np.empty(0),
             level=math.nan,
             inside=False,
             component="",
             u_feedback=u_feedback,
-            u_unsaturated=total,
             saturated=u != total,
             tau=np.ones(1),
             status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,

@@ -1,6 +1,8 @@
 """Tube-MPC law (paper eq. 36, 48, 54): u = F diag(tau) (x - x_r - x_n) + u_n + u_r within the limits.
 
-The pitch rate in x is the filtered one; that of x_r + x_n is too where the design says so (eq. 48).
+The pitch rate in x is the filtered one; that of x_r + x_n is too where the design says so (eq. 48). Integral action on
+the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the offset that a
+wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know.
 """
 
 from __future__ import annotations
@@ -15,17 +17,18 @@ import numpy as np
 from numba import njit
 
 from hsv.control.adjustable import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
+from hsv.control.controller import ControllerInput, ControllerResult
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
     NotchData,
     NotchSection,
     discretise,
+    filter_step,
     flown_sections,
 )
-from hsv.control.planned_filter import PlannedFilter
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
+from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
 from hsv.vehicle.parameters import COUPLING_SETS
 
 
@@ -42,25 +45,38 @@ class TubeStatusCode(IntEnum):
 TUBE_PARAMETERS = (
     replace(TAU, read_only=False),
     *TAU_CHANGE_PARAMETERS,
+    Parameter("integral.rate", 0.0, "k of the integral gain k F(:, [h V]); 0: no integral action", "1/s", 0.0, 1.0),
     Parameter("vehicle.coupling", "paper_like", "set of inertial coupling of the vehicle flown", choices=COUPLING_SETS),
     *FLOWN_NOTCH_PARAMETERS,
 )
 """Of the tube law, beside those of the design."""
+
+_N_INTEGRATED = 2
+"""Altitude and velocity, the first two states."""
 
 
 class TubeData(NamedTuple):
     """The law for compiled functions.
 
     ``gains`` F diag(tau) (c, 2, 9), each from its step in ``starts`` (c) on, the first from the beginning; input limits
-    (2); whether the plan's pitch rate is ``filtered``, by which ``notch``.
+    (2); whether the error is one from the plan ``x_r + x_n``, or from x_r alone; whether the plan's pitch rate is
+    ``filtered``, by which ``notch``; rate (1/s) and ``period`` (s) of the integral action.
     """
 
     gains: np.ndarray
     starts: np.ndarray
     minimum: np.ndarray
     maximum: np.ndarray
+    planned: bool
     filtered: bool
     notch: NotchData
+    integral_rate: float
+    period: float
+
+
+def memory_of(data: TubeData) -> np.ndarray:
+    """Return the room of :func:`tube_step`: s_n (2 s) of the plan's filter, integral (2), scratch for the error (9)."""
+    return np.zeros(2 * len(data.notch.D) + _N_INTEGRATED + N_STATES)
 
 
 @njit(cache=True)
@@ -72,38 +88,70 @@ def active_gain(data: Any, step: int) -> int:
     return index
 
 
-@njit(cache=True)
-def tube_input(
+# Inlined where it is called: the arrays of a call cost as much as its arithmetic.
+@njit(cache=True, inline="always")
+def tube_step(
     data: Any,
-    gain: np.ndarray,
+    memory: np.ndarray,
+    step: int,
+    monitored: bool,
     x: np.ndarray,
-    pitch_rate_error: float,
+    q_f: float,
+    s: np.ndarray,
     x_r: np.ndarray,
+    u_r: np.ndarray,
     x_n: np.ndarray,
     u_n: np.ndarray,
-    u_r: np.ndarray,
     u_feedback: np.ndarray,
     u_total: np.ndarray,
     u: np.ndarray,
-) -> None:
-    """Write the feedback part, by ``gain`` (2, 9), the sum of the three parts and the limited input, (2) each.
+) -> int:
+    """Write the feedback part, the sum of the three parts and the limited input, (2) each; return the gain's index.
 
-    ``pitch_rate_error``: filtered pitch rate less that of the plan. Where the sum is not finite (a measurement that is
-    not a number) the input is the reference's: an actuator gets a number whatever happens.
+    The filter of the plan's pitch rate q'_n (eq. 48) starts from the state ``s`` of the one in the loop, which is exact
+    where x = x_r + x_n; it is stepped where the law needs it or is ``monitored``, and where there is one in the loop.
+    The integral stands still in every step in which an input is limited. Where the sum is not finite (a measurement
+    that is not a number) the input is the reference's: an actuator gets a number whatever happens.
     """
+    active = active_gain(data, step)
+    size = 2 * len(data.notch.D)
+    if step == 0:
+        for i in range(min(len(s), size)):
+            memory[i] = s[i]
+        for i in range(_N_INTEGRATED):
+            memory[size + i] = 0.0
+    pitch_rate_error = q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE] if data.planned else q_f - x_r[PITCH_RATE]
+    if (data.filtered or monitored) and 0 < size == len(s):
+        planned_rate = filter_step(data.notch, memory, x_r[PITCH_RATE] + x_n[PITCH_RATE])
+        if data.filtered:
+            pitch_rate_error = q_f - planned_rate
+    errors = memory[size + _N_INTEGRATED :]
+    for j in range(len(x)):
+        errors[j] = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
+    errors[PITCH_RATE] = pitch_rate_error
+    limited = False
     for i in range(len(u)):
-        feedback = 0.0
+        feedback, integral = 0.0, 0.0
         for j in range(len(x)):
-            error = pitch_rate_error if j == PITCH_RATE else x[j] - x_n[j] - x_r[j]
-            feedback += gain[i, j] * error
-        u_feedback[i] = feedback
-        u_total[i] = u_feedback[i] + u_n[i] + u_r[i]
+            feedback += data.gains[active, i, j] * errors[j]
+        u_plan = u_n[i] if data.planned else 0.0
+        if data.integral_rate > 0.0:
+            for j in range(_N_INTEGRATED):
+                integral += data.integral_rate * data.gains[active, i, j] * memory[size + j]
+            u_plan += integral
+        u_total[i] = feedback + u_plan + u_r[i]
+        u_feedback[i] = feedback + integral
         wanted = u_total[i] if math.isfinite(u_total[i]) else u_r[i]
         u[i] = min(max(wanted, data.minimum[i]), data.maximum[i])
+        limited = limited or u[i] != u_total[i]
+    if data.integral_rate > 0.0 and not limited:
+        for j in range(_N_INTEGRATED):
+            memory[size + j] += data.period * (x[j] - x_r[j] - x_n[j])
+    return active
 
 
 @dataclass(frozen=True)
-class TubeResult:
+class TubeResult(ControllerResult):
     """The input (2) to apply and how it came about; see the message TubeStatus for the fields.
 
     ``error`` (n) of the rigid states and, with the filter in the loop, of its states; ``tube_centre`` and
@@ -112,7 +160,6 @@ class TubeResult:
     that of each rigid state (5).
     """
 
-    input: np.ndarray
     error: np.ndarray
     tube_centre: np.ndarray
     tube_half_width: np.ndarray
@@ -120,14 +167,13 @@ class TubeResult:
     inside: bool
     component: str
     u_feedback: np.ndarray
-    u_unsaturated: np.ndarray
     saturated: np.ndarray
     tau: np.ndarray
     status: TubeStatusCode
 
 
 class TubeLaw:
-    """The controller's last stage. Its feedback has no memory but for the filtered plan of eq. 48."""
+    """The controller's last stage."""
 
     def __init__(
         self,
@@ -135,23 +181,25 @@ class TubeLaw:
         coupling: str | None = None,
         notch: tuple[NotchSection, ...] | None = None,
         changes: Sequence[tuple[int, np.ndarray]] = (),
+        integral_rate: float = 0.0,
     ) -> None:
         """Fly ``design`` on a vehicle with this set of inertial coupling, ``None``: the one it is certified for.
 
         The set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes`` of
-        tau: first step and factors (5), in order.
+        tau: first step and factors (5), in order. ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
         """
         self._design = design
         self._certified = coupling in (None, design.coupling)
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
         self._notch = discretise(flown, design.period)
-        self._planned = PlannedFilter(self._notch)
+        self._integral_rate = integral_rate
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
+        self._memory = memory_of(self.data)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
-        self.step(x, 0.0, np.zeros(2 * len(flown)), x, u, x, u)
+        self.step(ControllerInput(0, x, 0.0, np.zeros(2 * len(flown)), x, u, x, u))
         self.reset()
 
     @classmethod
@@ -160,20 +208,19 @@ class TubeLaw:
 
         ``design``: the one in ``values``, where it is known already.
         """
-        coupling = check_all(TUBE_PARAMETERS, values)["vehicle.coupling"]
+        v = check_all(TUBE_PARAMETERS, values)
         design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
-        return cls(design, coupling, flown_sections(values), changes)
+        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"])
 
     @property
     def gain(self) -> np.ndarray:
         """The gain F diag(tau) (2, 9) of the next step."""
-        return np.asarray(self.data.gains[active_gain(self.data, self._step)])
+        return np.asarray(self.data.gains[active_gain(self.data, self._next)])
 
     def reset(self) -> None:
         """Start a new run: with the factor set last, and with the scheduled changes to come."""
-        self._step = 0
-        self._planned.reset()
+        self._next = 0
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
@@ -183,10 +230,10 @@ class TubeLaw:
             ParameterError: They are not certified.
         """
         self._tau = certified(values, self._design.tau_minimum)
-        past = [entry for entry in self._entries if entry[0] < self._step]
-        to_come = [entry for entry in self._entries if entry[0] > self._step]
-        self._arrange([*past, (self._step, self._tau), *to_come])
-        return self._step
+        past = [entry for entry in self._entries if entry[0] < self._next]
+        to_come = [entry for entry in self._entries if entry[0] > self._next]
+        self._arrange([*past, (self._next, self._tau), *to_come])
+        return self._next
 
     def _arrange(self, entries: list[tuple[int, np.ndarray]]) -> None:
         self._entries = entries
@@ -196,45 +243,25 @@ class TubeLaw:
             np.array([start for start, _ in entries], np.int64),
             design.input_minimum,
             design.input_maximum,
+            True,
             design.filtered,
             self._notch,
+            self._integral_rate,
+            design.period,
         )
 
-    def step(
-        self,
-        state: np.ndarray,
-        filtered_pitch_rate: float,
-        filter_state: np.ndarray,
-        reference: np.ndarray,
-        reference_input: np.ndarray,
-        deviation: np.ndarray,
-        nominal_input: np.ndarray,
-    ) -> TubeResult:
-        """Return the input of this step from x (9), q_f (rad/s), s (2 s), x_r (9), u_r (2), x_n (9) and u_n (2)."""
-        planned = self._planned.step(float(reference[PITCH_RATE] + deviation[PITCH_RATE]), filter_state)
-        if planned and self.data.filtered:
-            pitch_rate_error = filtered_pitch_rate - planned.filtered_pitch_rate
-        else:
-            pitch_rate_error = filtered_pitch_rate - float(deviation[PITCH_RATE]) - float(reference[PITCH_RATE])
-        active = active_gain(self.data, self._step)
-        self._step += 1
+    def step(self, inputs: ControllerInput) -> TubeResult:
+        """Return the input of this step; the first of a run is step 0."""
+        k, state, _, filter_state, reference, _, deviation, _ = inputs
+        memory, size = self._memory, len(filter_state)
+        in_loop = 0 < size == 2 * len(self._notch.D)
+        planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        tube_input(
-            self.data,
-            self.data.gains[active],
-            state,
-            pitch_rate_error,
-            reference,
-            deviation,
-            nominal_input,
-            reference_input,
-            u_feedback,
-            total,
-            u,
-        )
+        active = tube_step(self.data, memory, k, True, *inputs[1:], u_feedback, total, u)
+        self._next = k + 1
         error, tube = (state - reference - deviation)[:N_RIGID], None
-        if planned:
-            error, tube = np.concatenate((error, filter_state - planned.filter_state)), self._tube
+        if in_loop:
+            error, tube = np.concatenate((error, filter_state - planned)), self._tube
         level = tube.level(error) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and level <= 1.0
@@ -248,6 +275,7 @@ class TubeLaw:
             status = TubeStatusCode.OK if self._certified else TubeStatusCode.UNCERTIFIED_VEHICLE
         return TubeResult(
             input=u,
+            u_unsaturated=total,
             error=error,
             tube_centre=tube.centre if tube else np.empty(0),
             tube_half_width=tube.half_width if tube else np.empty(0),
@@ -255,7 +283,6 @@ class TubeLaw:
             inside=inside,
             component=tube.farthest(error) if tube and not inside else "",
             u_feedback=u_feedback,
-            u_unsaturated=total,
             saturated=u != total,
             tau=compact(self._entries[active][1]),
             status=status,

@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsv.control.controller import ControllerInput
+
 if TYPE_CHECKING:  # a node imports its own component alone
-    from hsv.control.control_law import ControlLaw
     from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
     from hsv.control.notch_filter import NotchFilter, NotchResult
-    from hsv.control.tube_law import TubeResult
+    from hsv.control.robust_mpc import RobustMpc
+    from hsv.control.tube_law import TubeLaw, TubeResult
     from hsv.faults.actuator import FaultInjector, FaultResult
     from hsv.vehicle.plant import PlantResult
 
@@ -120,16 +122,19 @@ def plan_nominal(trajectory: NominalTrajectory, state: Message, nominal: Message
     return result
 
 
-def control(law: ControlLaw, filtered: Message, nominal: Message, command: Message) -> TubeResult:
+def control(law: TubeLaw | RobustMpc, filtered: Message, nominal: Message, command: Message) -> TubeResult:
     """Step the controller: FilteredState and NominalState to ControlInput."""
     result = law.step(
-        state_vector(filtered.state),
-        filtered.filtered_pitch_rate,
-        np.asarray(filtered.filter_state),
-        state_vector(nominal.reference),
-        input_vector(nominal.reference_input),
-        state_vector(nominal.deviation),
-        input_vector(nominal.input),
+        ControllerInput(
+            filtered.step,
+            state_vector(filtered.state),
+            filtered.filtered_pitch_rate,
+            np.asarray(filtered.filter_state),
+            state_vector(nominal.reference),
+            input_vector(nominal.reference_input),
+            state_vector(nominal.deviation),
+            input_vector(nominal.input),
+        )
     )
     command.header, command.step = filtered.header, filtered.step
     fill_input(command, result.input)

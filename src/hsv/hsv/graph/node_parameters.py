@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from hsv.control.design_file import DESIGN_PARAMETERS
-from hsv.control.integral_action import INTEGRAL_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
@@ -19,7 +18,6 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     "notch_filter": NOTCH_PARAMETERS,
     "nominal_trajectory": (*NOMINAL_PARAMETERS, *DESIGN_PARAMETERS),
     "tube_mpc": (
-        *INTEGRAL_PARAMETERS,
         *TUBE_PARAMETERS,
         *CERTIFICATE_PARAMETERS,
         *(p for p in DESIGN_PARAMETERS if p.name not in {own.name for own in TUBE_PARAMETERS}),

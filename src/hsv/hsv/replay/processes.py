@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from hsv.control.control_law import tube_law
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.robust_mpc import RobustMpc
+from hsv.control.tube_law import TubeLaw
 from hsv.faults.actuator import FaultInjector
 from hsv.graph import exchange
 from hsv.graph.description import (
@@ -122,7 +122,7 @@ PROCESSES = {
         ),
         Process(
             TUBE_MPC,
-            tube_law,
+            TubeLaw.from_parameters,
             partial(_control, True),
             1e-10,
             "the level in the set is a quadratic form whose terms of both signs nearly cancel",

@@ -10,15 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from hsv.control.control_law import ControlLaw
+from hsv.control.controller import Controller, ControllerInput
 from hsv.control.nominal_law import FamilyLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.tube_law import TubeLaw, active_gain, tube_input
+from hsv.control.robust_mpc import RobustMpc
+from hsv.control.tube_law import TubeLaw, memory_of, tube_step
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.metrics import FlightData
+from hsv.vehicle.dynamics import PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.plant import FlightStatus, Plant
@@ -31,7 +33,7 @@ class Components:
     plant: Plant
     notch_filter: NotchFilter
     nominal_trajectory: NominalTrajectory
-    tube_law: ControlLaw
+    controller: Controller
     fault_injector: FaultInjector
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
@@ -79,15 +81,15 @@ def _fly(
     faults: Any,
     reference: Any,
     x: np.ndarray,
+    memory: np.ndarray,
     work: np.ndarray,
     history: Any,
 ) -> int:
     """Fly as many steps as ``history`` has rows, from ``x``; return the number of rows written (fewer: diverged)."""
     n, m = len(x), 2
     filter_state = np.zeros(2 * len(notch.D))
-    rest(notch, x[4], filter_state)
-    planned_state = filter_state.copy()
-    filtered = tube.filtered and 0 < len(notch.D) == len(tube.notch.D)
+    rest(notch, x[PITCH_RATE], filter_state)
+    s = filter_state.copy()
     last = len(reference.state) - 1
     S, x_n, new = np.empty(n * (n + m)), np.empty(n), np.empty(n)
     for i in range(n):
@@ -95,7 +97,6 @@ def _fly(
     u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     # Copies, made when another row holds: views of rows in every step take a twentieth of the loop's time.
     x_r, u_r, defect, row = np.empty(n), np.empty(m), np.empty(n), -1
-    gain, active = tube.gains[0].copy(), 0
     rows = len(history.filtered_pitch_rate)
     for k in range(rows):
         if k > 0:
@@ -110,13 +111,9 @@ def _fly(
                 defect[i] = reference.defect[row, i]
             for i in range(m):
                 u_r[i] = reference.input[row, i]
-        due = active_gain(tube, k)
-        if due != active:
-            active = due
-            for i in range(m):
-                for j in range(n):
-                    gain[i, j] = tube.gains[active, i, j]
-        q_f = filter_step(notch, filter_state, x[4])
+        for i in range(len(s)):
+            s[i] = filter_state[i]
+        q_f = filter_step(notch, filter_state, x[PITCH_RATE])
         history.filtered_pitch_rate[k] = q_f
         for i in range(n):
             history.deviation[k, i] = x_n[i]
@@ -124,11 +121,7 @@ def _fly(
         history.gain_index[k] = index
         for i in range(m):
             history.nominal_input[k, i] = u_n[i]
-        if filtered:
-            pitch_rate_error = q_f - filter_step(tube.notch, planned_state, x_r[4] + x_n[4])
-        else:
-            pitch_rate_error = q_f - x_n[4] - x_r[4]
-        tube_input(tube, gain, x, pitch_rate_error, x_r, x_n, u_n, u_r, u_feedback, total, u)
+        tube_step(tube, memory, k, False, x, q_f, s, x_r, u_r, x_n, u_n, u_feedback, total, u)
         for i in range(m):
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
@@ -201,8 +194,8 @@ def fly(components: Components) -> Flight:
 
     The nested family under the tube law flies compiled, whatever else step by step; both give the same bits.
     """
-    law = components.tube_law
-    if isinstance(law, TubeLaw) and isinstance(components.nominal_trajectory.law, FamilyLaw):
+    law = components.controller
+    if isinstance(law, TubeLaw | RobustMpc) and isinstance(components.nominal_trajectory.law, FamilyLaw):
         return _flight(components, _fly_compiled(components, law))
     return fly_stepwise(components)
 
@@ -210,7 +203,7 @@ def fly(components: Components) -> Flight:
 def fly_stepwise(components: Components) -> Flight:
     """Fly as :func:`fly` does, through the ``step()`` of every component, as the nodes of the graph do."""
     plant, notch, nominal = components.plant, components.notch_filter, components.nominal_trajectory
-    law, injector = components.tube_law, components.fault_injector
+    law, injector = components.controller, components.fault_injector
     for component in (notch, nominal, law, injector):
         component.reset()
     history = History.empty(plant.steps + 1)
@@ -218,16 +211,19 @@ def fly_stepwise(components: Components) -> Flight:
     for k in range(plant.steps + 1):
         if k > 0:
             current = plant.step(history.actuator[k - 1])
-        filtered = notch.step(float(current.state[4]))
+        filtered = notch.step(float(current.state[PITCH_RATE]))
         planned = nominal.step(current.state)
         applied = law.step(
-            current.state,
-            filtered.filtered_pitch_rate,
-            filtered.filter_state,
-            planned.reference,
-            planned.reference_input,
-            planned.deviation,
-            planned.input,
+            ControllerInput(
+                k,
+                current.state,
+                filtered.filtered_pitch_rate,
+                filtered.filter_state,
+                planned.reference,
+                planned.reference_input,
+                planned.deviation,
+                planned.input,
+            )
         )
         history.state[k] = current.state
         history.filtered_pitch_rate[k] = filtered.filtered_pitch_rate
@@ -243,7 +239,7 @@ def fly_stepwise(components: Components) -> Flight:
     return _flight(components, history)
 
 
-def _fly_compiled(components: Components, law: TubeLaw) -> History:
+def _fly_compiled(components: Components, law: TubeLaw | RobustMpc) -> History:
     plant, nominal = components.plant, components.nominal_trajectory
     history = History.empty(plant.steps + 1)
     rows = _fly(
@@ -256,6 +252,7 @@ def _fly_compiled(components: Components, law: TubeLaw) -> History:
         components.fault_injector.schedule,
         nominal.reference.data,
         plant.initial.state.copy(),
+        memory_of(law.data),
         workspace(),
         history,
     )

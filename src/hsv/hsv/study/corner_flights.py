@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from hsv.campaign.tube_levels import TubeLevels
-from hsv.control.design_file import ControlDesign
 from hsv.design.region import Corner
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
@@ -29,26 +28,6 @@ Progress = Callable[[str, int, int], None]
 
 Table = dict[str, np.ndarray]
 """Columns (flights) by measure, the nominal vehicle first; what a flight does not define is not a number."""
-
-
-def compiled(values: dict[str, Any]) -> dict[str, Any]:
-    """Return parameters of the same flight that the compiled loop takes.
-
-    Robust MPC, u = K (x - x_r) + u_r, is the tube law with F = K about a nominal trajectory under u_n = K x_n: the
-    nominal state drops out. It holds in exact arithmetic; the flights agree to rounding.
-    """
-    if values["controller"] != "robust_mpc":
-        return values
-    design = ControlDesign.from_parameters(values)
-    gain = design.nominal_gains[values["robust_mpc.gain_index"]].ravel().tolist()
-    kept = {name: value for name, value in values.items() if not name.startswith("tube.")}
-    return {
-        **kept,
-        "controller": "tube_mpc",
-        "feedback.gain": gain,
-        "nominal.gains": gain,
-        "nominal.ellipsoids": design.nominal_ellipsoids[0].ravel().tolist(),
-    }
 
 
 def fly_over(
@@ -67,7 +46,7 @@ def fly_over(
         progress: Called with the number of flights done.
         coupling_scale: Times the derived inertial coupling, in place of a named set.
     """
-    levels, parts = TubeLevels(values), assemble(compiled(values))
+    levels, parts = TubeLevels(values), assemble(values)
     if coupling_scale is not None:
         p = parts.plant
         vehicle = p.vehicle.with_coupling_scale(coupling_scale)
