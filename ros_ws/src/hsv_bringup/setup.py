@@ -20,7 +20,7 @@ setup(
             "recorder = hsv_bringup.recorder:main",
             "player = hsv_bringup.player:main",
             "set_parameter = hsv_bringup.set_parameter:main",
-            "stand_in = hsv_bringup.stand_in:main",
+            "peer_emulator = hsv_bringup.peer_emulator:main",
         ],
     },
 )

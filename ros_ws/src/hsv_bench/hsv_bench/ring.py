@@ -17,45 +17,45 @@ from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
 from hsv.graph import description
-from hsv_bench.member import Member, Recorder
+from hsv_bench.ring_node import Recorder, RingNode
 
 LOOPS = ("events", "wait_set", "ordered")
 
 
-def spin_events(members: Sequence[Member]) -> None:
+def spin_events(nodes: Sequence[RingNode]) -> None:
     """Let the EventsExecutor of rclpy call."""
     executor = EventsExecutor()
-    for member in members:
-        executor.add_node(member.node)
-    while not all(member.finished for member in members):
+    for node in nodes:
+        executor.add_node(node.ros)
+    while not all(node.finished for node in nodes):
         executor.spin_once(timeout_sec=0.25)
 
 
-def spin_wait_set(members: Sequence[Member]) -> None:
+def spin_wait_set(nodes: Sequence[RingNode]) -> None:
     """Wait on a wait set and take, without any executor: the least that rclpy can do between processes."""
-    inputs = [(member, subscription) for member in members for subscription in member.inputs]
+    inputs = [(node, subscription) for node in nodes for subscription in node.inputs]
     handle = rclpy.get_default_context().handle
     assert handle is not None
     with handle:
         wait_set = rclpy_implementation.WaitSet(len(inputs), 0, 0, 0, 0, 0, handle)
-        while not all(member.finished for member in members):
+        while not all(node.finished for node in nodes):
             wait_set.clear_entities()
             indices = [wait_set.add_subscription(subscription.handle) for _, subscription in inputs]
             wait_set.wait(250_000_000)
-            for index, (member, subscription) in zip(indices, inputs, strict=True):
+            for index, (node, subscription) in zip(indices, inputs, strict=True):
                 if wait_set.is_ready("subscription", index):
-                    _take(member, subscription)
+                    _take(node, subscription)
 
 
-def spin_ordered(members: Sequence[Member]) -> None:
+def spin_ordered(nodes: Sequence[RingNode]) -> None:
     """Take in the order of the data flow: the least that rclpy can do within one process."""
-    while not all(member.finished for member in members):
-        for member in members:
-            for subscription in member.inputs:
-                _take(member, subscription)
+    while not all(node.finished for node in nodes):
+        for node in nodes:
+            for subscription in node.inputs:
+                _take(node, subscription)
 
 
-def _take(member: Member, subscription: object) -> None:
+def _take(node: RingNode, subscription: object) -> None:
     taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)  # type: ignore[attr-defined]
     if taken is not None:
         subscription.callback(taken[0])  # type: ignore[attr-defined]
@@ -74,22 +74,22 @@ def main(args: Sequence[str] | None = None) -> int:
     roles = [*names[1:], names[0]] if arguments.role == "all" else [arguments.role]
     rclpy.init(args=[])
     try:
-        members = [
-            Recorder(arguments.laps, arguments.bag) if role == names[0] else Member(role, arguments.laps)
+        nodes = [
+            Recorder(arguments.laps, arguments.bag) if role == names[0] else RingNode(role, arguments.laps)
             for role in roles
         ]
-        while not all(member.matched() for member in members):
+        while not all(node.matched() for node in nodes):
             time.sleep(0.02)
         print("ready", flush=True)
         sys.stdin.readline()
         started = time.perf_counter()
-        for member in members:
-            if member.node.get_name() == description.PLANT.name:
-                member.publish()
-        {"events": spin_events, "wait_set": spin_wait_set, "ordered": spin_ordered}[arguments.loop](members)
+        for node in nodes:
+            if node.ros.get_name() == description.PLANT.name:
+                node.publish()
+        {"events": spin_events, "wait_set": spin_wait_set, "ordered": spin_ordered}[arguments.loop](nodes)
         print(time.perf_counter() - started, flush=True)
-        for member in members:
-            member.close()
+        for node in nodes:
+            node.close()
         sys.stdin.readline()
     finally:
         rclpy.try_shutdown()

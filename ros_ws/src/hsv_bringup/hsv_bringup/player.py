@@ -45,7 +45,7 @@ class PlayerNode(ProcessNode):
         super().__init__("player")
         self._rate = rate
         self._paused = paused
-        self._talkers = {
+        self._outputs = {
             topic: self.create_publisher(_message_class(bag, topic), topic, _profile(bag.qos(topic)))
             for topic in topics
         }
@@ -67,7 +67,7 @@ class PlayerNode(ProcessNode):
         if self._next >= len(self._instants):
             self._end()
 
-    def patience(self) -> float:
+    def wait_timeout(self) -> float:
         """Wake in time for the next message."""
         return 0.25 if self._paused else min(max(self._delay(), 0.0), 0.25)
 
@@ -84,7 +84,7 @@ class PlayerNode(ProcessNode):
 
     def _end(self) -> None:
         """End once all listeners have everything; one that is gone or hangs is given up by DDS itself, in time."""
-        slow = [t for t, p in self._talkers.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
+        slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
         elif time.monotonic() > self._says:
@@ -93,7 +93,7 @@ class PlayerNode(ProcessNode):
 
     def _publish(self) -> None:
         for topic, data in self._instants[self._next][1]:
-            self._talkers[topic].publish(data)
+            self._outputs[topic].publish(data)
         self._next += 1
 
     def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -59,7 +59,7 @@ class RecorderNode(PeerNode):
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
             self.bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), qos))
         for topic in TOPICS:
-            self.listen(topic, partial(self._on_step_message, topic), raw=True)
+            self.create_step_subscription(topic, partial(self._on_step_message, topic), raw=True)
         for topic, kind in OTHER_TOPICS.items():
             profile = LATCHED if topic.startswith("/hsv/") else STEP
             callback: Callable[[bytes], None] = partial(self._on_other_message, topic)

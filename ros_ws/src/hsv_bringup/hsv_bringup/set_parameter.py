@@ -20,7 +20,7 @@ from rclpy.utilities import remove_ros_args
 from hsv.graph.description import COMPOSED
 from hsv.graph.progress import Standstill, processor_time_of
 
-PATIENCE = 30.0
+WAIT_TIMEOUT = 30.0
 """Seconds to wait for a node that is not there while no process of its name does anything, nor other nodes come."""
 
 _LOOK = 1.0
@@ -45,8 +45,8 @@ def set_parameter(node_name: str, name: str, value: object) -> SetParametersResu
             if time.monotonic() - begun < looks * _LOOK:
                 continue
             looks += 1
-            if standstill.look(_moves(node, node_name)) > PATIENCE:
-                return SetParametersResult(successful=False, reason=f"no node {node_name!r} in {PATIENCE:g} s")
+            if standstill.look(_moves(node, node_name)) > WAIT_TIMEOUT:
+                return SetParametersResult(successful=False, reason=f"no node {node_name!r} in {WAIT_TIMEOUT:g} s")
             if looks % 5 == 0:
                 print(f"waiting for {node_name}", file=sys.stderr, flush=True)
         return answer.result().results[0]

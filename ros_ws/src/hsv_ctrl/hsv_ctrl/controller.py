@@ -24,10 +24,10 @@ class ControllerNode(PeerNode):
         self._nominal: NominalState | None = None
         self._outside = False
         self._command_message, self._status_message = ControlInput(), TubeStatus()
-        self._command = self.talk("/hsv/command")
-        self._status = self.talk("/hsv/tube_status")
-        self.listen("/hsv/filtered_state", self._on_state)
-        self.listen("/hsv/nominal", self._on_nominal)
+        self._command = self.create_step_publisher("/hsv/command")
+        self._status = self.create_step_publisher("/hsv/tube_status")
+        self.create_step_subscription("/hsv/filtered_state", self._on_state)
+        self.create_step_subscription("/hsv/nominal", self._on_nominal)
 
     def start_run(self, run: Run) -> None:
         """Forget the last messages of the run before."""

@@ -23,8 +23,8 @@ class NominalTrajectoryNode(PeerNode):
         self.trajectory = NominalTrajectory.from_parameters(*declare_design(self, NOMINAL_PARAMETERS))
         self._times, self._failed = StepTimes(), False
         self._message = NominalState()
-        self._nominal = self.talk("/hsv/nominal")
-        self.listen("/hsv/state", self._on_state)
+        self._nominal = self.create_step_publisher("/hsv/nominal")
+        self.create_step_subscription("/hsv/state", self._on_state)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""

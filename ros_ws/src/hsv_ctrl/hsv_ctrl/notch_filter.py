@@ -20,8 +20,8 @@ class NotchFilterNode(PeerNode):
         super().__init__("notch_filter")
         self.filter = NotchFilter.from_parameters(declare(self, NOTCH_PARAMETERS))
         self._message = FilteredState()
-        self._filtered = self.talk("/hsv/filtered_state")
-        self.listen("/hsv/state", self._on_state)
+        self._filtered = self.create_step_publisher("/hsv/filtered_state")
+        self.create_step_subscription("/hsv/state", self._on_state)
 
     def start_run(self, run: Run) -> None:
         """Start from rest."""

@@ -38,14 +38,14 @@ class LockstepNode(ProcessNode):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
         self._diagnosed_second = -1
         self._made = time.monotonic()
-        self._patience_ends = self._made + SAY_AFTER
+        self._says_next = self._made + SAY_AFTER
 
-    def listen(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
+    def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe a step topic of the graph description."""
         kind = message_class(description.TOPICS[topic])
         self._inputs[topic] = self.create_subscription(kind, topic, callback, STEP, raw=raw)
 
-    def talk(self, topic: str) -> Any:
+    def create_step_publisher(self, topic: str) -> Any:
         """Return the publisher of a step topic of the graph description."""
         self._outputs[topic] = self.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
         return self._outputs[topic]
@@ -70,8 +70,8 @@ class LockstepNode(ProcessNode):
     def say_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
         """Log now and then for whom this node waits; in the end as a warning if its waiting ``decides`` the start."""
         now = time.monotonic()
-        if missing and now > self._patience_ends:
-            self._patience_ends = now + SAY_AFTER
+        if missing and now > self._says_next:
+            self._says_next = now + SAY_AFTER
             words = "waiting for " + ", ".join(missing)
             if decides and now - self._made > WARN_AFTER:
                 self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
@@ -119,7 +119,7 @@ class PeerNode(LockstepNode):
         else:
             self.say_waiting(missing or ["plant (/hsv/run)"])
 
-    def patience(self) -> float:
+    def wait_timeout(self) -> float:
         """Look at the links more often until they stand."""
         return 0.25 if self._announced else LINK_LOOK
 

@@ -58,7 +58,7 @@ def run_nodes(
                 code = max(codes)
                 break
             # The executor runs nothing while it waits without a limit.
-            executor.spin_once(timeout_sec=min([node.patience() for node in nodes]))
+            executor.spin_once(timeout_sec=min([node.wait_timeout() for node in nodes]))
         else:
             code = max([node.stopped(stop[0]) if node.exit_code is None else node.exit_code for node in nodes])
     except (HsvError, ParameterException, rclpy_implementation.RCLError) as error:

@@ -27,6 +27,6 @@ class ProcessNode(Node):
     def close(self) -> None:
         """Called once before the process ends; overridden where something must be saved."""
 
-    def patience(self) -> float:
+    def wait_timeout(self) -> float:
         """Return how long (s) to wait for a message before :meth:`poll` is due."""
         return 0.25

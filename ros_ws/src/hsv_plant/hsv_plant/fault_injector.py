@@ -23,9 +23,9 @@ class FaultInjectorNode(PeerNode):
         super().__init__("fault_injector")
         self.injector = FaultInjector.from_parameters(declare(self, FAULT_PARAMETERS))
         self._actuator_message, self._status_message = ControlInput(), FaultStatus()
-        self._actuator = self.talk("/hsv/actuator")
-        self._status = self.talk("/hsv/fault_status")
-        self.listen("/hsv/command", self._on_command)
+        self._actuator = self.create_step_publisher("/hsv/actuator")
+        self._status = self.create_step_publisher("/hsv/fault_status")
+        self.create_step_subscription("/hsv/command", self._on_command)
         self.create_service(InjectFault, "/hsv/inject_fault", self._inject)
         self.create_service(ClearFault, "/hsv/clear_fault", self._clear)
 

@@ -36,10 +36,10 @@ class PlantNode(LockstepNode):
         self._ready: set[str] = set()
         self._state_message, self._forces_message = VehicleState(), VehicleForces()
         self._clock_message = Clock()
-        self._state_publisher = self.talk("/hsv/state")
-        self._clock_publisher = self.talk("/clock")
-        self._forces_publisher = self.talk("/hsv/forces")
-        self.listen("/hsv/actuator", self._on_actuator)
+        self._state_publisher = self.create_step_publisher("/hsv/state")
+        self._clock_publisher = self.create_step_publisher("/clock")
+        self._forces_publisher = self.create_step_publisher("/hsv/forces")
+        self.create_step_subscription("/hsv/actuator", self._on_actuator)
         self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
         self.create_subscription(RecorderProgress, "/hsv/recorder_progress", self._on_progress, STEP)
         self._run = Run(run_id=uuid.uuid4().hex, period=self.plant.period, last_step=self.plant.steps)
@@ -118,7 +118,7 @@ class PlantNode(LockstepNode):
             if waited > self.values["step_timeout"] + max(self._delay(), 0.0):
                 self._give_up(waited)
 
-    def patience(self) -> float:
+    def wait_timeout(self) -> float:
         """Wake in time for the next state when paced."""
         if not self._started:
             return LINK_LOOK

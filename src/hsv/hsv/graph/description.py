@@ -63,7 +63,7 @@ COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
 
-STAND_IN = NodeDescription("stand_in", "hsv_bringup", "stand_in", (), ())
+PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator", (), ())
 """Not of the graph: takes the place of all others when one node is replayed."""
 
 PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())

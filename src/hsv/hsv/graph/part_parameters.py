@@ -28,10 +28,10 @@ RECORDER_PARAMETERS = (
     Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
 )
 
-STAND_IN_PARAMETERS = (
-    Parameter("stand_in.bag", "", "bag to feed the node from"),
-    Parameter("stand_in.node", "", "node under test"),
-    Parameter("stand_in.directory", "", "bag to write with its answers, a new directory"),
-    Parameter("stand_in.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
+PEER_EMULATOR_PARAMETERS = (
+    Parameter("peer_emulator.bag", "", "bag to feed the node from"),
+    Parameter("peer_emulator.node", "", "node under test"),
+    Parameter("peer_emulator.directory", "", "bag to write with its answers, a new directory"),
+    Parameter("peer_emulator.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
 )
-"""Of the stand-in for all other nodes, in a replay over DDS."""
+"""Of the emulator of all other nodes, in a replay over DDS."""

@@ -1,4 +1,4 @@
-"""Replay with the real node processes: one by one against a stand-in for all others, or the whole graph again."""
+"""Replay with the real node processes: one by one against an emulator of all others, or the whole graph."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hsv.errors import RecordingError
-from hsv.graph.description import PLANT, STAND_IN, TOPICS, NodeDescription, graph
+from hsv.graph.description import PEER_EMULATOR, PLANT, TOPICS, NodeDescription, graph
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.reader import Bag
@@ -20,7 +20,7 @@ RUN = "/hsv/run"
 def replay_all(
     bag: Bag, names: Sequence[str], controller: str, values: Mapping[str, Any], progress: Progress
 ) -> Iterator[ProcessComparison]:
-    """Run each of the nodes ``names`` alone, fed from ``bag`` by a stand-in, and compare what it publishes.
+    """Run each of the nodes ``names`` alone, fed from ``bag`` by a peer emulator, and compare its answers.
 
     Raises:
         RecordingError: A topic that is needed is missing; no process has been started.
@@ -36,12 +36,12 @@ def replay_all(
             answers = Path(folder, "answers")
             run = {
                 "recorder": False,
-                "stand_in.bag": str(bag.path.absolute()),
-                "stand_in.node": name,
-                "stand_in.directory": str(answers),
+                "peer_emulator.bag": str(bag.path.absolute()),
+                "peer_emulator.node": name,
+                "peer_emulator.directory": str(answers),
             }
             steps = len(bag.messages("/hsv/state"))
-            _run((process.node, STAND_IN), {**values, **run}, Path(folder), name, steps, progress)
+            _run((process.node, PEER_EMULATOR), {**values, **run}, Path(folder), name, steps, progress)
             made = Bag(answers)
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
@@ -72,7 +72,7 @@ def _run(
     steps: int,
     progress: Progress,
 ) -> None:
-    """Run ``nodes`` until the last of them has ended: the stand-in or, where there is none, the plant."""
+    """Run ``nodes`` until the last of them has ended: the emulator or, where there is none, the plant."""
     file = folder / "parameters.yaml"
     file.write_text(parameter_yaml(values), encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""Stands in for all peers of one node: feeds it from a bag, step by step, and writes down what it answers."""
+"""Emulates all peers of one node: feeds it from a bag, step by step, and writes down what it answers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hsv_msgs.msg import Ready, Run
 from rclpy.node import Node
 
 from hsv.graph import description
-from hsv.graph.part_parameters import STAND_IN_PARAMETERS
+from hsv.graph.part_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.reader import Bag
@@ -28,22 +28,22 @@ from hsv_node.qos import LATCHED, STEP
 _STAMP = struct.Struct("<iI")
 
 
-class StandInNode(LockstepNode):
-    """Plays the peers of ``stand_in.node``, each under its own name, with what ``stand_in.bag`` holds of them."""
+class PeerEmulatorNode(LockstepNode):
+    """Plays the peers of ``peer_emulator.node``, each under its own name, with what a bag holds of them."""
 
     def __init__(self) -> None:
-        super().__init__("stand_in")
-        values = declare(self, STAND_IN_PARAMETERS)
-        bag = Bag(values["stand_in.bag"])
-        self._under_test = values["stand_in.node"]
-        self._limit = values["stand_in.timeout"]
+        super().__init__("peer_emulator")
+        values = declare(self, PEER_EMULATOR_PARAMETERS)
+        bag = Bag(values["peer_emulator.bag"])
+        self._under_test = values["peer_emulator.node"]
+        self._limit = values["peer_emulator.timeout"]
         me = next(n for n in description.graph(self.controller) if n.name == self._under_test)
         self._is_plant = me is description.PLANT
         self._steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, me.subscribes)
         self._recorded = {topic: [data for _, data in bag.messages(topic)] for topic in me.subscribes}
         self._answered = dict.fromkeys(me.publishes, 0)
         self._fed = 0
-        self._output = BagWriter(Path(values["stand_in.directory"]))
+        self._output = BagWriter(Path(values["peer_emulator.directory"]))
         self._peers: dict[str, Node] = {}
         # The node under test looks for its peers by name on every link: each has to be there under its own.
         self._feeds = {}
@@ -142,9 +142,9 @@ class StandInNode(LockstepNode):
 
 
 def _ignore(_: bytes) -> None:
-    """The link is there for its name; the answers are read once, by the stand-in itself."""
+    """The link is there for its name; the answers are read once, by the emulator itself."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the stand-in node."""
-    return run_node(StandInNode, "stand_in", args)
+    """Run the peer emulator node."""
+    return run_node(PeerEmulatorNode, "peer_emulator", args)

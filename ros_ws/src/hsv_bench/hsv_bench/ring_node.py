@@ -25,12 +25,12 @@ _FILLED = {
 """Arrays with as many elements as in a flight of Case 1."""
 
 
-class Member:
+class RingNode:
     """A process of the graph description without its work."""
 
     def __init__(self, role: str, laps: int) -> None:
         """Create publishers and subscriptions of ``role``, for so many laps."""
-        self.node = Node(role)
+        self.ros = Node(role)
         self.finished = False
         self.lap = 0
         self._laps = laps
@@ -39,7 +39,7 @@ class Member:
         self._outputs = [(topic, self._publisher(topic), self._message(topic)) for topic in self._role.publishes]
         raw = self._role is description.RECORDER
         self.inputs = [
-            self.node.create_subscription(self._kind(topic), topic, self._callback(topic), STEP, raw=raw)
+            self.ros.create_subscription(self._kind(topic), topic, self._callback(topic), STEP, raw=raw)
             for topic in self._role.subscribes
         ]
 
@@ -75,7 +75,7 @@ class Member:
         return self.receive
 
     def _publisher(self, topic: str) -> Any:
-        return self.node.create_publisher(self._kind(topic), topic, STEP)
+        return self.ros.create_publisher(self._kind(topic), topic, STEP)
 
     @staticmethod
     def _kind(topic: str) -> Any:
@@ -85,7 +85,7 @@ class Member:
         return self._kind(topic)(**_FILLED.get(topic, {}))
 
 
-class Recorder(Member):
+class Recorder(RingNode):
     """Writes all messages to a bag, as they come."""
 
     def __init__(self, laps: int, bag: Path) -> None:
