@@ -35,7 +35,6 @@ ON_THE_PATH = (
     "vehicle/trim.py",
     "lpv/polytope.py",
     "control/adjustable.py",
-    "control/control_law.py",
     "control/controller.py",
     "control/controllers.py",
     "control/nominal_law.py",
@@ -50,6 +49,7 @@ ON_THE_PATH = (
     "simulation/closed_loop.py",
     "simulation/commands.py",
     "simulation/fields.py",
+    "simulation/foreign.py",
     "simulation/scenario.py",
 )
 """Files that decide a flight, from the scenario's text to the last step."""
@@ -61,6 +61,7 @@ EXACT_NUMPY = {
     *("ndarray", "float64", "int64", "complex128", "uint64", "bool_", "intp", "inf", "nan", "finfo", "pi", "newaxis"),
     *("array", "asarray", "ascontiguousarray", "empty", "empty_like", "zeros", "zeros_like", "ones", "ones_like"),
     *("full", "eye", "arange", "broadcast_to", "stack", "concatenate", "column_stack", "reshape", "ravel", "copy"),
+    "split",
     *("abs", "sqrt", "clip", "minimum", "maximum", "max", "min", "argmax", "argmin", "ptp", "round", "diff", "outer"),
     *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
 }

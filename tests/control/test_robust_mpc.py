@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.control.control_law import control_law
 from hsv.control.controller import ControllerInput
+from hsv.control.controllers import build_controller
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeStatusCode
@@ -41,10 +41,10 @@ def test_input_that_is_not_a_number_is_told():
 
 
 def test_parameters_choose_controller_and_gain():
-    law = control_law({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": -1})
+    law = build_controller({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": -1})
     assert isinstance(law, RobustMpc)
-    assert np.array_equal(law.data.gains[0], DESIGN.nominal_gains[-1])
+    assert np.array_equal(law.kernel.gains[0], DESIGN.nominal_gains[-1])
     with pytest.raises(ParameterError, match=r"robust_mpc.gain_index = 9: expected -7 to 6"):
-        control_law({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": 9})
+        build_controller({**VALUES, "controller": "robust_mpc", "robust_mpc.gain_index": 9})
     with pytest.raises(ParameterError, match=r"controller = 'lucky'"):
-        control_law({**VALUES, "controller": "lucky"})
+        build_controller({**VALUES, "controller": "lucky"})

@@ -4,6 +4,7 @@ import subprocess
 import sys
 import tempfile
 
+from flights import step_by_step
 from numba.core.registry import CPUDispatcher
 
 
@@ -23,12 +24,12 @@ def undefined_symbols(dispatcher: CPUDispatcher) -> set[str]:
 def main() -> None:
     """Fly once compiled and once step by step, then print "function: symbol" for every function of ours compiled."""
     from hsv.simulation.assembly import assemble_flight
-    from hsv.simulation.closed_loop import fly, fly_stepwise
+    from hsv.simulation.closed_loop import fly
     from hsv.simulation.scenario import load_scenario
 
     scenario = load_scenario("case2").model_copy(update={"duration": 120.0})
     fly(assemble_flight(scenario))
-    fly_stepwise(assemble_flight(scenario.model_copy(update={"duration": 0.1})))
+    step_by_step(assemble_flight(scenario.model_copy(update={"duration": 0.1})))
     modules = [module for name, module in sys.modules.items() if name.startswith("hsv.")]
     dispatchers = {
         id(value): value for module in modules for value in vars(module).values() if isinstance(value, CPUDispatcher)

@@ -47,6 +47,7 @@ def step_by_step(parts: Components) -> dict[str, np.ndarray]:
                 "filtered_pitch_rate": filtered.filtered_pitch_rate,
                 "deviation": nominal.deviation,
                 "nominal_input": nominal.input,
+                "gain_index": nominal.gain_index,
                 "u_unsaturated": tube.u_unsaturated,
                 "command": tube.input,
                 "actuator": fault.actuator,

@@ -79,14 +79,14 @@ class CFlight:
             RunError: No C compiler, a failed build, or components that the C build does not know.
         """
         law, nominal = components.controller, components.nominal_trajectory
-        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)) or law.data.integral_rate > 0.0:
+        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)) or law.kernel.integral_rate > 0.0:
             raise RunError("C build: it flies the tube law over the nested family, expected a scenario with these")
         self._folder = tempfile.TemporaryDirectory(prefix="hsv_bench_")
         self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), flags)))
         self._library.fly.restype = c_int64
         self._kept: list[np.ndarray] = []
         plant, notch, data = components.plant, components.notch_filter.data, nominal.data
-        S, tube = data.polytope, law.data
+        S, tube = data.polytope, law.kernel
         faults, reference = components.fault_injector.schedule, nominal.reference.data
         self._initial = plant.initial.state
         self._rows = plant.steps + 1

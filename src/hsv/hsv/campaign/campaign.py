@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from hsv.campaign.factors import Factor, check_names, factors_of
-from hsv.control.design_file import find_design, read_design_parameters
 from hsv.errors import CampaignError
-from hsv.simulation.assembly import blamed_on
+from hsv.simulation.assembly import blamed_on, design_parameters, scenario_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
@@ -49,7 +48,7 @@ class Campaign:
     @property
     def parameters(self) -> dict[str, Any]:
         """Flat parameters of the scenario's own flight."""
-        return {**self.design, **self.scenario.parameters()}
+        return {**self.design, **scenario_parameters(self.scenario)}
 
     @property
     def batch(self) -> int:
@@ -146,5 +145,5 @@ def plan(
     if not 0 <= seed < 2**63:
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
     with blamed_on(scenario):
-        design = read_design_parameters(find_design(scenario.design))
+        design = design_parameters(scenario)
     return Campaign(scenario.name, text, design, method, samples, seed, factors, commit)

@@ -12,7 +12,7 @@ from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.faults.actuator import FaultInjector
-from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Flight, fly
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.vehicle.envelope import in_model_range
@@ -44,7 +44,8 @@ class Pilot:
     def fly(self, sample: Sequence[float]) -> Flight:
         """Fly a sample (one value a factor, SI)."""
         parts = self._parts
-        values = {**self.campaign.design, **flown_scenario(self.scenario, self.campaign.factors, sample).parameters()}
+        flown = flown_scenario(self.scenario, self.campaign.factors, sample)
+        values = {**self.campaign.design, **scenario_parameters(flown)}
         trajectory = parts.nominal_trajectory
         if any(values[name] != self._nominal[name] for name in self._nominal if name.startswith("reference.")):
             trajectory = NominalTrajectory.from_parameters(values)

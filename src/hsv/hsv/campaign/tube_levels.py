@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import ControlDesign
+from hsv.control.design_file import design_of
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, flown_sections, rest
 from hsv.parameters import check_all
@@ -48,8 +48,11 @@ class TubeLevels:
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         """Read design, controller and filter from flat flight parameters."""
-        design = ControlDesign.from_parameters(values)
+        design = design_of(values)
         controller = check_all(CONTROLLER_PARAMETERS, values)["controller"]
+        self._tube = None
+        if design is None:
+            return
         in_loop = check_all(NOTCH_PARAMETERS, values)["notch.enabled"] and flown_sections(values) == design.notch
         self._tube = design.tube if controller == "tube_mpc" and in_loop else None
         self._notch = discretise(design.notch, design.period)

@@ -27,8 +27,8 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import report_flight
-    from hsv.control.design_file import digest, find_design, read_design_parameters
-    from hsv.simulation.assembly import assemble_flight, blamed_on
+    from hsv.control.design_file import digest
+    from hsv.simulation.assembly import assemble_flight, blamed_on, design_parameters
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import load_scenario
@@ -38,7 +38,7 @@ def simulate(
         check_target(out, "out")
     loaded = load_scenario(scenario)
     with blamed_on(loaded):
-        design = read_design_parameters(find_design(loaded.design))
+        design = design_parameters(loaded)
     components = assemble_flight(loaded, design)
     started = time.perf_counter()
     flight = fly(components)

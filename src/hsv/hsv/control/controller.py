@@ -1,11 +1,43 @@
-"""What a controller is: what it is given in a step and what it answers."""
+"""What a controller is: what it is given in a step and what it answers.
+
+A controller of one's own is a class with four names, here the whole of one that flies::
+
+    class Open:
+        PARAMETERS = (Parameter("open.trim_share", 1.0, "times the input of the trim", "", 0.0, 2.0),)
+
+        @classmethod
+        def from_parameters(cls, values, design):
+            controller = cls()
+            controller.share = check_all(cls.PARAMETERS, values)["open.trim_share"]
+            return controller
+
+        def reset(self):
+            pass
+
+        def step(self, inputs):
+            return self.share * inputs.reference_input
+"""
 
 from __future__ import annotations
 
+import ctypes
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+
+from hsv.errors import RunError
+from hsv.parameters import Parameter
+from hsv.vehicle.dynamics import INPUT_NAMES
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+
+if TYPE_CHECKING:
+    from hsv.control.design_file import ControlDesign
+
+
+STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void_p] * 4)
+"""``int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)``."""
 
 
 class ControllerInput(NamedTuple):
@@ -31,7 +63,7 @@ class ControllerInput(NamedTuple):
 
 @dataclass(frozen=True)
 class ControllerResult:
-    """What a controller answers; a controller with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
+    """What the bench takes from a controller; one with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
 
     input: np.ndarray
     """u (2), within the limits"""
@@ -39,11 +71,106 @@ class ControllerResult:
     """(2) before the limits"""
 
 
-class Controller(Protocol):
-    """From measured, reference and nominal state to the input of a step."""
+class StepKernel(NamedTuple):
+    """A compiled step function, as of :func:`numba.cfunc`, with its arrays.
+
+    The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; what is
+    not 0 ends the flight. ``in`` holds x (9), q_f, x_r (9), u_r (2), x_n (9), u_n (2), s (2 s) one after the other,
+    ``out`` takes the wanted input (2). Everything that is kept from step to step is in ``state``.
+    """
+
+    address: int
+    state: np.ndarray
+    """At the start of a run; every flight has a copy of its own"""
+    parameters: np.ndarray
+
+
+class Controller:
+    """A controller as the loop steps it: from measured, reference and nominal state to the input of a step."""
+
+    kernel: Any = None
+    """What the compiled loop flies: a :class:`hsv.control.tube_law.TubeData`, a :class:`StepKernel`, or ``None``, and
+    :meth:`step` is called."""
 
     def reset(self) -> None:
         """Start a new run."""
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
         """Return the input of this step; called once a step, in order."""
+        raise NotImplementedError
+
+
+class ControllerClass(Protocol):
+    """The class of a controller: its parameters, and how it is built from them.
+
+    What it builds has a :meth:`Controller.reset` and a ``step`` that returns the wanted input, fuel equivalence ratio
+    and elevator deflection (rad), which the bench limits; or, in place of a ``step``, a :class:`StepKernel` ``kernel``.
+    """
+
+    PARAMETERS: ClassVar[tuple[Parameter, ...]]
+    """Of the controller alone, named ``table.parameter``; a scenario has them in that table."""
+
+    def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
+        """Return a controller from all flat parameters of a flight and its design, ``None`` where it has none."""
+
+
+class ForeignController(Controller):
+    """A controller of one's own, in Python or compiled, with its answers checked and limited."""
+
+    def __init__(self, name: str, controller: Any) -> None:
+        """Call the ``controller`` by its ``name`` in errors."""
+        self._name = name
+        self._controller = controller
+        self.kernel: StepKernel | None = getattr(controller, "kernel", None)
+        if self.kernel is not None:
+            self._function = STEP_FUNCTION(self.kernel.address)
+            self.reset()
+
+    def reset(self) -> None:
+        """Start a new run."""
+        if self.kernel is None:
+            self._controller.reset()
+        else:
+            self._state = self.kernel.state.copy()
+
+    def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
+        """Return the input of this step as the controller wants it, not limited, finite or not.
+
+        Raises:
+            RunError: The controller failed, or did not answer with two numbers.
+        """
+        try:
+            given = self._controller.step(inputs) if self.kernel is None else self._called(inputs)
+        # Foreign code may fail in any way.
+        except Exception as error:
+            words = " ".join(str(error).split())
+            raise RunError(f"{self._name}, step {inputs.step}: {type(error).__name__}: {words}") from error
+        try:
+            fuel, elevator = given
+            return float(fuel), float(elevator)
+        except (TypeError, ValueError):
+            raise self.failure(inputs.step, f"answered {' '.join(repr(given).split())[:80]}") from None
+
+    def step(self, inputs: ControllerInput) -> ControllerResult:
+        """Return the limited input of this step.
+
+        Raises:
+            RunError: The controller failed, or did not answer with two finite numbers.
+        """
+        wanted = np.array(self.wanted(inputs))
+        if not np.all(np.isfinite(wanted)):
+            raise self.failure(inputs.step, f"answered {wanted.tolist()}")
+        return ControllerResult(np.minimum(np.maximum(wanted, INPUT_MINIMUM), INPUT_MAXIMUM), wanted)
+
+    def failure(self, step: int, what: str) -> RunError:
+        """Return the error of an answer that cannot be flown."""
+        return RunError(f"{self._name}, step {step}: {what}, expected a finite number for {' and '.join(INPUT_NAMES)}")
+
+    def _called(self, inputs: ControllerInput) -> np.ndarray:
+        assert self.kernel is not None
+        k, x, q_f, s, *planned = inputs
+        flat, wanted = np.concatenate((x, [q_f], *planned, s)), np.full(len(INPUT_NAMES), np.nan)
+        arrays = (flat, wanted, self._state, self.kernel.parameters)
+        if code := self._function(k, *(array.ctypes.data for array in arrays)):
+            raise RunError(f"returned {code}")
+        return wanted

@@ -1,9 +1,116 @@
-"""The controllers that can close the loop, by name."""
+"""The controllers that can close the loop: registered by packages under a name, or named by their class.
+
+A package registers its controllers as entry points of the group ``hsv.controllers``, as this one does::
+
+    entry_points={"hsv.controllers": ["tube_mpc = hsv.control.tube_law:TubeLaw"]}
+
+A scenario then says ``controller = "tube_mpc"``; where nothing is registered, ``controller = "package.module:Class"``.
+What such a class must have is in :mod:`hsv.control.controller`.
+"""
 
 from __future__ import annotations
 
-from hsv.parameters import Parameter
+import difflib
+import importlib
+from collections.abc import Mapping
+from functools import partial
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Any
 
-CONTROLLERS = ("tube_mpc", "robust_mpc")
+from hsv.control.controller import Controller, ControllerClass, ForeignController
+from hsv.errors import HsvError, ParameterError
+from hsv.parameters import Parameter, check_all
+from hsv.units import parse_quantity
 
-CONTROLLER_PARAMETERS = (Parameter("controller", "tube_mpc", "which controller closes the loop", choices=CONTROLLERS),)
+if TYPE_CHECKING:
+    from hsv.control.design_file import ControlDesign
+
+GROUP = "hsv.controllers"
+"""The entry points of controllers."""
+
+SHIPPED_CONTROLLERS = ("tube_mpc", "robust_mpc")
+"""Those of this library; the first flies where none is named."""
+
+CONTROLLER_PARAMETERS = (
+    Parameter("controller", SHIPPED_CONTROLLERS[0], "what closes the loop: a registered name, or package.module:Class"),
+)
+
+
+def controller_names() -> list[str]:
+    """Return the names of all registered controllers."""
+    return sorted({entry.name for entry in entry_points(group=GROUP)})
+
+
+def controller_class(name: str) -> ControllerClass:
+    """Return the class of a controller, a registered one or ``package.module:Class``.
+
+    Raises:
+        ParameterError: There is none of that name, or it cannot be loaded.
+    """
+    module, colon, attribute = name.partition(":")
+    if not colon:
+        registered = [entry for entry in entry_points(group=GROUP) if entry.name == name]
+        if not registered:
+            near = difflib.get_close_matches(name, controller_names(), 1)
+            hint = f" (did you mean {near[0]!r}?)" if near else ""
+            raise ParameterError(
+                f"controller = {name!r}: expected one of {', '.join(controller_names())} or package.module:Class{hint}"
+            )
+        module, _, attribute = registered[0].value.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    # Foreign code may fail in any way while it is imported.
+    except Exception as error:
+        words = " ".join(str(error).split())
+        raise ParameterError(f"controller = {name!r}: cannot be loaded, {type(error).__name__}: {words}") from error
+    lacking = [a for a in ("PARAMETERS", "from_parameters") if not hasattr(found, a)]
+    if lacking:
+        raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a class of a controller")
+    return found
+
+
+def table_values(kind: ControllerClass, tables: Mapping[str, Mapping[str, object]]) -> dict[str, Any]:
+    """Return the flat parameters, SI, that the ``tables`` of a scenario give to a controller of this class.
+
+    Raises:
+        ParameterError, QuantityError: A table, key or value that it does not admit, named.
+    """
+    known = {parameter.name: parameter for parameter in kind.PARAMETERS}
+    values = {}
+    for table, entries in tables.items():
+        for key, text in entries.items():
+            name = f"{table}.{key}"
+            if name not in known:
+                raise ParameterError(f"{name}: unknown key, expected one of {', '.join(known) or 'no table'}")
+            parameter = known[name]
+            numeric = parameter.kind.startswith("double")
+            convert = partial(parse_quantity, unit=parameter.unit or "1", field=name) if numeric else _as_it_is
+            given = [convert(entry) for entry in text] if isinstance(text, list) else convert(text)
+            values[name] = parameter.check(given)
+    return values
+
+
+def _as_it_is(value: Any) -> Any:
+    return value
+
+
+def build_controller(values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
+    """Return the controller that the flat parameters ``values`` describe.
+
+    Args:
+        values: Of the flight; the controller takes those that it knows.
+        design: The design in ``values``, where it is known already.
+
+    Raises:
+        ParameterError, DesignError: A wrong value, named; or the controller cannot be built.
+    """
+    name = str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+    kind = controller_class(name)
+    try:
+        built = kind.from_parameters(values, design)
+    except HsvError:
+        raise
+    except Exception as error:
+        words = " ".join(str(error).split())
+        raise ParameterError(f"controller = {name!r}: cannot be built, {type(error).__name__}: {words}") from error
+    return built if isinstance(built, Controller) else ForeignController(name, built)

@@ -204,6 +204,17 @@ class ControlDesign:
         return design
 
 
+def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
+    """Return the design in the flat parameters of a flight, ``None`` where there is none.
+
+    Raises:
+        DesignError: As :meth:`ControlDesign.from_parameters`.
+    """
+    flown_with_any = {parameter.name for parameter in DESIGN_NOTCH_PARAMETERS}
+    brought = {parameter.name for parameter in DESIGN_PARAMETERS} - flown_with_any - {TAU.name}
+    return ControlDesign.from_parameters(values) if brought & values.keys() else None
+
+
 def digest(values: Mapping[str, Any]) -> str:
     """Return the SHA-256 of a design's flat parameters.
 

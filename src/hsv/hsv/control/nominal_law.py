@@ -70,7 +70,14 @@ def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
 
 @njit(cache=True)
 def nominal_input(data: Any, deviation: np.ndarray, u_n: np.ndarray) -> tuple[int, bool]:
-    """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one."""
+    """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one.
+
+    Without gains u_n is zero.
+    """
+    if len(data.gains) == 0:
+        for i in range(len(u_n)):
+            u_n[i] = 0.0
+        return 0, True
     index = 0
     inside = False
     for g in range(len(data.ellipsoids) - 1, -1, -1):
@@ -100,4 +107,5 @@ class FamilyLaw:
         u_n = np.empty(self.data.gains.shape[1])
         index, inside = nominal_input(self.data, deviation, u_n)
         status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
-        return LawResult(u_n, self.data.gains[index], index, status)
+        gain = self.data.gains[index] if len(self.data.gains) else np.empty(0)
+        return LawResult(u_n, gain, index, status)

@@ -9,11 +9,14 @@ from typing import Any, Self
 import numpy as np
 from numba import njit
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design_file import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
+from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
-from hsv.lpv.polytope import schedule
+from hsv.errors import ParameterError
+from hsv.lpv.polytope import AxisWeights, PolytopeData, schedule
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 
 LAWS = ("family", "kothare_online", "qp")
 
@@ -75,12 +78,14 @@ class NominalResult:
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
-    def __init__(self, design: ControlDesign, reference: ReferenceTrajectory, law: NominalLaw | None = None) -> None:
-        """Fly ``law``, the design's nested family where none is given."""
+    def __init__(
+        self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None
+    ) -> None:
+        """Fly ``law``, the design's nested family where none is given; without a design the reference alone."""
         self.reference = reference
-        self.data = nominal_data(design)
+        self.data = nominal_data(design) if design else NO_NOMINAL
         self.law = law or FamilyLaw(self.data)
-        n, m = design.polytope.B.shape[1:]
+        n, m = N_STATES, N_INPUTS
         self._deviation = np.zeros(n)
         self._scratch = np.empty(n * (n + m)), np.empty(n)
         self._step = 0
@@ -101,7 +106,12 @@ class NominalTrajectory:
             ParameterError, DesignError, TrimError: A wrong value, named.
         """
         v = check_all(NOMINAL_PARAMETERS, values)
-        design = design or ControlDesign.from_parameters(values)
+        design = design or design_of(values)
+        if design is None:
+            if v["nominal.law"] != LAWS[0]:
+                raise ParameterError(f"parameter nominal.law = {v['nominal.law']!r}: expected a design that it is for")
+            period = check_all(DESIGN_NOTCH_PARAMETERS, values)["period"]
+            return cls(None, ReferenceTrajectory.from_parameters(values, period))
         reference = ReferenceTrajectory.from_parameters(values, design.period)
         return cls(design, reference, _law(v, design, reference))
 
@@ -115,13 +125,13 @@ class NominalTrajectory:
         row = self.reference.row(self._step)
         _, references, reference_inputs, defects = self.reference.data
         reference = references[row]
-        if self._step == 0:
+        if self._step == 0 and len(self.data.gains):
             self._deviation[:] = state - reference
         self._step += 1
         deviation = self._deviation.copy()
         chosen = self.law.step(deviation)
         S, new = self._scratch
-        in_envelope = nominal_advance(
+        in_envelope = not len(self.data.gains) or nominal_advance(
             self.data.polytope, state[0], state[1], self._deviation, chosen.input, defects[row], S, new
         )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
@@ -134,6 +144,16 @@ class NominalTrajectory:
             chosen.gain_index,
             status,
         )
+
+
+_FLAT = AxisWeights(np.array([0.0, 1.0]), np.zeros((4, 1, 0)))
+
+NO_NOMINAL = NominalData(
+    PolytopeData(np.zeros((0, N_STATES * (N_STATES + N_INPUTS))), _FLAT, _FLAT),
+    np.zeros((0, N_INPUTS, N_STATES)),
+    np.zeros((0, N_RIGID, N_RIGID)),
+)
+"""In place of a nominal system, where there is no design: x_n and u_n stay zero."""
 
 
 def nominal_data(design: ControlDesign) -> NominalData:

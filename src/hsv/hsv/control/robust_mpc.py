@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from hsv.control.controller import ControllerInput
+from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step
@@ -21,8 +21,11 @@ ROBUST_MPC_PARAMETERS = (
 )
 
 
-class RobustMpc:
+class RobustMpc(Controller):
     """One of the nominal gains K acts on the whole deviation from the reference; it has no memory."""
+
+    PARAMETERS = ROBUST_MPC_PARAMETERS
+    kernel: TubeData
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
         """Take gain number ``gain_index`` of the family, -1 the last.
@@ -37,10 +40,10 @@ class RobustMpc:
             )
         limits = design.input_minimum, design.input_maximum
         no_notch = discretise((), design.period)
-        self.data = TubeData(
+        self.kernel = TubeData(
             gains[gain_index][None], np.zeros(1, np.int64), *limits, False, False, no_notch, 0.0, design.period
         )
-        self._memory = memory_of(self.data)
+        self._memory = memory_of(self.kernel)
         x, u = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
         self.step(ControllerInput(0, x, 0.0, np.empty(0), x, u, x, u))  # compile now: a cold cache must not stall
 
@@ -62,7 +65,7 @@ class RobustMpc:
         The nominal trajectory is not used, there is no set, and the error is the deviation from the reference.
         """
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        tube_step(self.data, self._memory, inputs.step, False, *inputs[1:], u_feedback, total, u)
+        tube_step(self.kernel, self._memory, inputs.step, False, *inputs[1:], u_feedback, total, u)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,

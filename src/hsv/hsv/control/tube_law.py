@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.adjustable import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
-from hsv.control.controller import ControllerInput, ControllerResult
+from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.design_file import ControlDesign
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
@@ -28,7 +28,8 @@ from hsv.control.notch_filter import (
     flown_sections,
 )
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 from hsv.vehicle.parameters import COUPLING_SETS
 
 
@@ -72,6 +73,20 @@ class TubeData(NamedTuple):
     notch: NotchData
     integral_rate: float
     period: float
+
+
+NO_TUBE = TubeData(
+    np.zeros((1, N_INPUTS, N_STATES)),
+    np.zeros(1, np.int64),
+    INPUT_MINIMUM,
+    INPUT_MAXIMUM,
+    False,
+    False,
+    discretise((), 1.0),
+    0.0,
+    1.0,
+)
+"""In place of a tube law, where another controller flies."""
 
 
 def memory_of(data: TubeData) -> np.ndarray:
@@ -172,8 +187,11 @@ class TubeResult(ControllerResult):
     status: TubeStatusCode
 
 
-class TubeLaw:
+class TubeLaw(Controller):
     """The controller's last stage."""
+
+    PARAMETERS = TUBE_PARAMETERS
+    kernel: TubeData
 
     def __init__(
         self,
@@ -196,7 +214,7 @@ class TubeLaw:
         self._integral_rate = integral_rate
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
-        self._memory = memory_of(self.data)
+        self._memory = memory_of(self.kernel)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
         self.step(ControllerInput(0, x, 0.0, np.zeros(2 * len(flown)), x, u, x, u))
@@ -216,7 +234,7 @@ class TubeLaw:
     @property
     def gain(self) -> np.ndarray:
         """The gain F diag(tau) (2, 9) of the next step."""
-        return np.asarray(self.data.gains[active_gain(self.data, self._next)])
+        return np.asarray(self.kernel.gains[active_gain(self.kernel, self._next)])
 
     def reset(self) -> None:
         """Start a new run: with the factor set last, and with the scheduled changes to come."""
@@ -238,7 +256,7 @@ class TubeLaw:
     def _arrange(self, entries: list[tuple[int, np.ndarray]]) -> None:
         self._entries = entries
         design = self._design
-        self.data = TubeData(
+        self.kernel = TubeData(
             np.stack([design.adjusted_gain(tau) for _, tau in entries]),
             np.array([start for start, _ in entries], np.int64),
             design.input_minimum,
@@ -257,7 +275,7 @@ class TubeLaw:
         in_loop = 0 < size == 2 * len(self._notch.D)
         planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        active = tube_step(self.data, memory, k, True, *inputs[1:], u_feedback, total, u)
+        active = tube_step(self.kernel, memory, k, True, *inputs[1:], u_feedback, total, u)
         self._next = k + 1
         error, tube = (state - reference - deviation)[:N_RIGID], None
         if in_loop:

@@ -14,8 +14,8 @@ from typing import Any
 import yaml
 
 from hsv.control.design_file import digest, find_design, read_parameters
-from hsv.errors import RecordingError
-from hsv.graph.description import NodeDescription, graph
+from hsv.errors import RecordingError, ScenarioError
+from hsv.graph.description import CONTROLLERS, NodeDescription, graph
 from hsv.simulation.assembly import assemble_flight, blamed_on
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
@@ -55,6 +55,11 @@ def prepare(
     """
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
+    if scenario.controller not in CONTROLLERS:
+        raise ScenarioError(
+            f"scenario {scenario.name!r}: controller = {scenario.controller!r}: over DDS expected one of "
+            f"{', '.join(CONTROLLERS)}; hsv simulate and hsv montecarlo fly any"
+        )
     with blamed_on(scenario):
         design_file = find_design(scenario.design)
         design = read_parameters(design_file)

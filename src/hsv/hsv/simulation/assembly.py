@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from hsv.control.control_law import control_law
-from hsv.control.design_file import ControlDesign, find_design, read_design, read_parameters
+from hsv.control.controllers import SHIPPED_CONTROLLERS, build_controller, controller_class, table_values
+from hsv.control.design_file import design_of, find_design, read_design, read_design_parameters
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.errors import DesignError, HsvError, ScenarioError, TrimError
@@ -27,13 +27,34 @@ _FIELDS = {
 """Parameters as a scenario calls them."""
 
 
+def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
+    """Return the flat parameters of ``scenario``, those of a controller of one's own included, which is loaded.
+
+    Raises:
+        ParameterError, QuantityError: Names what the controller does not admit.
+    """
+    values = scenario.parameters()
+    if scenario.controller not in SHIPPED_CONTROLLERS:
+        values |= table_values(controller_class(scenario.controller), scenario.own)
+    return values
+
+
+def design_parameters(scenario: Scenario) -> dict[str, Any]:
+    """Return the parameters of the scenario's design, checked; none where it has none.
+
+    Raises:
+        DesignError: There is no such design, or it is not acceptable.
+    """
+    return read_design_parameters(find_design(scenario.design)) if scenario.design else {}
+
+
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
     """Return the design's parameters with those of ``scenario`` over them; :func:`assemble` checks them.
 
     Raises:
-        DesignError: There is no such design, or its file holds no parameters.
+        DesignError, ParameterError, QuantityError: As above.
     """
-    return {**read_parameters(find_design(scenario.design)), **scenario.parameters()}
+    return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
 def assemble(values: Mapping[str, Any]) -> Components:
@@ -42,12 +63,12 @@ def assemble(values: Mapping[str, Any]) -> Components:
     Raises:
         ParameterError, DesignError, TrimError: Names the parameter that is wrong.
     """
-    design = ControlDesign.from_parameters(values)
+    design = design_of(values)
     return Components(
         Plant.from_parameters(values),
         NotchFilter.from_parameters(values),
         NominalTrajectory.from_parameters(values, design),
-        control_law(values, design),
+        build_controller(values, design),
         FaultInjector.from_parameters(values),
     )
 
@@ -59,7 +80,7 @@ def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None)
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
     """
     with blamed_on(scenario):
-        values = flight_parameters(scenario) if design is None else {**design, **scenario.parameters()}
+        values = {**(design_parameters(scenario) if design is None else design), **scenario_parameters(scenario)}
         components = assemble(values)
         plant = components.plant
         if plant.steps < 1:

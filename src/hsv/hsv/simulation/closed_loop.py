@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
+import math
+import threading
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from hsv.control.controller import Controller, ControllerInput
-from hsv.control.nominal_law import FamilyLaw, nominal_input
+from hsv.control.controller import Controller, ControllerInput, ForeignController
+from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.robust_mpc import RobustMpc
-from hsv.control.tube_law import TubeLaw, memory_of, tube_step
+from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.fingerprint import fingerprint
+from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
 from hsv.simulation.metrics import FlightData
-from hsv.vehicle.dynamics import PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.plant import FlightStatus, Plant
@@ -70,6 +74,36 @@ class History(NamedTuple):
         return cls(*(np.empty((rows, w)) if w else np.empty(rows) for w in widths))
 
 
+class LoopArrays(NamedTuple):
+    """The signals of a step between nominal trajectory and actuators, and the memory of the tube law, in place.
+
+    Those up to ``filter_state`` are one array, in this order: what a controller is given.
+    """
+
+    state: np.ndarray
+    filtered_pitch_rate: np.ndarray
+    reference: np.ndarray
+    reference_input: np.ndarray
+    deviation: np.ndarray
+    nominal_input: np.ndarray
+    filter_state: np.ndarray
+    wanted: np.ndarray
+    gain_index: np.ndarray
+    memory: np.ndarray
+
+
+_WIDTHS = (N_STATES, 1, N_STATES, N_INPUTS, N_STATES, N_INPUTS)
+_ENDS = tuple(accumulate(_WIDTHS))
+_CUTS = [slice(start, end) for start, end in zip((0, *_ENDS), (*_ENDS, None), strict=True)]
+_ONE_AT_A_TIME = threading.Lock()
+
+
+def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, LoopArrays]:
+    given = np.zeros(_ENDS[-1] + filter_states)
+    views = [*(given[cut] for cut in _CUTS), np.zeros(N_INPUTS), np.zeros(1), memory]
+    return given, LoopArrays._make(views)
+
+
 @njit(cache=True, nogil=True)
 def _fly(
     vehicle: Any,
@@ -77,26 +111,31 @@ def _fly(
     substeps: int,
     notch: Any,
     nominal: Any,
+    nominal_call: Any,
     tube: Any,
+    controller_call: Any,
     faults: Any,
     reference: Any,
-    x: np.ndarray,
-    memory: np.ndarray,
+    arrays: Any,
     work: np.ndarray,
     history: Any,
 ) -> int:
-    """Fly as many steps as ``history`` has rows, from ``x``; return the number of rows written (fewer: diverged)."""
-    n, m = len(x), 2
-    filter_state = np.zeros(2 * len(notch.D))
+    """Fly as many steps as ``history`` has rows, from the state in ``arrays``; return the number of rows written.
+
+    Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k.
+    """
+    x, q_f, x_r, u_r, x_n, u_n, s, wanted, gain_index, memory = arrays
+    n, m = len(x), len(u_n)
+    filter_state = np.zeros(len(s))
     rest(notch, x[PITCH_RATE], filter_state)
-    s = filter_state.copy()
     last = len(reference.state) - 1
-    S, x_n, new = np.empty(n * (n + m)), np.empty(n), np.empty(n)
+    S, new = np.empty(n * (n + m)), np.empty(n)
+    planned = len(nominal.gains) > 0
     for i in range(n):
-        x_n[i] = x[i] - reference.state[min(max(-reference.first, 0), last), i]
-    u_n, u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m)
-    # Copies, made when another row holds: views of rows in every step take a twentieth of the loop's time.
-    x_r, u_r, defect, row = np.empty(n), np.empty(m), np.empty(n), -1
+        x_n[i] = x[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
+    u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    # Copied when another row holds: views of rows in every step take a twentieth of the loop's time.
+    defect, row = np.empty(n), -1
     rows = len(history.filtered_pitch_rate)
     for k in range(rows):
         if k > 0:
@@ -113,20 +152,35 @@ def _fly(
                 u_r[i] = reference.input[row, i]
         for i in range(len(s)):
             s[i] = filter_state[i]
-        q_f = filter_step(notch, filter_state, x[PITCH_RATE])
-        history.filtered_pitch_rate[k] = q_f
+        q_f[0] = filter_step(notch, filter_state, x[PITCH_RATE])
+        history.filtered_pitch_rate[k] = q_f[0]
         for i in range(n):
             history.deviation[k, i] = x_n[i]
-        index, _ = nominal_input(nominal, x_n, u_n)
-        history.gain_index[k] = index
+        if nominal_call.function != NOTHING:
+            if call_step(nominal_call.function, k, 0, 0, 0, 0) != 0:
+                return -1 - k
+        elif planned:
+            gain_index[0], _ = nominal_input(nominal, x_n, u_n)
+        history.gain_index[k] = gain_index[0]
         for i in range(m):
             history.nominal_input[k, i] = u_n[i]
-        tube_step(tube, memory, k, False, x, q_f, s, x_r, u_r, x_n, u_n, u_feedback, total, u)
+        if controller_call.function != NOTHING:
+            _, inputs, outputs, state, parameters = controller_call
+            if call_step(controller_call.function, k, inputs, outputs, state, parameters) != 0:
+                return -1 - k
+            for i in range(m):
+                if not math.isfinite(wanted[i]):
+                    return -1 - k
+                total[i] = wanted[i]
+                u[i] = min(max(total[i], tube.minimum[i]), tube.maximum[i])
+        else:
+            tube_step(tube, memory, k, False, x, q_f[0], s, x_r, u_r, x_n, u_n, u_feedback, total, u)
         for i in range(m):
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
             history.command[k, i] = u[i]
-        nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, defect, S, new)
+        if planned:
+            nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, defect, S, new)
         apply_faults(faults, k, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
@@ -192,71 +246,75 @@ class Flight:
 def fly(components: Components) -> Flight:
     """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges.
 
-    The nested family under the tube law flies compiled, whatever else step by step; both give the same bits.
+    The loop is compiled; a nominal law that solves a problem in flight and a controller of one's own in Python are
+    called from it. Flights with such a block wait for one another: it has one state.
+
+    Raises:
+        RunError: A controller of one's own failed; it is named, with the step.
     """
-    law = components.controller
-    if isinstance(law, TubeLaw | RobustMpc) and isinstance(components.nominal_trajectory.law, FamilyLaw):
-        return _flight(components, _fly_compiled(components, law))
-    return fly_stepwise(components)
-
-
-def fly_stepwise(components: Components) -> Flight:
-    """Fly as :func:`fly` does, through the ``step()`` of every component, as the nodes of the graph do."""
-    plant, notch, nominal = components.plant, components.notch_filter, components.nominal_trajectory
-    law, injector = components.controller, components.fault_injector
-    for component in (notch, nominal, law, injector):
-        component.reset()
+    plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
+    tube = controller.kernel if isinstance(controller.kernel, TubeData) else NO_TUBE
+    given, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
+    arrays.state[:] = plant.initial.state
+    nominal_call = controller_call = NO_CALL
+    callbacks = []
+    if not isinstance(nominal.law, FamilyLaw):
+        callbacks.append(_solving(nominal.law, arrays))
+        nominal_call = callbacks[-1].call
+    if isinstance(controller, ForeignController):
+        if controller.kernel is None:
+            callbacks.append(_controlling(controller, given, arrays))
+            controller_call = callbacks[-1].call
+        else:
+            address, state, parameters = controller.kernel
+            memory = state.copy()
+            controller_call = call_of(address, given, arrays.wanted, memory, parameters)
     history = History.empty(plant.steps + 1)
-    current = plant.reset()
-    for k in range(plant.steps + 1):
-        if k > 0:
-            current = plant.step(history.actuator[k - 1])
-        filtered = notch.step(float(current.state[PITCH_RATE]))
-        planned = nominal.step(current.state)
-        applied = law.step(
-            ControllerInput(
-                k,
-                current.state,
-                filtered.filtered_pitch_rate,
-                filtered.filter_state,
-                planned.reference,
-                planned.reference_input,
-                planned.deviation,
-                planned.input,
-            )
+    with _ONE_AT_A_TIME if callbacks else nullcontext():
+        if callbacks:
+            nominal.law.reset()
+            controller.reset()
+        rows = _fly(
+            plant.vehicle,
+            plant.period,
+            plant.substeps,
+            components.notch_filter.data,
+            nominal.data,
+            nominal_call,
+            tube,
+            controller_call,
+            components.fault_injector.schedule,
+            nominal.reference.data,
+            arrays,
+            workspace(),
+            history,
         )
-        history.state[k] = current.state
-        history.filtered_pitch_rate[k] = filtered.filtered_pitch_rate
-        history.deviation[k] = planned.deviation
-        history.nominal_input[k] = planned.input
-        history.gain_index[k] = planned.gain_index
-        history.u_unsaturated[k] = applied.u_unsaturated
-        history.command[k] = applied.input
-        history.actuator[k] = injector.step(k, applied.input).actuator
-        if current.status is FlightStatus.DIVERGED:
-            history = History(*(column[: k + 1] for column in history))
-            break
-    return _flight(components, history)
+    for callback in callbacks:
+        if callback.error is not None:
+            raise callback.error
+    if rows < 0:
+        assert isinstance(controller, ForeignController)
+        raise controller.failure(-1 - rows, f"answered {arrays.wanted.tolist()}")
+    return _flight(components, History(*(column[:rows] for column in history)))
 
 
-def _fly_compiled(components: Components, law: TubeLaw | RobustMpc) -> History:
-    plant, nominal = components.plant, components.nominal_trajectory
-    history = History.empty(plant.steps + 1)
-    rows = _fly(
-        plant.vehicle,
-        plant.period,
-        plant.substeps,
-        components.notch_filter.data,
-        nominal.data,
-        law.data,
-        components.fault_injector.schedule,
-        nominal.reference.data,
-        plant.initial.state.copy(),
-        memory_of(law.data),
-        workspace(),
-        history,
-    )
-    return History(*(column[:rows] for column in history))
+def _solving(law: NominalLaw, arrays: LoopArrays) -> Callback:
+    def solve(step: int) -> None:
+        chosen = law.step(arrays.deviation.copy())
+        arrays.nominal_input[:], arrays.gain_index[0] = chosen.input, chosen.gain_index
+
+    return Callback(solve)
+
+
+def _controlling(controller: ForeignController, given: np.ndarray, arrays: LoopArrays) -> Callback:
+    def control(step: int) -> None:
+        # A copy: a controller may keep what it was given.
+        now = given.copy()
+        x, q_f, x_r, u_r, x_n, u_n, s = [now[cut] for cut in _CUTS]
+        inputs = ControllerInput(step, x, float(q_f[0]), s, x_r, u_r, x_n, u_n)
+        arrays.wanted[0], arrays.wanted[1] = controller.wanted(inputs)
+
+    return Callback(control)
 
 
 def _flight(components: Components, history: History) -> Flight:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, StrictBool, StrictInt, ValidationError
 
 from hsv.control.adjustable import TAU, factors
+from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
@@ -104,7 +105,9 @@ class Scenario(Table):
     name: str
     title: str
     design: str = "baseline"
-    controller: Literal["tube_mpc", "robust_mpc"] = "tube_mpc"
+    """Name or path; empty: none"""
+    controller: str = "tube_mpc"
+    """A registered name, or ``package.module:Class``"""
     duration: Time
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
@@ -116,6 +119,8 @@ class Scenario(Table):
     integral: IntegralTable = IntegralTable()
     robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
+    own: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
     limits: dict[str, float] = Field(default_factory=dict)
     """Largest magnitude expected of a metric, SI."""
 
@@ -125,7 +130,10 @@ class Scenario(Table):
         return breakpoints(self.initial.altitude, self.initial.velocity, self.command)
 
     def parameters(self) -> dict[str, Any]:
-        """Return the flat parameters of this scenario; with those of its design they determine the flight."""
+        """Return the flat parameters of this scenario but those of a controller of one's own.
+
+        With those (:func:`hsv.simulation.assembly.scenario_parameters`) and the design's they determine the flight.
+        """
         values: dict[str, Any] = {
             "duration": self.duration,
             "vehicle.model": self.vehicle.model,
@@ -196,10 +204,15 @@ def parse_scenario(text: str, name: str) -> Scenario:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"scenario {name!r}: {error}") from error
-    if "name" in table:
-        raise ScenarioError(f"scenario {name!r}: name: unknown key, a scenario is called by its file")
+    for key in ("name", "own"):
+        if key in table:
+            why = ", a scenario is called by its file" if key == "name" else ""
+            raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
+    own = _own_tables(table)
+    table = {key: value for key, value in table.items() if key not in own}
     try:
-        scenario = Scenario.model_validate({**table, "name": name, "limits": _limits(table.get("limits", {}))})
+        given = {**table, "name": name, "own": own, "limits": _limits(table.get("limits", {}))}
+        scenario = Scenario.model_validate(given)
         _check(scenario)
     except ValidationError as error:
         raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
@@ -210,6 +223,13 @@ def parse_scenario(text: str, name: str) -> Scenario:
 
 def _shipped() -> Any:
     return files("hsv.simulation").joinpath("scenarios")
+
+
+def _own_tables(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a controller of one's own."""
+    if table.get("controller", SHIPPED_CONTROLLERS[0]) in SHIPPED_CONTROLLERS:
+        return {}
+    return {key: value for key, value in table.items() if isinstance(value, dict) and key not in Scenario.model_fields}
 
 
 def _limits(table: object) -> dict[str, float]:
@@ -226,6 +246,8 @@ def _limits(table: object) -> dict[str, float]:
 
 
 def _check(scenario: Scenario) -> None:
+    if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
+        raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():
         if name not in uncertainty_bounds():
             expected = ", ".join(uncertainty_bounds())
@@ -291,4 +313,4 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
         if isinstance(part, str):
             annotation = model.model_fields[part].annotation
             model = annotation if isinstance(annotation, type) else annotation.__args__[0]
-    return [name for name in model.model_fields if name != "name"]
+    return [name for name in model.model_fields if name not in ("name", "own")]

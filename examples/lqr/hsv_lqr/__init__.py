@@ -1,0 +1,58 @@
+"""A linear-quadratic regulator about the trim of the reference, with integral action: a controller of one's own."""
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from hsv.lpv.discretisation import zero_order_hold
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import PITCH_RATE, jacobian
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.trim import trim
+
+RIGID = 5  # altitude, velocity, angle of attack, pitch angle, pitch rate
+STATE_SCALE = np.array([100.0, 20.0, 0.01, 0.01, 0.05])  # m, m/s, rad, rad, rad/s: deviations that weigh equally
+INPUT_SCALE = np.array([0.5, 0.1])  # fuel equivalence ratio, elevator deflection (rad)
+
+
+class Lqr:
+    """u = u_r - K [x - x_r; integral of the altitude and velocity errors], K for the trim that the flight starts in."""
+
+    PARAMETERS = (
+        Parameter("lqr.input_weight", 1.0, "times the inputs' weight in the cost: larger is slower", "", 1e-3, 1e3),
+        Parameter("lqr.integral_time", 20.0, "time over which an error weighs as much as its integral", "s", 1.0, 1e4),
+    )
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        """Compute the gain for the nominal rigid vehicle; no design of the bench is used."""
+        own = check_all(cls.PARAMETERS, values)
+        period = values.get("period", 0.02)
+        vehicle = vehicle_parameters("paper_like").decoupled()
+        point = trim(vehicle, values["initial.altitude"], values["initial.velocity"])
+        A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), period)
+        A, B = A[:RIGID, :RIGID], B[:RIGID]
+        # The integrals of both errors over time are two more states.
+        full = np.block([[A, np.zeros((RIGID, 2))], [period * np.eye(2, RIGID), np.eye(2)]])
+        inputs = np.vstack((B, np.zeros((2, 2))))
+        scale = np.concatenate((STATE_SCALE, own["lqr.integral_time"] * STATE_SCALE[:2]))
+        Q, R = np.diag(scale**-2.0), own["lqr.input_weight"] * np.diag(INPUT_SCALE**-2.0)
+        P = solve_discrete_are(full, inputs, Q, R)
+        lqr = cls()
+        lqr.period, lqr.gain = period, np.linalg.solve(R + inputs.T @ P @ inputs, inputs.T @ P @ full)
+        lqr.reset()
+        return lqr
+
+    def reset(self):
+        """Start a new run."""
+        self.integral = np.zeros(2)
+
+    def step(self, inputs):
+        """Return the wanted input; the bench limits it."""
+        error = (inputs.state - inputs.reference)[:RIGID]
+        error[PITCH_RATE] = inputs.filtered_pitch_rate - inputs.reference[PITCH_RATE]
+        wanted = inputs.reference_input - self.gain @ np.concatenate((error, self.integral))
+        # The integral stands still while an input is limited: it would wind up.
+        if np.all((wanted >= INPUT_MINIMUM) & (wanted <= INPUT_MAXIMUM)):
+            self.integral += self.period * error[:2]
+        return wanted

@@ -1,0 +1,207 @@
+"""Controllers of one's own in the loop: Python classes and compiled step functions."""
+
+import threading
+
+import numpy as np
+import pytest
+from numba import carray, cfunc
+
+from hsv.control.controller import ControllerInput, StepKernel
+from hsv.errors import RunError, ScenarioError
+from hsv.parameters import Parameter, check_all
+from hsv.simulation.assembly import assemble_flight, scenario_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import parse_scenario
+from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+
+SCENARIO = """
+title = "Case 1 by another controller"
+design = "{design}"
+controller = "{controller}"
+duration = "{duration}"
+[initial]
+altitude = "85500 ft"
+velocity = "7900 ft/s"
+[[command]]
+altitude_change = "60 ft"
+[{table}]
+{settings}
+"""
+FEEDBACK = np.array([[-1e-3, -2e-3, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 3.0, 1.2]])
+RATE = 0.05
+
+
+def flight(controller="Leaky", design="", settings="", table="leaky", duration="4 s"):
+    if controller in globals():
+        controller = f"{__name__}:{controller}"
+    text = SCENARIO.format(controller=controller, design=design, settings=settings, table=table, duration=duration)
+    return assemble_flight(parse_scenario(text, "own"))
+
+
+class Leaky:
+    """Proportional feedback with a leaky integral of the pitch angle: memory, parameters, the filtered pitch rate."""
+
+    PARAMETERS = (
+        Parameter("leaky.gain", 1.0, "times the feedback", "", 0.0, 10.0),
+        Parameter("leaky.time", 2.0, "of the leak", "s", 0.1, 100.0),
+    )
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        made = cls()
+        made.own = check_all(cls.PARAMETERS, values)
+        made.design = design
+        return made
+
+    def reset(self):
+        self.leaking = 0.0
+
+    def step(self, inputs):
+        error = inputs.state[:5] - inputs.reference[:5]
+        error[4] = inputs.filtered_pitch_rate - inputs.reference[4]
+        wanted = [0.0, 0.0]
+        for i in range(2):
+            total = 0.0
+            for j in range(5):
+                total += FEEDBACK[i, j] * error[j]
+            wanted[i] = inputs.reference_input[i] + self.own["leaky.gain"] * total
+        wanted[1] += RATE * self.leaking
+        self.leaking += 0.02 * (error[3] - self.leaking / self.own["leaky.time"])
+        return wanted
+
+
+@cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
+def leaky_step(k, given, wanted, state, parameters):
+    x, x_r, u_r = carray(given, 9), carray(given, 19)[10:], carray(given, 21)[19:]
+    gain, time, limit = parameters[0], parameters[1], parameters[2]
+    if k == int(limit):
+        return 7
+    for i in range(2):
+        total = 0.0
+        for j in range(5):
+            error = (given[9] if j == 4 else x[j]) - x_r[j]
+            total += FEEDBACK[i, j] * error
+        wanted[i] = u_r[i] + gain * total
+    wanted[1] += RATE * state[0]
+    state[0] += 0.02 * (x[3] - x_r[3] - state[0] / time)
+    return 0
+
+
+class CompiledLeaky(Leaky):
+    """The same, compiled."""
+
+    fails_at = -1
+
+    @property
+    def kernel(self):
+        own = self.own
+        return StepKernel(
+            leaky_step.address, np.zeros(1), np.array([own["leaky.gain"], own["leaky.time"], self.fails_at])
+        )
+
+
+class Late(Leaky):
+    """Answers well up to step 20."""
+
+    answer = np.nan, 0.0
+
+    def step(self, inputs):
+        return super().step(inputs) if inputs.step < 20 else self.answer
+
+
+class Raising(Leaky):
+    def step(self, inputs):
+        raise ZeroDivisionError("no gain")
+
+
+def test_python_and_compiled_controller_fly_the_same_bits_alone_and_stepped():
+    own, compiled = flight(), flight("CompiledLeaky")
+    one, other = fly(own), fly(compiled)
+    assert len(one.time) > 100
+    assert one.fingerprint == other.fingerprint
+    inputs = ControllerInput(
+        0, one.history.state[0], 0.0, np.zeros(2), one.reference[0], one.reference_input[0], np.zeros(9), np.zeros(2)
+    )
+    for parts, flown in ((own, one), (compiled, other)):
+        parts.controller.reset()
+        inputs = inputs._replace(filtered_pitch_rate=flown.history.filtered_pitch_rate[0])
+        assert parts.controller.step(inputs).input.tolist() == flown.history.command[0].tolist()
+    assert not one.history.deviation.any() and not one.history.nominal_input.any()
+
+
+def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
+    monkeypatch.setattr(Late, "answer", (5.0, -3.0))
+    flown = fly(flight("Late"))
+    assert flown.history.u_unsaturated[20].tolist() == [5.0, -3.0]
+    assert flown.history.command[20].tolist() == [INPUT_MAXIMUM[0], INPUT_MINIMUM[1]]
+    assert flown.data().saturated[20].all() and not flown.data().saturated[19].any()
+
+
+def test_settings_reach_the_controller_in_si_units():
+    scenario = parse_scenario(
+        SCENARIO.format(
+            controller=f"{__name__}:Leaky",
+            design="baseline",
+            settings='time = "1.5 min"',
+            table="leaky",
+            duration="1 s",
+        ),
+        "own",
+    )
+    assert scenario_parameters(scenario)["leaky.time"] == 90.0
+    parts = assemble_flight(scenario)
+    assert fly(parts).history.deviation.any()  # with a design there is a nominal trajectory, too
+
+
+@pytest.mark.parametrize(
+    ("controller", "answer", "message"),
+    [
+        ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected a finite number for fuel"),
+        ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected a finite number for fuel"),
+        ("Late", None, r"Late, step 20: answered None"),
+        ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain"),
+    ],
+)
+def test_a_controller_that_fails_is_named_with_its_step(controller, answer, message, monkeypatch):
+    monkeypatch.setattr(Late, "answer", answer)
+    parts = flight(controller)
+    with pytest.raises(RunError, match=message):
+        fly(parts)
+
+
+def test_a_compiled_controller_that_fails_is_named_with_its_step(monkeypatch):
+    monkeypatch.setattr(CompiledLeaky, "fails_at", 33)
+    with pytest.raises(RunError, match="CompiledLeaky, step 33"):
+        fly(flight("CompiledLeaky"))
+
+
+def test_flights_in_threads_share_no_state():
+    parts = flight()
+    alone = fly(parts).fingerprint
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(fly(parts.perturbed({})).fingerprint)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [alone] * 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"controller": "tube_mcp"}, r"controller = 'tube_mcp': expected one of .*did you mean 'tube_mpc'"),
+        ({"controller": "nowhere:Class"}, r"cannot be loaded, ModuleNotFoundError: No module named 'nowhere'"),
+        ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),
+        ({"controller": "math:cos"}, r"has no PARAMETERS, from_parameters, expected a class of a controller"),
+        ({"settings": "gian = 1.0"}, r"leaky.gian: unknown key, expected one of leaky.gain, leaky.time"),
+        ({"settings": "gain = -1.0"}, r"leaky.gain = -1.0: expected double from 0 to 10"),
+        ({"settings": 'time = "3 m"'}, r"leaky.time = '3 m': wrong unit"),
+        ({"table": "lucky", "settings": "gain = 1.0"}, r"lucky.gain: unknown key"),
+        ({"controller": "tube_mpc"}, r"leaky: unknown key"),
+        ({"controller": "tube_mpc", "table": "tube"}, r"design = '': expected one, tube_mpc flies with its gains"),
+    ],
+)
+def test_what_cannot_be_flown_is_named(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        flight(**changes)
