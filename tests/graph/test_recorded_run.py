@@ -111,7 +111,7 @@ LISTEN = textwrap.dedent(
     topics = sys.argv[2].split(",")
     heard = {topic: [] for topic in topics}
     for topic in topics:
-        node.create_subscription(message_class(TOPICS[topic]), topic, heard[topic].append, STEP, raw=True)
+        node.create_subscription(message_class(TOPICS[topic.strip("/")]), topic, heard[topic].append, STEP, raw=True)
     executor = EventsExecutor()
     executor.add_node(node)
     expected = {topic: [data for _, data in recorded.messages(topic)] for topic in topics}

@@ -8,11 +8,14 @@ import pytest
 from recorded_flight import message_types
 from rosbags.typesys.store import Typestore
 
-from hsv.graph.description import TOPICS
+from hsv.graph.description import TOPICS, resolved
 from hsv.recording.fields import fields_of
 from hsv.recording.viewers import LAYOUTS
 
-RECORDED = TOPICS | {"/rosout": "rcl_interfaces/msg/Log", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
+RECORDED = {resolved(role): kind for role, kind in TOPICS.items()} | {
+    "/rosout": "rcl_interfaces/msg/Log",
+    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+}
 PATH = re.compile(r"(/[A-Za-z_]\w*)+(\.[A-Za-z_]\w*(\[\d+\])?)+")
 """Message paths of Foxglove without quotes, filters and slices."""
 PANELS = {"Plot", "Tab", "RosOut", "DiagnosticSummary", "RawMessages"}
@@ -80,7 +83,7 @@ def test_names_of_plotjuggler_are_those_that_its_parser_makes(types):
             for path in [f"{prefix}/{field.name}{'' if lengths is None else f'[{i}]'}" for i in range(lengths or 1)]:
                 yield from series(field.type, path) if field.is_message else [path]
 
-    made = {name for topic, kind in TOPICS.items() for name in series(kind, topic)}
+    made = {name for topic, kind in TOPICS.items() for name in series(kind, resolved(topic))}
     root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
     assert {curve.attrib["name"] for curve in root.iter("curve")} <= made
 

@@ -98,7 +98,7 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
 
 def test_a_lost_message_is_a_difference_of_count(bag: Bag, tmp_path: Path) -> None:
     def lose(tracks: dict[str, Track]) -> None:
-        tracks["/hsv/command"] = tracks["/hsv/command"].cut(600)
+        tracks["hsv/command"] = tracks["hsv/command"].cut(600)
 
     first = replay_all(tampered(bag, tmp_path, lose))["tube_mpc"].topics[0].first
     assert first is not None and first.field == "number of messages" and first.step == 600
@@ -107,10 +107,10 @@ def test_a_lost_message_is_a_difference_of_count(bag: Bag, tmp_path: Path) -> No
 
 def test_swapped_messages_are_a_difference_of_order(bag: Bag, tmp_path: Path) -> None:
     def swap(tracks: dict[str, Track]) -> None:
-        track = tracks["/hsv/filtered_state"]
+        track = tracks["hsv/filtered_state"]
         data = list(track.data)
         data[300], data[301] = data[301], data[300]
-        tracks["/hsv/filtered_state"] = replace(track, data=data)
+        tracks["hsv/filtered_state"] = replace(track, data=data)
 
     first = replay_all(tampered(bag, tmp_path, swap))["notch_filter"].topics[0].first
     assert first is not None and first.field == "time (ns)"
@@ -137,7 +137,7 @@ def test_a_short_run_proves_nothing(tmp_path: Path) -> None:
 
 def test_bags_that_cannot_be_replayed_say_why(bag: Bag, tmp_path: Path) -> None:
     def forget(tracks: dict[str, Track]) -> None:
-        del tracks["/hsv/nominal"]
+        del tracks["hsv/nominal"]
 
     with pytest.raises(RecordingError, match="no topic /hsv/nominal"):
         replay_all(tampered(bag, tmp_path, forget))

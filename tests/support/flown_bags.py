@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.faults.actuator import FaultInjector
-from hsv.graph.description import TOPICS
+from hsv.graph.description import TOPICS, resolved
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.topic import Qos, Topic
@@ -65,7 +65,7 @@ def flown_bag(path: Path, duration: float = 12.0, fault: float = 6.0, in_flight:
 def write_bag(path: Path, tracks: Mapping[str, Track], design: Mapping[str, Any], scenario: Mapping[str, Any]) -> Path:
     """Write tracks as a bag with attached parameters."""
     kinds = {topic: kind for topic, kind in TOPICS.items() if topic in tracks}
-    topics = [Topic(t, kind, definition(kind), type_hash(kind), Qos()) for t, kind in kinds.items()]
+    topics = [Topic(resolved(t), kind, definition(kind), type_hash(kind), Qos()) for t, kind in kinds.items()]
     writer = BagWriter(path, topics, {"scenario": "short", "commit": "0" * 40})
     for name, values in (("design.yaml", design), ("scenario.yaml", scenario)):
         plain = {key: value.tolist() if hasattr(value, "tolist") else value for key, value in values.items()}
@@ -75,6 +75,6 @@ def write_bag(path: Path, tracks: Mapping[str, Track], design: Mapping[str, Any]
         for topic in kinds:
             track = tracks[topic]
             if row < len(track.data):
-                writer.write(topic, track.times[row], track.data[row])
+                writer.write(resolved(topic), track.times[row], track.data[row])
     writer.close()
     return path

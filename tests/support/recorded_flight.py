@@ -10,7 +10,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.control.design_file import find_design, find_file
-from hsv.graph.description import TOPICS
+from hsv.graph.description import CLOCK, STATE, TOPICS, resolved
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
@@ -51,7 +51,7 @@ def record_flight(
     changed = {name.replace("__", "."): value for name, value in changes.items()}
     values = flight_parameters(flown) | changed
     types = message_types()
-    kinds = TOPICS | {"/rosout": LOG, "/diagnostics": DIAGNOSTICS}
+    kinds = {resolved(role): kind for role, kind in TOPICS.items()} | {"/rosout": LOG, "/diagnostics": DIAGNOSTICS}
     topics = [
         Topic(name, kind, types.generate_msgdef(kind, ros_version=2)[0], types.hash_rihs01(kind), Qos())
         for name, kind in kinds.items()
@@ -77,14 +77,14 @@ def _fly(writer: BagWriter, types: Typestore, values: dict[str, Any]) -> None:
     components = {name: process.build(values) for name, process in processes.items()}
     messages = {topic: blank(types, kind) for topic, kind in TOPICS.items()}
     first = True
-    while first or messages["/hsv/state"].status == 0:
+    while first or messages[STATE].status == 0:
         for name, process in processes.items():
             inputs = () if process.restarts and first else tuple(messages[topic] for topic in process.inputs)
             outputs = tuple(messages[topic] for topic in process.outputs)
             process.step(components[name], inputs, outputs, types.types.__getitem__)
-        time = nanoseconds(messages["/clock"].clock)
+        time = nanoseconds(messages[CLOCK].clock)
         for topic, kind in TOPICS.items():
-            writer.write(topic, time, bytes(types.serialize_cdr(messages[topic], kind)))
+            writer.write(resolved(topic), time, bytes(types.serialize_cdr(messages[topic], kind)))
         first = False
 
 

@@ -19,8 +19,8 @@ from hsv_node.qos import STEP
 _CONTROLLER = description.TUBE_MPC.name
 
 _FILLED = {
-    "/hsv/filtered_state": {"filter_state": [0.0] * 2},
-    "/hsv/tube_status": {"error": [0.0] * 7, "tube_centre": [0.0] * 7, "tube_half_width": [0.0] * 7},
+    description.FILTERED_STATE: {"filter_state": [0.0] * 2},
+    description.TUBE_STATUS: {"error": [0.0] * 7, "tube_centre": [0.0] * 7, "tube_half_width": [0.0] * 7},
 }
 """Arrays with as many elements as in a flight of Case 1."""
 
@@ -45,15 +45,16 @@ class RingNode:
 
     def matched(self) -> bool:
         """Tell whether all links of the graph description stand."""
-        links = description.links(self._role.name, _CONTROLLER, True)
-        counts = {p.topic_name: p.get_subscription_count() for _, p, _ in self._outputs}
-        counts |= {s.topic_name: s.get_publisher_count() for s in self.inputs}
+        links = description.links(self._role, _CONTROLLER, True)
+        counts = {topic: publisher.get_subscription_count() for topic, publisher, _ in self._outputs}
+        inputs = zip(self._role.subscribes, self.inputs, strict=True)
+        counts |= {topic: subscription.get_publisher_count() for topic, subscription in inputs}
         return all(count >= sum(topic == linked for linked, _ in links) for topic, count in counts.items())
 
     def publish(self) -> None:
         """Publish what this process publishes in a step."""
         for topic, publisher, message in self._outputs:
-            if topic != "/clock":
+            if topic != description.CLOCK:
                 message.step = self.lap
             publisher.publish(message)
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import rclpy
 from hsv_msgs.msg import Ready, Run
 from rclpy.node import Node
 
 from hsv.graph import description
+from hsv.graph.description import NodeDescription
 from hsv.graph.part_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.recording.definitions import definition, type_hash
@@ -32,7 +34,7 @@ class PeerEmulatorNode(LockstepNode):
     """Plays the peers of ``peer_emulator.node``, each under its own name, with what a bag holds of them."""
 
     def __init__(self) -> None:
-        super().__init__("peer_emulator")
+        super().__init__(description.PEER_EMULATOR, "replay")
         values = declare(self, PEER_EMULATOR_PARAMETERS)
         bag = Bag(values["peer_emulator.bag"])
         self._under_test = values["peer_emulator.node"]
@@ -44,53 +46,57 @@ class PeerEmulatorNode(LockstepNode):
         self._answered = dict.fromkeys(me.publishes, 0)
         self._fed = 0
         self._output = BagWriter(Path(values["peer_emulator.directory"]))
+        self._emulated = description.peers(me, self.controller, recorded=False)
         self._peers: dict[str, Node] = {}
-        # The node under test looks for its peers by name on every link: each has to be there under its own.
-        self._feeds = {}
-        for topic, peer in description.links(self._under_test, self.controller, recorded=False):
-            kind = message_class(description.TOPICS[topic])
-            if topic in me.subscribes:
-                self._feeds[topic] = self._peer(peer).create_publisher(kind, topic, STEP)
-            else:
-                self._peer(peer).create_subscription(kind, topic, _ignore, STEP, raw=True)
+        published = {topic: publisher for peer in self._emulated for topic, publisher in self._emulate(peer, me)}
+        self._feeds = {topic: published[topic] for topic in me.subscribes}
         for topic in me.publishes:
-            name = description.TOPICS[topic]
-            self._output.add_topic(Topic(topic, name, definition(name), type_hash(name), Qos(depth=STEP.depth)))
-            answer: Callable[[bytes], None] = partial(self._on_answer, topic)
-            self.create_subscription(message_class(name), topic, answer, STEP, raw=True)
-        self._run = next((message for _, message in bag.decode("/hsv/run")), None)
+            kind = description.TOPICS[topic]
+            name = self.resolve_topic_name(topic)
+            self._output.add_topic(Topic(name, kind, definition(kind), type_hash(kind), Qos(depth=STEP.depth)))
+            answer: Callable[[bytes], None] = partial(self._on_answer, topic, name)
+            self.create_subscription(message_class(kind), topic, answer, STEP, raw=True)
+        self._run = next((message for _, message in bag.decode(description.RUN)), None)
         self._ready = self._join()
         self._standstill = Standstill()
 
-    def _peer(self, name: str) -> Node:
-        if name not in self._peers:
-            self._peers[name] = rclpy.create_node(name, context=self.context, use_global_arguments=False)
-        return self._peers[name]
+    def _emulate(self, peer: NodeDescription, me: NodeDescription) -> Iterator[tuple[str, Any]]:
+        """Make a node that is known for ``peer`` by what it publishes, and yield its publishers by topic."""
+        node = rclpy.create_node(
+            peer.name, namespace=self.get_namespace(), context=self.context, use_global_arguments=False
+        )
+        self._peers[peer.name] = node
+        for topic in peer.publishes:
+            self.claim(topic)
+            yield topic, node.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
+        for topic in me.publishes:
+            if topic in peer.subscribes:
+                node.create_subscription(message_class(description.TOPICS[topic]), topic, _ignore, STEP, raw=True)
 
     def _join(self) -> bool:
         """Announce a run to the node under test, or everybody as ready to a plant; return whether to start."""
         if self._is_plant:
-            self._announcer = self.create_publisher(Ready, "/hsv/ready", LATCHED)
-            self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
+            self._announcer = self.create_publisher(Ready, description.READY, LATCHED)
+            self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
             return True
         assert self._run is not None, "hsv replay takes no bag without the announcement of its run"
         run = Run(run_id="replay", period=self._run.period, last_step=self._run.last_step)
-        self._announcer = self._peer(description.PLANT.name).create_publisher(Run, "/hsv/run", LATCHED)
+        self._announcer = self._peers[description.PLANT.name].create_publisher(Run, description.RUN, LATCHED)
         self._announcer.publish(run)
-        self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
+        self.create_subscription(Ready, description.READY, self._on_ready, LATCHED)
         return False
 
     def _on_run(self, run: Run) -> None:
-        for peer in description.peers(self._under_test, self.controller, recorded=False):
-            self._announcer.publish(Ready(node=peer, run_id=run.run_id))
+        for peer in self._emulated:
+            self._announcer.publish(Ready(node=peer.name, run_id=run.run_id))
 
     def _on_ready(self, ready: Ready) -> None:
         if ready.node == self._under_test:
             self._ready = True
 
-    def _on_answer(self, topic: str, data: bytes) -> None:
+    def _on_answer(self, topic: str, name: str, data: bytes) -> None:
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
-        self._output.write(topic, seconds * 1_000_000_000 + nanoseconds, data)
+        self._output.write(name, seconds * 1_000_000_000 + nanoseconds, data)
         self._answered[topic] += 1
         self._feed()
 
@@ -116,7 +122,7 @@ class PeerEmulatorNode(LockstepNode):
         answers = sum(self._answered.values())
         if not answers and not self._fed:
             # However long it takes to start: whoever has started it sees it end or hang.
-            self.say_waiting([self._under_test], decides=True)
+            self.say_waiting(lambda: [self._under_test], decides=True)
         elif self._standstill.look((self._fed, answers)) > self._limit:
             silent = [topic for topic, count in self._answered.items() if count <= min(self._answered.values())]
             self.get_logger().fatal(

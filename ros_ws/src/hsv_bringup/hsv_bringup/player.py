@@ -16,17 +16,14 @@ from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
 from hsv.errors import ParameterError, RecordingError
-from hsv.graph.description import TOPICS
+from hsv.graph.description import CLOCK, TOPICS
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos
-from hsv_node.lockstep import SAY_AFTER
+from hsv_node.lockstep import SAID_EVERY
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
+from hsv_node.parameters import refuse_sim_time
 from hsv_node.process import ProcessNode
-
-CLOCK = "/clock"
-
-_ORDER = {topic: index for index, topic in enumerate(TOPICS)}
 
 
 class PlayerNode(ProcessNode):
@@ -37,16 +34,19 @@ class PlayerNode(ProcessNode):
 
         Args:
             bag: What to play.
-            topics: Topics to publish.
+            topics: Topics to publish, by their names in the bag.
             rate: Simulated over wall time.
             paused: Whether to begin paused.
             delay: Wall time (s) before the first message, for listeners to find the player.
         """
-        super().__init__("player")
+        # In the namespace of the bag, so that a remapping of the player's own moves its topics as well.
+        super().__init__("player", bag.namespace)
+        if bag.roles.get(CLOCK) in topics:
+            refuse_sim_time(self)
         self._rate = rate
         self._paused = paused
         self._outputs = {
-            topic: self.create_publisher(_message_class(bag, topic), topic, _profile(bag.qos(topic)))
+            topic: self.create_publisher(_message_class(bag, topic), _relative(bag, topic), _profile(bag.qos(topic)))
             for topic in topics
         }
         self._instants = _instants(bag, topics)
@@ -88,7 +88,7 @@ class PlayerNode(ProcessNode):
         if not slow:
             self.finish(0)
         elif time.monotonic() > self._says:
-            self._says = time.monotonic() + SAY_AFTER
+            self._says = time.monotonic() + SAID_EVERY
             self.get_logger().info("waiting for slow listeners of " + ", ".join(slow))
 
     def _publish(self) -> None:
@@ -127,10 +127,18 @@ class PlayerNode(ProcessNode):
 def _instants(bag: Bag, topics: Sequence[str]) -> list[tuple[int, list[tuple[str, bytes]]]]:
     """Return the messages by simulated time (ns); within an instant in the order in which a step is recorded."""
     gathered: dict[int, list[tuple[str, bytes]]] = {}
-    for topic in sorted(topics, key=lambda name: _ORDER.get(name, -1)):
+    order = [bag.name_of(role) for role in TOPICS]
+    for topic in sorted(topics, key=lambda name: order.index(name) if name in order else -1):
         for instant, data in bag.messages(topic):
             gathered.setdefault(instant, []).append((topic, data))
     return sorted(gathered.items())
+
+
+def _relative(bag: Bag, topic: str) -> str:
+    """Return the name of a topic below the namespace of its bag, where it is there; ROS's own stay where they are."""
+    own = bag.namespace.rstrip("/") + "/"
+    role = next((role for role, name in bag.roles.items() if name == topic), "")
+    return topic if role.startswith("/") or not topic.startswith(own) else topic.removeprefix(own)
 
 
 def _message_class(bag: Bag, topic: str) -> Any:
@@ -158,8 +166,8 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="player", description="Republish a bag.")
     parser.add_argument("bag", type=Path, help="bag directory, or its .mcap file")
     parser.add_argument("--rate", type=float, default=1.0, help="pace: 1 as recorded, 10 ten times as fast")
-    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, /clock comes along; default: all")
-    parser.add_argument("--no-clock", action="store_true", help="leave /clock to somebody else")
+    parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, and the clock; default: all")
+    parser.add_argument("--no-clock", action="store_true", help="leave the clock to somebody else")
     parser.add_argument("--paused", action="store_true", help="begin paused: call /player/step or /player/resume")
     parser.add_argument("--delay", type=float, default=1.0, help="wall time (s) for listeners to find the player")
     options = parser.parse_args(words)
@@ -170,13 +178,11 @@ def main(args: Sequence[str] | None = None) -> int:
         if not 0.0 <= options.delay < math.inf:
             raise ParameterError(f"delay = {options.delay}: expected a finite number (seconds), not below zero")
         bag = Bag(options.bag)
-        topics = dict.fromkeys(options.topics or bag.topics)
-        for topic in topics:
-            bag.track(topic)
-        if not options.no_clock and CLOCK in bag.topics:
-            topics[CLOCK] = None
+        topics = {bag.track(topic).topic: None for topic in options.topics or bag.topics}
+        if not options.no_clock and CLOCK in bag.roles:
+            topics[bag.roles[CLOCK]] = None
         if options.no_clock:
-            topics.pop(CLOCK, None)
+            topics.pop(bag.name_of(CLOCK), None)
         return PlayerNode(bag, list(topics), options.rate, options.paused, options.delay)
 
     return run_node(build, "player", args)

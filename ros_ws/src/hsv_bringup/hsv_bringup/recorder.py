@@ -9,12 +9,14 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from hsv_msgs.msg import RecorderProgress, Run
+from hsv_msgs.msg import RecorderProgress, Run, VehicleState
+from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
-from hsv.graph.description import OTHER_TOPICS, TOPICS
+from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS
 from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
+from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
 from hsv_node.lockstep import PeerNode
@@ -27,16 +29,15 @@ CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
 
 _STAMP = struct.Struct("<iI")
-_STATUS = 100
-"""Where VehicleState carries its status; what follows pads the message to a multiple of four bytes."""
-_ORDER = {topic: index for index, topic in enumerate(TOPICS)}
+_FRAME_LENGTH = slice(12, 16)
+"""Where a message with a header carries the length of its frame_id, on which the places of all that follows depend."""
 
 
 class RecorderNode(PeerNode):
     """Writes the messages of a step in a fixed order once all are there, so that equal runs give equal bags."""
 
     def __init__(self) -> None:
-        super().__init__("recorder")
+        super().__init__(RECORDER, "bag")
         values = declare(self, RECORDER_PARAMETERS)
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
         directory = Path(values["bag.directory"] or f"bags/run_{utc}")
@@ -50,22 +51,27 @@ class RecorderNode(PeerNode):
             if not path.is_file():
                 raise ParameterError(f"parameter bag.attachments = {str(path)!r}: expected an existing file")
         custom_data = dict(pair.split("=", 1) for pair in values["bag.custom_data"] if "=" in pair)
-        self.bag = BagWriter(directory, custom_data=custom_data)
+        self._names = {topic: self.resolve_topic_name(topic) for topic in (TOPICS | OTHER_TOPICS)}
+        self.bag = BagWriter(directory, custom_data=custom_data | naming(self._names, self.get_namespace()))
         for path in attachments:
             media_type = mimetypes.guess_type(path.name)[0] or "text/plain"
             self.bag.attach(path.name, media_type, path.read_bytes())
         for topic, kind in (TOPICS | OTHER_TOPICS).items():
-            latched = topic in ("/hsv/run", "/hsv/ready")
+            latched = topic in LATCHED_TOPICS
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
-            self.bag.add_topic(Topic(topic, kind, definition(kind), type_hash(kind), qos))
-        for topic in TOPICS:
-            self.create_step_subscription(topic, partial(self._on_step_message, topic), raw=True)
+            self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
+        self._order = tuple(self._names[topic] for topic in TOPICS)
+        self._state_name = self._names[STATE]
+        self._status_at: dict[bytes, int] = {}
+        """Where the state carries its status, by the length of its frame_id."""
+        for topic, name in zip(TOPICS, self._order, strict=True):
+            self.create_step_subscription(topic, partial(self._on_step_message, name), raw=True)
         for topic, kind in OTHER_TOPICS.items():
-            profile = LATCHED if topic.startswith("/hsv/") else STEP
-            callback: Callable[[bytes], None] = partial(self._on_other_message, topic)
+            profile = LATCHED if topic in LATCHED_TOPICS else STEP
+            callback: Callable[[bytes], None] = partial(self._on_other_message, self._names[topic])
             self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
         self._progress_message = RecorderProgress()
-        self._progress = self.create_publisher(RecorderProgress, "/hsv/recorder_progress", STEP)
+        self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
         self.get_logger().info(f"recording to {directory}")
 
     def start_run(self, run: Run) -> None:
@@ -73,7 +79,7 @@ class RecorderNode(PeerNode):
         if self._complete >= 0:
             self.get_logger().fatal(
                 "a new run was announced: expected a recorder of its own for every run, "
-                "and a ROS_DOMAIN_ID of its own for each that flies at the same time"
+                "and a ROS_DOMAIN_ID or a namespace of its own for each that flies at the same time"
             )
             self.finish(1)
         self._last_step = run.last_step
@@ -85,25 +91,27 @@ class RecorderNode(PeerNode):
         stamp = seconds * 1_000_000_000 + nanoseconds
         step = self._pending.setdefault(stamp, {})
         step[topic] = data
-        if len(step) == len(_ORDER):
+        if len(step) == len(self._order):
             self._write_step(stamp)
 
     def _write_step(self, stamp: int) -> None:
         messages = self._pending.pop(stamp)
-        for topic in _ORDER:
+        for topic in self._order:
             self.bag.write(topic, stamp, messages[topic])
         self._now = stamp
         self._complete = round(stamp / self._nanoseconds_per_step)
-        final = self._complete >= self._last_step or self._is_last(messages["/hsv/state"])
+        final = self._complete >= self._last_step or self._is_last(messages[self._state_name])
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
             # What is confirmed is on its way to the disk, whatever happens to this process.
             self.bag.flush()
             self._progress_message.step = self._complete
             self._progress.publish(self._progress_message)
 
-    @staticmethod
-    def _is_last(state: bytes) -> bool:
-        return state[_STATUS] != 0
+    def _is_last(self, state: bytes) -> bool:
+        length = state[_FRAME_LENGTH]
+        if length not in self._status_at:
+            self._status_at[length] = _status_place(state)
+        return state[self._status_at[length]] != 0
 
     def _on_other_message(self, topic: str, data: bytes) -> None:
         self.bag.write(topic, self._now, data)
@@ -111,9 +119,18 @@ class RecorderNode(PeerNode):
     def close(self) -> None:
         """Write what has come of an unfinished step, and finish the bag."""
         for stamp in sorted(self._pending):
-            for topic in sorted(self._pending[stamp], key=_ORDER.__getitem__):
+            for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])
         self.bag.close()
+
+
+def _status_place(state: bytes) -> int:
+    """Return the offset at which a VehicleState as long as ``state`` carries its status."""
+    message = deserialize_message(state, VehicleState)
+    serialized = []
+    for message.status in (0, 255):
+        serialized.append(serialize_message(message))
+    return next(place for place, (a, b) in enumerate(zip(*serialized, strict=True)) if a != b)
 
 
 def main(args: Sequence[str] | None = None) -> int:

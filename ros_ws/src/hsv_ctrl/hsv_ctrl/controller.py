@@ -6,28 +6,29 @@ from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeSta
 
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
+from hsv.graph.description import COMMAND, FILTERED_STATE, NOMINAL, TUBE_STATUS, NodeDescription
 from hsv.graph.exchange import control, fill_tube_status
 from hsv_node.lockstep import PeerNode
 
 
 class ControllerNode(PeerNode):
-    """Turns /hsv/filtered_state and /hsv/nominal into /hsv/command and /hsv/tube_status."""
+    """Turns filtered and nominal state into the command and the status of the tube."""
 
     law: TubeLaw | RobustMpc
     """Set by the node."""
     follows_nominal = True
     """Whether the nominal input is a part of the command."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, role: NodeDescription) -> None:
+        super().__init__(role, "tube")
         self._state: FilteredState | None = None
         self._nominal: NominalState | None = None
         self._outside = False
         self._command_message, self._status_message = ControlInput(), TubeStatus()
-        self._command = self.create_step_publisher("/hsv/command")
-        self._status = self.create_step_publisher("/hsv/tube_status")
-        self.create_step_subscription("/hsv/filtered_state", self._on_state)
-        self.create_step_subscription("/hsv/nominal", self._on_nominal)
+        self._command = self.create_step_publisher(COMMAND)
+        self._status = self.create_step_publisher(TUBE_STATUS)
+        self.create_step_subscription(FILTERED_STATE, self._on_state)
+        self.create_step_subscription(NOMINAL, self._on_nominal)
 
     def start_run(self, run: Run) -> None:
         """Forget the last messages of the run before."""

@@ -8,6 +8,7 @@ from hsv_msgs.msg import NominalState, Run, VehicleState
 
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS, NominalTrajectory
+from hsv.graph.description import NOMINAL, NOMINAL_TRAJECTORY, STATE
 from hsv.graph.exchange import plan_nominal
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.step_times import StepTimes
@@ -16,15 +17,15 @@ from hsv_node.main import run_node
 
 
 class NominalTrajectoryNode(PeerNode):
-    """Turns /hsv/state into /hsv/nominal."""
+    """Turns the state into reference and nominal state."""
 
     def __init__(self) -> None:
-        super().__init__("nominal_trajectory")
+        super().__init__(NOMINAL_TRAJECTORY, "trajectory")
         self.trajectory = NominalTrajectory.from_parameters(*declare_design(self, NOMINAL_PARAMETERS))
         self._times, self._failed = StepTimes(), False
         self._message = NominalState()
-        self._nominal = self.create_step_publisher("/hsv/nominal")
-        self.create_step_subscription("/hsv/state", self._on_state)
+        self._nominal = self.create_step_publisher(NOMINAL)
+        self.create_step_subscription(STATE, self._on_state)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""

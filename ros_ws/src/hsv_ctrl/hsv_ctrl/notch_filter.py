@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from hsv_msgs.msg import FilteredState, Run, VehicleState
 
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
+from hsv.graph.description import FILTERED_STATE, NOTCH_FILTER, STATE
 from hsv.graph.exchange import filter_state
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
@@ -14,14 +15,14 @@ from hsv_node.parameters import declare
 
 
 class NotchFilterNode(PeerNode):
-    """Turns /hsv/state into /hsv/filtered_state."""
+    """Turns the state into the filtered state."""
 
     def __init__(self) -> None:
-        super().__init__("notch_filter")
+        super().__init__(NOTCH_FILTER, "filter")
         self.filter = NotchFilter.from_parameters(declare(self, NOTCH_PARAMETERS))
         self._message = FilteredState()
-        self._filtered = self.create_step_publisher("/hsv/filtered_state")
-        self.create_step_subscription("/hsv/state", self._on_state)
+        self._filtered = self.create_step_publisher(FILTERED_STATE)
+        self.create_step_subscription(STATE, self._on_state)
 
     def start_run(self, run: Run) -> None:
         """Start from rest."""

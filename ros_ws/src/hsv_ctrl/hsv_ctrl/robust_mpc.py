@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
+from hsv.graph.description import ROBUST_MPC
 from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
 from hsv_node.main import run_node
@@ -16,7 +17,7 @@ class RobustMpcNode(ControllerNode):
     follows_nominal = False
 
     def __init__(self) -> None:
-        super().__init__("robust_mpc")
+        super().__init__(ROBUST_MPC)
         self.law = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
 
 

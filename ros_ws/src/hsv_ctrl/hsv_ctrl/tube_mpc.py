@@ -12,6 +12,7 @@ from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
 from hsv.errors import ParameterError
+from hsv.graph.description import TUBE_MPC
 from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
 from hsv_node.main import run_node
@@ -21,7 +22,7 @@ class TubeMpcNode(ControllerNode):
     """Feedback about the nominal trajectory (paper eq. 36); refuses a design that fails its quick claims."""
 
     def __init__(self) -> None:
-        super().__init__("tube_mpc")
+        super().__init__(TUBE_MPC)
         values, design = declare_design(self, (*TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
         if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)

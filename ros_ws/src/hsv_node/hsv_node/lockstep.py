@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+import socket
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run
+from rclpy.node import NodeNameNonExistentError
 
+from hsv.errors import RunError
 from hsv.graph import description
+from hsv.graph.description import NodeDescription
+from hsv.graph.exclusive import claim_topic
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.process import ProcessNode
 from hsv_node.qos import LATCHED, STEP
 
-SAY_AFTER = 2.0
-"""Seconds of waiting for peers before this is said, and between saying it again."""
+FIRST_SAID_AFTER = 2.0
+"""Seconds of waiting for peers before this is said."""
+
+SAID_EVERY = 10.0
+"""Seconds between saying the same thing again."""
 
 LINK_LOOK = 0.05
 """Seconds between looks at the links before they stand; each takes a millisecond from those that still start."""
@@ -27,18 +35,62 @@ WARN_AFTER = 10.0
 
 
 class LockstepNode(ProcessNode):
-    """A node of the graph description that reacts to the messages of a step and never to timers."""
+    """A node of the graph description that reacts to the messages of a step and never to timers.
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    Its peers are known by what they publish, not by their names, which may be remapped as those of the topics may.
+
+    Raises:
+        RunError: Another node of this machine publishes its topics in the same domain and namespace.
+    """
+
+    def __init__(self, role: NodeDescription, task: str = "") -> None:
+        """Join the graph.
+
+        Args:
+            role: What the node is in the graph.
+            task: What its diagnostics tell of, in a word or two.
+        """
+        super().__init__(role.name)
+        self.role, self._task = role, task
+        self._claims: list[socket.socket] = []
+        for topic in role.own_topics:
+            self.claim(topic)
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", STEP)
+        self._diagnostics = self.create_publisher(DiagnosticArray, description.DIAGNOSTICS, STEP)
         self._diagnosed_second = -1
         self._made = time.monotonic()
-        self._says_next = self._made + SAY_AFTER
+        self._says_next = self._made + FIRST_SAID_AFTER
+        self._foreign = 0
+        self._foreign_said = -SAID_EVERY
+        self._links: dict[str, list[NodeDescription]] = {}
+        if role.known_by:
+            for topic, peer in description.links(role, self.controller, self.recorded):
+                self._links.setdefault(topic, []).append(peer)
+
+    def destroy_node(self) -> None:
+        """Leave the graph, and its topics to another."""
+        super().destroy_node()
+        for held in self._claims:
+            held.close()
+
+    def claim(self, topic: str) -> None:
+        """Keep a topic to this node.
+
+        Raises:
+            RunError: Another node of this machine has it. Nothing was published yet that could disturb that one.
+        """
+        name, domain = self.resolve_topic_name(topic), self.context.get_domain_id()
+        held = claim_topic(domain, name)
+        if held is None:
+            self.destroy_node()
+            raise RunError(
+                f"another node publishes {name} in ROS domain {domain}: expected one {self.role.name} a domain and "
+                "namespace (ROS_DOMAIN_ID, -r __ns:=)"
+            )
+        self._claims.append(held)
 
     def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe a step topic of the graph description."""
@@ -50,33 +102,64 @@ class LockstepNode(ProcessNode):
         self._outputs[topic] = self.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
         return self._outputs[topic]
 
+    def links_are_counted(self) -> bool:
+        """Tell whether as many are matched as there are links, which costs next to nothing; not who they are."""
+        return all(self._matched(topic) >= len(roles) for topic, roles in self._links.items())
+
     def missing_links(self) -> list[str]:
         """Return what this node still waits for, e.g. ``"tube_mpc (/hsv/nominal)"``; empty when all is matched."""
         missing = []
-        expected: dict[str, int] = {}
-        for topic, peer in description.links(self.get_name(), self.controller, self.recorded):
-            expected[topic] = expected.get(topic, 0) + 1
+        roles_of: dict[tuple[str, str], set[str]] = {}
+        for topic, roles in self._links.items():
             if topic in self._outputs:
-                seen = self.get_subscriptions_info_by_topic(topic)
-                matched = self._outputs[topic].get_subscription_count()
+                seen, name = self.get_subscriptions_info_by_topic(topic), self._outputs[topic].topic_name
             else:
-                seen = self.get_publishers_info_by_topic(topic)
-                matched = self._inputs[topic].get_publisher_count()
-            # Names say who is there, counts that the link itself stands: both are needed before the first message.
-            if peer not in (endpoint.node_name for endpoint in seen) or matched < expected[topic]:
-                missing.append(f"{peer} ({topic})")
+                seen, name = self.get_publishers_info_by_topic(topic), self._inputs[topic].topic_name
+            there: set[str] = set()
+            for node in {(endpoint.node_name, endpoint.node_namespace) for endpoint in seen}:
+                if node not in roles_of:
+                    roles_of[node] = self._published_types(*node)
+                there |= roles_of[node]
+            absent = [role for role in roles if role.known_by not in there]
+            # Types say who is there, counts that the link itself stands: both are needed before the first message.
+            absent = absent or roles[self._matched(topic) :]
+            missing += [f"{role.name} ({name})" for role in absent]
         return missing
 
-    def say_waiting(self, missing: Sequence[str], decides: bool = False) -> None:
+    def node_in_role(self, role: NodeDescription) -> str | None:
+        """Return the full name of the node of this namespace that plays ``role``, None if there is none."""
+        for name, namespace in self.get_node_names_and_namespaces():
+            if namespace == self.get_namespace() and role.known_by in self._published_types(name, namespace):
+                return f"{namespace.rstrip('/')}/{name}"
+        return None
+
+    def say_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
         """Log now and then for whom this node waits; in the end as a warning if its waiting ``decides`` the start."""
         now = time.monotonic()
-        if missing and now > self._says_next:
-            self._says_next = now + SAY_AFTER
-            words = "waiting for " + ", ".join(missing)
-            if decides and now - self._made > WARN_AFTER:
-                self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
-            else:
-                self.get_logger().info(words)
+        if now < self._says_next:
+            return
+        self._says_next = now + SAID_EVERY
+        words = "waiting for " + ", ".join(missing())
+        if decides and now - self._made > WARN_AFTER:
+            self.get_logger().warning(f"slow start, for {now - self._made:.0f} s {words}")
+        else:
+            self.get_logger().info(words)
+
+    def say_foreign(self, topic: str, step: int, expected: int) -> None:
+        """Log now and then that messages come which nobody of this graph should send."""
+        self._foreign += 1
+        now = time.monotonic()
+        if now < self._foreign_said + SAID_EVERY:
+            return
+        self._foreign_said = now
+        publishers = sorted(
+            f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+            for endpoint in self.get_publishers_info_by_topic(topic)
+        )
+        self.get_logger().error(
+            f"{self._inputs[topic].topic_name} of step {step}: expected {expected}, ignored ({self._foreign} so far; "
+            f"published by {', '.join(publishers) or 'a node that is gone'})"
+        )
 
     def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""
@@ -85,7 +168,7 @@ class LockstepNode(ProcessNode):
         self._diagnosed_second = step_stamp.sec
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
-            name=self.get_name(),
+            name=f"{self.get_name()}: {self._task}",
             message=summary,
             hardware_id="hsv",
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
@@ -94,16 +177,30 @@ class LockstepNode(ProcessNode):
         message.header.stamp = step_stamp
         self._diagnostics.publish(message)
 
+    def _matched(self, topic: str) -> int:
+        if topic in self._outputs:
+            return int(self._outputs[topic].get_subscription_count())
+        return int(self._inputs[topic].get_publisher_count())
+
+    def _published_types(self, name: str, namespace: str) -> set[str]:
+        if not namespace.startswith("/"):
+            return set()  # an endpoint whose node is not known yet
+        try:
+            published = self.get_publisher_names_and_types_by_node(name, namespace)
+        except NodeNameNonExistentError:
+            return set()  # it is just leaving
+        return {kind for _, kinds in published for kind in kinds}
+
 
 class PeerNode(LockstepNode):
     """A node other than the plant: it announces itself ready to every run that the plant announces."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, role: NodeDescription, task: str = "") -> None:
+        super().__init__(role, task)
         self._run: Run | None = None
         self._announced = False
-        self._ready = self.create_publisher(Ready, "/hsv/ready", LATCHED)
-        self.create_subscription(Run, "/hsv/run", self._on_run, LATCHED)
+        self._ready = self.create_publisher(Ready, description.READY, LATCHED)
+        self._runs = self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
 
     def start_run(self, run: Run) -> None:
         """Forget the run before; overridden by every node."""
@@ -112,12 +209,11 @@ class PeerNode(LockstepNode):
         """Announce this node as ready as soon as all its links are matched; until then say for whom it waits."""
         if self._announced:
             return
-        missing = self.missing_links()
-        if self._run is not None and not missing:
+        if self._run is not None and self.links_are_counted() and not self.missing_links():
             self._announced = True
-            self._ready.publish(Ready(node=self.get_name(), run_id=self._run.run_id))
+            self._ready.publish(Ready(node=self.role.name, run_id=self._run.run_id))
         else:
-            self.say_waiting(missing or ["plant (/hsv/run)"])
+            self.say_waiting(lambda: self.missing_links() or [f"plant ({self._runs.topic_name})"])
 
     def wait_timeout(self) -> float:
         """Look at the links more often until they stand."""

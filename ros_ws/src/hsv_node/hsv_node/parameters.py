@@ -6,9 +6,10 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter
@@ -44,6 +45,23 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
 def given(node: Node, name: str) -> bool:
     """Return whether the parameter ``name`` was given to ``node`` at its start, in a file or on the command line."""
     return name in node._parameter_overrides
+
+
+def refuse_sim_time(node: Node) -> None:
+    """Keep a node that makes the clock from going by it.
+
+    Raises:
+        ParameterError: It was given ``use_sim_time``.
+    """
+    refusal = f"parameter use_sim_time = True: expected false for {node.get_name()}, which makes the clock itself"
+    if node.get_parameter("use_sim_time").value:
+        raise ParameterError(refusal)
+
+    def check(parameters: list[RosParameter]) -> SetParametersResult:
+        given = any(parameter.name == "use_sim_time" and parameter.value for parameter in parameters)
+        return SetParametersResult(successful=not given, reason=refusal if given else "")
+
+    node.add_on_set_parameters_callback(check)
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:

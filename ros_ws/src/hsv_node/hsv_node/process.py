@@ -8,8 +8,8 @@ from rclpy.node import Node
 class ProcessNode(Node):
     """A node with an exit code, and with something to do between messages."""
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, namespace: str | None = None) -> None:
+        super().__init__(name, namespace=namespace)
         self.exit_code: int | None = None
         """Set when the node wants to end, to the exit code of the process."""
 

@@ -10,6 +10,7 @@ from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError
 from hsv.faults.actuator import FAULT_PARAMETERS, Fault, FaultInjector
+from hsv.graph.description import ACTUATOR, CLEAR_FAULT, COMMAND, FAULT_INJECTOR, FAULT_STATUS, INJECT_FAULT
 from hsv.graph.exchange import actuate, fill_fault_status
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
@@ -17,17 +18,17 @@ from hsv_node.parameters import declare
 
 
 class FaultInjectorNode(PeerNode):
-    """Turns /hsv/command into /hsv/actuator, and says on /hsv/fault_status which faults act."""
+    """Turns the command into that of the actuators, and says which faults act."""
 
     def __init__(self) -> None:
-        super().__init__("fault_injector")
+        super().__init__(FAULT_INJECTOR, "faults")
         self.injector = FaultInjector.from_parameters(declare(self, FAULT_PARAMETERS))
         self._actuator_message, self._status_message = ControlInput(), FaultStatus()
-        self._actuator = self.create_step_publisher("/hsv/actuator")
-        self._status = self.create_step_publisher("/hsv/fault_status")
-        self.create_step_subscription("/hsv/command", self._on_command)
-        self.create_service(InjectFault, "/hsv/inject_fault", self._inject)
-        self.create_service(ClearFault, "/hsv/clear_fault", self._clear)
+        self._actuator = self.create_step_publisher(ACTUATOR)
+        self._status = self.create_step_publisher(FAULT_STATUS)
+        self.create_step_subscription(COMMAND, self._on_command)
+        self.create_service(InjectFault, INJECT_FAULT, self._inject)
+        self.create_service(ClearFault, CLEAR_FAULT, self._clear)
 
     def start_run(self, run: Run) -> None:
         """Return to the scheduled faults."""

@@ -10,14 +10,27 @@ import numpy as np
 from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
 from rosgraph_msgs.msg import Clock
 
-from hsv.graph.description import EXIT_DIVERGED, peers
+from hsv.graph.description import (
+    ACTUATOR,
+    CLOCK,
+    EXIT_DIVERGED,
+    FAULT_INJECTOR,
+    FORCES,
+    PLANT,
+    READY,
+    RECORDER,
+    RECORDER_PROGRESS,
+    RUN,
+    STATE,
+    peers,
+)
 from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
 from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
 from hsv_node.lockstep import LINK_LOOK, LockstepNode
 from hsv_node.main import run_node
-from hsv_node.parameters import declare
+from hsv_node.parameters import declare, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
 
@@ -26,24 +39,25 @@ MAX_AHEAD = 100
 
 
 class PlantNode(LockstepNode):
-    """Publishes /hsv/state, /hsv/forces and /clock; one step per message on /hsv/actuator."""
+    """Publishes state, forces and clock; one step per message of the actuators."""
 
     def __init__(self) -> None:
-        super().__init__("plant")
+        super().__init__(PLANT, "flight")
+        refuse_sim_time(self)
         self.values = declare(self, (*PLANT_PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
-        self._peers = peers("plant", self.controller, self.recorded)
+        self._peers = peers(PLANT, self.controller, self.recorded)
         self._ready: set[str] = set()
         self._state_message, self._forces_message = VehicleState(), VehicleForces()
         self._clock_message = Clock()
-        self._state_publisher = self.create_step_publisher("/hsv/state")
-        self._clock_publisher = self.create_step_publisher("/clock")
-        self._forces_publisher = self.create_step_publisher("/hsv/forces")
-        self.create_step_subscription("/hsv/actuator", self._on_actuator)
-        self.create_subscription(Ready, "/hsv/ready", self._on_ready, LATCHED)
-        self.create_subscription(RecorderProgress, "/hsv/recorder_progress", self._on_progress, STEP)
+        self._state_publisher = self.create_step_publisher(STATE)
+        self._clock_publisher = self.create_step_publisher(CLOCK)
+        self._forces_publisher = self.create_step_publisher(FORCES)
+        self.create_step_subscription(ACTUATOR, self._on_actuator)
+        self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
+        self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
         self._run = Run(run_id=uuid.uuid4().hex, period=self.plant.period, last_step=self.plant.steps)
-        self._announcer = self.create_publisher(Run, "/hsv/run", LATCHED)
+        self._announcer = self.create_publisher(Run, RUN, LATCHED)
         self._announcer.publish(self._run)
         self._result = self.plant.reset()
         self._started = False
@@ -66,7 +80,7 @@ class PlantNode(LockstepNode):
 
     def _on_actuator(self, message: ControlInput) -> None:
         if message.step != self._result.step:
-            self.get_logger().error(f"/hsv/actuator of step {message.step}: expected {self._result.step}, ignored")
+            self.say_foreign(ACTUATOR, message.step, self._result.step)
             return
         self._messages += 1
         if self._result.status is FlightStatus.RUNNING:
@@ -129,26 +143,37 @@ class PlantNode(LockstepNode):
         return 128 + signal_number
 
     def _try_start(self) -> None:
-        missing = [f"{peer} (/hsv/ready)" for peer in self._peers if peer not in self._ready] or self.missing_links()
-        if not missing:
+        if self._is_ready() and self.links_are_counted() and not self.missing_links():
             self._started = True
             self._begun = time.monotonic()
             self._standstill = Standstill()
             self._publish()
             return
-        self.say_waiting(missing, decides=True)
+        self.say_waiting(self._missing, decides=True)
         limit = self.values["start_timeout"]
         if limit and time.monotonic() - self._begun > limit:
-            self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(missing))
+            self.get_logger().fatal(f"no start within {limit:g} s: still waiting for " + ", ".join(self._missing()))
             self.finish(1)
+
+    def _is_ready(self) -> bool:
+        return all(peer.name in self._ready for peer in self._peers)
+
+    def _missing(self) -> list[str]:
+        """Return what the start waits for."""
+        unready = [peer.name for peer in self._peers if peer.name not in self._ready]
+        return [f"{name} ({self._readies.topic_name})" for name in unready] or self.missing_links()
 
     def _give_up(self, waited: float) -> None:
         step = self._result.step
         behind_recorder = self._flown or not self._room()
-        what = "/hsv/recorder_progress (from recorder)" if behind_recorder else "/hsv/actuator (from fault_injector)"
+        source, topic = (
+            (RECORDER, self._confirmations.topic_name)
+            if behind_recorder
+            else (FAULT_INJECTOR, self.resolve_topic_name(ACTUATOR))
+        )
         silent = unresponsive(self, self._peers)
         blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
-        self.get_logger().fatal(f"step {step}: no {what} for {waited:.1f} s; {blame}")
+        self.get_logger().fatal(f"step {step}: no {topic} (from {source.name}) for {waited:.1f} s; {blame}")
         self.finish(1)
 
     def _land(self) -> None:

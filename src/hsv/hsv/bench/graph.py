@@ -10,7 +10,7 @@ from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
 from hsv.graph.description import COMPOSED
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.preparation import prepare
+from hsv.graph.preparation import parameter_yaml, prepare
 
 _PERIOD = 0.02
 
@@ -25,7 +25,9 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         prepared = prepare("case1", bag=Path(folder, "bag"))
         nodes = (COMPOSED,) if composed else prepared.nodes
-        arguments = [*parameter_arguments(prepared.parameter_files), "-p", f"duration:={float(duration)}"]
+        shortened = Path(folder, "duration.yaml")
+        shortened.write_text(parameter_yaml({"duration": float(duration)}), encoding="utf-8")
+        arguments = parameter_arguments([*prepared.parameter_files, shortened])
 
         def on_step(step: int) -> None:
             times[step] = time.perf_counter()

@@ -9,10 +9,11 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from hsv.bench.figure import Figure, interleaved
+from hsv.graph.description import CLOCK, COMMAND, NOMINAL, STATE, TUBE_STATUS
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
 
-_SIZES = {"/clock": 12, "/hsv/state": 104, "/hsv/tube_status": 400, "/hsv/nominal": 240, "/hsv/command": 40}
+_SIZES = {CLOCK: 12, STATE: 104, TUBE_STATUS: 400, NOMINAL: 240, COMMAND: 40}
 """Topics and bytes a message, about those of a step."""
 
 _STEPS = 4000

@@ -17,6 +17,7 @@ from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
 from hsv.errors import CampaignError
+from hsv.graph.description import TUBE_STATUS
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def over_dds(
     repeated = pilot.outcome(replace(data, time=np.arange(len(data.time)) * pilot.period))
     if repeated["tube_level"] is not None:
         # What the controller itself published, not what is computed from its messages.
-        repeated["tube_level"] = float(np.max(recorded.columns("/hsv/tube_status")["level"]))
+        repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
     return Repetition(flight, _outcome(row), repeated, bag)
 
 

@@ -36,7 +36,7 @@ def diff(
         raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
     bags = Bag(first), Bag(second)
     # What both lack is no difference.
-    topics = [topic for topic in TOPICS if any(topic in bag.topics for bag in bags)]
+    topics = [topic for topic in TOPICS if any(topic in bag.roles for bag in bags)]
     compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in topics]
     differences = [c.first for c in compared if c.first]
     earliest = min(differences, key=lambda d: d.time_ns, default=None)

@@ -39,6 +39,6 @@ def export(
     if out is None:
         home = opened.folder.absolute()
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
-    topics = topic or [name for name in TOPICS if name in opened.topics]
+    topics = topic or [name for name in TOPICS if name in opened.roles]
     print_written(tables.export(opened, topics, chosen[0], out), json)
     warn_of_shortcomings(opened)

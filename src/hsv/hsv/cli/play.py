@@ -14,10 +14,11 @@ def play(
     bag: BagArgument,
     rate: Annotated[float, typer.Option(help="Pace: 1 as recorded, 10 ten times as fast.")] = 1.0,
     topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, may be repeated; default: all.")] = None,
-    clock: Annotated[bool, typer.Option(help="Publish /clock.")] = True,
+    clock: Annotated[bool, typer.Option(help="Publish the clock.")] = True,
     paused: Annotated[
         bool, typer.Option("--paused", help="Begin paused; the services /player/step and /player/resume go on.")
     ] = False,
+    namespace: Annotated[str, typer.Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
     delay: Annotated[float, typer.Option(help="Wall time (s) for listeners to find the player.")] = 1.0,
 ) -> None:
     """Republish a bag over DDS, for a viewer or a node under test.
@@ -26,17 +27,18 @@ def play(
     """
     import os
 
-    from hsv.graph.description import PLAYER
+    from hsv.graph.description import PLAYER, checked_namespace
     from hsv.graph.launcher import executable
     from hsv.recording.reader import Bag
 
     warn_of_shortcomings(Bag(bag))
     path = str(executable(PLAYER))
     words = [path, str(bag), "--rate", str(rate), "--delay", str(delay)]
+    remapped = ["--ros-args", "-r", f"__ns:={checked_namespace(namespace)}"] if namespace else []
     if topic:
         words += ["--topics", *topic]
     if not clock:
         words.append("--no-clock")
     if paused:
         words.append("--paused")
-    os.execv(path, words)
+    os.execv(path, [*words, *remapped])

@@ -16,6 +16,10 @@ def run(
     real_time_factor: Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")] = 0.0,
     composed: Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")] = False,
     bag: Annotated[Path | None, typer.Option(help="Bag to write; default: bags/<scenario>_<UTC>.")] = None,
+    namespace: Annotated[
+        str,
+        typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain."),
+    ] = "/",
     step_timeout: Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")] = 10.0,
     report: Annotated[bool, typer.Option(help="Write the report into the bag's folder.")] = True,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
@@ -31,6 +35,7 @@ def run(
     from hsv.cli.progress import flight as flight_bar
     from hsv.cli.summary import report_flight
     from hsv.errors import QuantityError, RecordingError
+    from hsv.graph.description import checked_namespace
     from hsv.graph.flight import fly_graph
     from hsv.graph.launcher import WARNING
     from hsv.graph.preparation import prepare
@@ -42,6 +47,7 @@ def run(
         raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
     if not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
+    namespace = checked_namespace(namespace)
     prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout)
     loaded = prepared.scenario
     clock: dict[str, float] = {}
@@ -57,7 +63,7 @@ def run(
             clock["end"] = time.monotonic()
             show(number)
 
-        diverged = fly_graph(prepared, composed=composed, on_step=step, on_line=line)
+        diverged = fly_graph(prepared, composed=composed, namespace=namespace, on_step=step, on_line=line)
     recorded = Bag(prepared.bag)
     data = flight_data(recorded)
     extra = {"bag": str(prepared.bag)}

@@ -36,7 +36,7 @@ def view(
 
     from hsv.errors import RecordingError
     from hsv.recording.reader import Bag
-    from hsv.recording.viewers import VIEWERS
+    from hsv.recording.viewers import VIEWERS, layout_for
 
     opened = Bag(bag)
     if len(opened.files) != 1 or opened.path.suffix != ".mcap":
@@ -46,10 +46,12 @@ def view(
     mcap = opened.path.absolute()
     wanted = [VIEWERS[program]] if program else list(VIEWERS.values())
     for viewer in wanted:
-        command = viewer.command(mcap)
-        if command:
+        found = viewer.program()
+        if found:
+            made = layout_for(opened, viewer.layout) if viewer.layout else None
+            command = [found, *viewer.arguments(mcap, made)]
             subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
-            layout = str(viewer.layout) if viewer.layout else None
+            layout = str(made) if viewer.imports else None
             if json:
                 print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
             else:

@@ -1,30 +1,60 @@
-"""The graph of nodes, described once: ``hsv run``, the launch file, the nodes and the replay all read this."""
+"""The graph of nodes, described once: ``hsv run``, the launch file, the nodes and the replay all read this.
+
+Topics and nodes stand here by their role. What a topic of a running graph is called depends on the namespace and the
+remappings of the nodes, and so does what a node is called; a bag says which of its topics plays which role.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
+from hsv.errors import ParameterError
+
+CLOCK = "clock"
+STATE = "hsv/state"
+FORCES = "hsv/forces"
+FILTERED_STATE = "hsv/filtered_state"
+NOMINAL = "hsv/nominal"
+COMMAND = "hsv/command"
+TUBE_STATUS = "hsv/tube_status"
+ACTUATOR = "hsv/actuator"
+FAULT_STATUS = "hsv/fault_status"
+RUN = "hsv/run"
+READY = "hsv/ready"
+RECORDER_PROGRESS = "hsv/recorder_progress"
+DIAGNOSTICS = "diagnostics"
+ROSOUT = "/rosout"
+PARAMETER_EVENTS = "/parameter_events"
+INJECT_FAULT = "hsv/inject_fault"
+CLEAR_FAULT = "hsv/clear_fault"
+
 TOPICS = {
-    "/clock": "rosgraph_msgs/msg/Clock",
-    "/hsv/state": "hsv_msgs/msg/VehicleState",
-    "/hsv/forces": "hsv_msgs/msg/VehicleForces",
-    "/hsv/filtered_state": "hsv_msgs/msg/FilteredState",
-    "/hsv/nominal": "hsv_msgs/msg/NominalState",
-    "/hsv/command": "hsv_msgs/msg/ControlInput",
-    "/hsv/tube_status": "hsv_msgs/msg/TubeStatus",
-    "/hsv/actuator": "hsv_msgs/msg/ControlInput",
-    "/hsv/fault_status": "hsv_msgs/msg/FaultStatus",
+    CLOCK: "rosgraph_msgs/msg/Clock",
+    STATE: "hsv_msgs/msg/VehicleState",
+    FORCES: "hsv_msgs/msg/VehicleForces",
+    FILTERED_STATE: "hsv_msgs/msg/FilteredState",
+    NOMINAL: "hsv_msgs/msg/NominalState",
+    COMMAND: "hsv_msgs/msg/ControlInput",
+    TUBE_STATUS: "hsv_msgs/msg/TubeStatus",
+    ACTUATOR: "hsv_msgs/msg/ControlInput",
+    FAULT_STATUS: "hsv_msgs/msg/FaultStatus",
 }
 """Topics with exactly one message a step, in the order in which a step is recorded."""
 
+LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready"}
+"""Announcements that late joiners receive."""
+
 OTHER_TOPICS = {
-    "/hsv/run": "hsv_msgs/msg/Run",
-    "/hsv/ready": "hsv_msgs/msg/Ready",
-    "/rosout": "rcl_interfaces/msg/Log",
-    "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
-    "/parameter_events": "rcl_interfaces/msg/ParameterEvent",
+    **LATCHED_TOPICS,
+    ROSOUT: "rcl_interfaces/msg/Log",
+    DIAGNOSTICS: "diagnostic_msgs/msg/DiagnosticArray",
+    PARAMETER_EVENTS: "rcl_interfaces/msg/ParameterEvent",
 }
-"""Topics beside those with one message a step; recorded at the simulated time at which they arrive."""
+"""Topics beside those with one message a step; recorded at the simulated time at which they arrive.
+
+Those with a leading slash are ROS's own: every node of a domain has them under this name, in whatever namespace it is.
+"""
 
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
@@ -32,26 +62,39 @@ EXIT_DIVERGED = 3
 
 @dataclass(frozen=True)
 class NodeDescription:
-    """A node: where its executable is and which step topics it publishes and subscribes."""
+    """A node by its role: where its executable is and which step topics it publishes and subscribes."""
 
     name: str
+    """The role, and the node's name unless it is remapped."""
     package: str
     executable: str
     publishes: tuple[str, ...]
     subscribes: tuple[str, ...]
+    known_by: str = ""
+    """Type of a message that only this role publishes: who does plays the role, whatever it and its topics are called.
+
+    Empty for what is not a node of the graph.
+    """
+
+    @property
+    def own_topics(self) -> tuple[str, ...]:
+        """Topics that no other node of the same graph may publish."""
+        return self.publishes or ((RECORDER_PROGRESS,) if self.known_by else ())
 
 
-RECORDER = NodeDescription("recorder", "hsv_bringup", "recorder", (), tuple(TOPICS))
-PLANT = NodeDescription("plant", "hsv_plant", "plant", ("/clock", "/hsv/state", "/hsv/forces"), ("/hsv/actuator",))
-NOTCH_FILTER = NodeDescription("notch_filter", "hsv_ctrl", "notch_filter", ("/hsv/filtered_state",), ("/hsv/state",))
+RECORDER = NodeDescription("recorder", "hsv_bringup", "recorder", (), tuple(TOPICS), "hsv_msgs/msg/RecorderProgress")
+PLANT = NodeDescription("plant", "hsv_plant", "plant", (CLOCK, STATE, FORCES), (ACTUATOR,), TOPICS[STATE])
+NOTCH_FILTER = NodeDescription(
+    "notch_filter", "hsv_ctrl", "notch_filter", (FILTERED_STATE,), (STATE,), TOPICS[FILTERED_STATE]
+)
 NOMINAL_TRAJECTORY = NodeDescription(
-    "nominal_trajectory", "hsv_ctrl", "nominal_trajectory", ("/hsv/nominal",), ("/hsv/state",)
+    "nominal_trajectory", "hsv_ctrl", "nominal_trajectory", (NOMINAL,), (STATE,), TOPICS[NOMINAL]
 )
 TUBE_MPC = NodeDescription(
-    "tube_mpc", "hsv_ctrl", "tube_mpc", ("/hsv/command", "/hsv/tube_status"), ("/hsv/filtered_state", "/hsv/nominal")
+    "tube_mpc", "hsv_ctrl", "tube_mpc", (COMMAND, TUBE_STATUS), (FILTERED_STATE, NOMINAL), TOPICS[TUBE_STATUS]
 )
 FAULT_INJECTOR = NodeDescription(
-    "fault_injector", "hsv_plant", "fault_injector", ("/hsv/actuator", "/hsv/fault_status"), ("/hsv/command",)
+    "fault_injector", "hsv_plant", "fault_injector", (ACTUATOR, FAULT_STATUS), (COMMAND,), TOPICS[FAULT_STATUS]
 )
 
 ROBUST_MPC = replace(TUBE_MPC, name="robust_mpc", executable="robust_mpc")
@@ -75,23 +118,46 @@ def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
     return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLERS[controller], FAULT_INJECTOR, PLANT)
 
 
-def peers(name: str, controller: str, recorded: bool) -> list[str]:
-    """Return the names of the other nodes, the recorder only if ``recorded``."""
-    return [n.name for n in graph(controller) if n.name != name and (recorded or n is not RECORDER)]
+def peers(me: NodeDescription, controller: str, recorded: bool) -> list[NodeDescription]:
+    """Return the other nodes of the graph that ``me`` flies in, the recorder only if ``recorded``."""
+    nodes = graph(me.name if me.name in CONTROLLERS else controller)
+    return [node for node in nodes if node is not me and (recorded or node is not RECORDER)]
 
 
-def links(name: str, controller: str, recorded: bool) -> list[tuple[str, str]]:
-    """Return the (topic, other node) pairs that node ``name`` must be matched with, the recorder's if ``recorded``."""
-    nodes = graph(name if name in CONTROLLERS else controller)
-    me = next(node for node in nodes if node.name == name)
+def links(me: NodeDescription, controller: str, recorded: bool) -> list[tuple[str, NodeDescription]]:
+    """Return the (topic, other node) pairs that ``me`` must be matched with, the recorder's if ``recorded``."""
     return [
-        (topic, other.name)
+        (topic, other)
         for topic in TOPICS
-        for other in nodes
-        if other is not me
-        and (recorded or RECORDER not in (me, other))
-        and (
-            (topic in me.publishes and topic in other.subscribes)
-            or (topic in me.subscribes and topic in other.publishes)
-        )
+        for other in peers(me, controller, recorded)
+        if topic in {*me.publishes} & {*other.subscribes} | {*me.subscribes} & {*other.publishes}
     ]
+
+
+ROOT = "/"
+"""The namespace of a graph that is not moved."""
+
+LONGEST_NAMESPACE = 200
+"""Characters; DDS takes some 250 for a whole topic or service, of which the longest name below takes its part."""
+
+
+def resolved(topic: str, namespace: str = ROOT) -> str:
+    """Return the full name that a topic or service has in ``namespace``, unless it is remapped."""
+    return topic if topic.startswith("/") else f"{namespace.rstrip('/')}/{topic}"
+
+
+def checked_namespace(text: str) -> str:
+    """Return a namespace as ROS 2 writes it, with its leading slash.
+
+    Raises:
+        ParameterError: It is none by the rules of ROS 2.
+    """
+    name = text if text.startswith("/") else f"/{text}"
+    if name != ROOT and not re.fullmatch(r"(/[A-Za-z_][A-Za-z0-9_]*)+", name):
+        raise ParameterError(
+            f"namespace = {text!r}: expected names of letters, digits and underscores that begin with no digit, "
+            "such as /veh1 or /lab/veh1"
+        )
+    if len(name) > LONGEST_NAMESPACE:
+        raise ParameterError(f"namespace of {len(name)} characters: expected at most {LONGEST_NAMESPACE}")
+    return name

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hsv.errors import RecordingError, RunError
-from hsv.graph.description import COMPOSED, EXIT_DIVERGED
+from hsv.graph.description import COMPOSED, EXIT_DIVERGED, ROOT
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
@@ -16,6 +16,7 @@ def fly_graph(
     prepared: PreparedRun,
     *,
     composed: bool = False,
+    namespace: str = ROOT,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
 ) -> bool:
@@ -24,6 +25,7 @@ def fly_graph(
     Args:
         prepared: What :func:`hsv.graph.preparation.prepare` returns.
         composed: All nodes in one process.
+        namespace: Namespace of all nodes, as :func:`hsv.graph.description.checked_namespace` returns it.
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
 
@@ -38,7 +40,7 @@ def fly_graph(
     code = 0
     try:
         arguments = parameter_arguments(prepared.parameter_files)
-        with Launcher(started, arguments, on_step, on_line, prepared.step_timeout) as launcher:
+        with Launcher(started, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
             code = launcher.wait()
     except RunError as error:
         failures.append(str(error))

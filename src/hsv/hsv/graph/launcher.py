@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hsv.errors import ParameterError, RunError
-from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, NodeDescription
+from hsv.errors import RunError
+from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, ROOT, NodeDescription, graph, resolved
+from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
 
 GRACE = 20.0
@@ -79,6 +80,7 @@ class Launcher:
         on_step: Callable[[int], None],
         on_line: Callable[[str, str], None],
         wait_timeout: float = 10.0,
+        namespace: str = ROOT,
     ) -> None:
         """Prepare to start processes.
 
@@ -88,9 +90,11 @@ class Launcher:
             on_step: Called with the steps that are reported.
             on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
             wait_timeout: For how long (s) a process may do nothing at all, where no other node would end the run.
+            namespace: Namespace of all nodes.
         """
         self._nodes = list(nodes)
-        self._arguments = list(arguments)
+        self._arguments = [*arguments, *(["-r", f"__ns:={namespace}"] if namespace != ROOT else [])]
+        self._namespace = namespace
         self._on_step = on_step
         self._on_line = on_line
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
@@ -99,7 +103,7 @@ class Launcher:
 
     def __enter__(self) -> Launcher:
         paths = [executable(node) for node in self._nodes]
-        self._domain = _domain_of_its_own()
+        self._claim = self._claim_namespace()
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
@@ -108,9 +112,29 @@ class Launcher:
             raise
         return self
 
+    def _claim_namespace(self) -> socket.socket:
+        """Return what keeps domain and namespace to this run, on this machine, for as long as it is open.
+
+        The nodes of two runs would take each other's messages, and both would be lost.
+        """
+        domain = ros_domain()
+        where = f"ROS_DOMAIN_ID={domain}{f' and namespace {self._namespace}' if self._namespace != ROOT else ''}"
+        held = claim_namespace(domain, self._namespace)
+        if held is None:
+            raise RunError(f"another run has {where}: expected a domain or a namespace of its own for every run")
+        nodes = graph() if COMPOSED in self._nodes else self._nodes
+        for node in nodes:
+            for topic in (resolved(name, self._namespace) for name in node.own_topics):
+                if is_published(domain, topic):
+                    held.close()
+                    raise RunError(
+                        f"a node with {where} publishes {topic} already: expected no other {node.name} there"
+                    )
+        return held
+
     def __exit__(self, *_: object) -> None:
         self.stop()
-        self._domain.close()
+        self._claim.close()
 
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
@@ -209,26 +233,6 @@ class Launcher:
 
 def _landed(process: _Process, code: int) -> bool:
     return process.description in _FLYING and code in (0, EXIT_DIVERGED)
-
-
-def _domain_of_its_own() -> socket.socket:
-    """Return what keeps the ROS domain to this run, on this machine, for as long as it is open.
-
-    The nodes of two runs would take each other's messages, and both would be lost.
-    """
-    text = os.environ.get("ROS_DOMAIN_ID") or "0"
-    try:
-        number = int(text)
-    except ValueError:
-        raise ParameterError(f"ROS_DOMAIN_ID={text!r}: expected a whole number") from None
-    name = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-    try:
-        # A name without a file: it is gone with this process, however that ends.
-        name.bind(f"\0hsv_domain_{number}")
-    except OSError:
-        name.close()
-        raise RunError(f"another run has ROS_DOMAIN_ID={number}: expected a domain of its own for every run") from None
-    return name
 
 
 def _die_with_parent() -> None:

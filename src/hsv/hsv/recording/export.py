@@ -30,7 +30,7 @@ class Format(StrEnum):
 
 
 def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[Path]:
-    """Write ``topics``; return the files written.
+    """Write ``topics``, by name or role; return the files written.
 
     CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
     ``elastic_rate[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
@@ -44,6 +44,7 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
             f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
         )
     npz = form is Format.npz
+    topics = [bag.name_of(topic) for topic in topics]
     lacking = "; ".join(shortcomings(bag))
     contents: dict[str, Any] = _arrays(bag, topics) if npz else {topic: _table(bag, topic) for topic in topics}
     try:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hsv.graph.description import ACTUATOR, COMMAND, FAULT_STATUS, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
 from hsv.recording.reader import Bag
 from hsv.recording.steps import cut_off, expected_stamps, joined
 from hsv.simulation.fingerprint import fingerprint
@@ -50,10 +51,8 @@ def flight_data(bag: Bag) -> FlightData:
     Raises:
         RecordingError: A topic is missing, or no step is complete.
     """
-    state, nominal, command, tube = joined(
-        bag, ("/hsv/state", "/hsv/nominal", "/hsv/command", "/hsv/tube_status")
-    ).values()
-    status = bag.columns("/hsv/fault_status")
+    state, nominal, command, tube = joined(bag, (STATE, NOMINAL, COMMAND, TUBE_STATUS)).values()
+    status = bag.columns(FAULT_STATUS)
     acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
     return FlightData(
         time=state["header.stamp"] * 1e-9,
@@ -73,7 +72,7 @@ def flight_fingerprint(bag: Bag) -> str | None:
     Raises:
         RecordingError: A topic is missing, or no step is complete.
     """
-    topics = ("/hsv/state", "/hsv/filtered_state", "/hsv/nominal", "/hsv/command", "/hsv/actuator")
+    topics = (STATE, FILTERED_STATE, NOMINAL, COMMAND, ACTUATOR)
     state, filtered, nominal, command, actuator = joined(bag, topics).values()
     every = np.arange(len(state["step"]))
     if cut_off(bag) or len(every) < len(expected_stamps(bag)):

@@ -8,16 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.errors import HsvError, RecordingError
+from hsv.graph.description import FAULT_STATUS, STATE, TUBE_STATUS
 from hsv.recording.flight import flight_fingerprint
 from hsv.recording.reader import Bag
 from hsv.recording.shortcomings import shortcomings
 from hsv.recording.steps import complete_stamps, cut_off
 from hsv.simulation.fingerprint import as_published
 from hsv.simulation.scenario import Scenario, parse_scenario
-
-FAULT_STATUS = "/hsv/fault_status"
-STATE = "/hsv/state"
-TUBE_STATUS = "/hsv/tube_status"
 
 
 def describe(bag: Bag) -> dict[str, Any]:
@@ -51,10 +48,10 @@ def describe(bag: Bag) -> dict[str, Any]:
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
         ],
-        "ending": _ending(bag) if STATE in bag.topics else None,
-        "faults": _faults(bag) if FAULT_STATUS in bag.topics else None,
-        "saturation": _saturation(bag) if TUBE_STATUS in bag.topics else None,
-        "tube": _tube(bag) if TUBE_STATUS in bag.topics else None,
+        "ending": _ending(bag) if STATE in bag.roles else None,
+        "faults": _faults(bag) if FAULT_STATUS in bag.roles else None,
+        "saturation": _saturation(bag) if TUBE_STATUS in bag.roles else None,
+        "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
     }
 
 

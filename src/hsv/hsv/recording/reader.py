@@ -16,7 +16,7 @@ from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.graph.description import OTHER_TOPICS, TOPICS
+from hsv.graph.description import OTHER_TOPICS, ROOT, TOPICS, resolved
 from hsv.recording.columns import Columns
 from hsv.recording.files import find_files, read_file, read_message
 from hsv.recording.metadata import (
@@ -29,15 +29,16 @@ from hsv.recording.metadata import (
     parsed,
     read_metadata,
 )
+from hsv.recording.roles import namespace_of, roles
 from hsv.recording.scan import MESSAGE_HEADER, Damage, Scan, content
 from hsv.recording.topic import Qos
 from hsv.recording.track import Track
 from hsv.recording.typestore import message_types
 
-NAMESPACE = "/hsv/"
-"""A bag of this project has topics below this name."""
-
-_KNOWN = TOPICS | OTHER_TOPICS
+_OURS = "/hsv/"
+"""In the names of this project's topics, unless they are remapped."""
+_USUAL = {resolved(role): kind for role, kind in (TOPICS | OTHER_TOPICS).items()}
+"""Types of the topics of a graph by the names that they have unless they are moved or remapped."""
 _STAMP_START, _STAMP_END = 4, 12
 """Where the messages of a step carry their stamp: seconds and nanoseconds, of four bytes each."""
 _BIG_ENDIAN = b"\x00\x00"
@@ -86,6 +87,8 @@ class Bag:
     Times are simulated ones, in nanoseconds: of the step topics the stamp that every message begins with, whenever it
     was received; of the others that of the last step before them. Damage is skipped and told in :attr:`loss`.
 
+    A topic is asked for by its name in the bag, ``/veh1/hsv/state``, or by its role in the graph, ``hsv/state``.
+
     Parameters
     ----------
     path
@@ -114,6 +117,10 @@ class Bag:
         self.custom_data: dict[str, str] = {}
         self.distro = DISTRO
         """The distribution of ROS 2 that it was recorded with."""
+        self.roles: dict[str, str] = {}
+        """Names of the topics by their role in the graph, as :mod:`hsv.graph.description` has it."""
+        self.namespace = ROOT
+        """Namespace of the graph."""
         self._topics: dict[str, _Recorded] = {}
         self._columns: dict[str, Columns] = {}
         self._read()
@@ -132,6 +139,10 @@ class Bag:
             for name, recorded in self._topics.items()
         }
 
+    def name_of(self, role: str) -> str:
+        """Return the name of the topic that plays ``role``, or that it would have if it were in the bag."""
+        return self.roles.get(role) or resolved(role, self.namespace)
+
     @cached_property
     def span(self) -> tuple[int, int]:
         """First and last time in the bag in nanoseconds; zeros if it holds no message."""
@@ -146,9 +157,9 @@ class Bag:
         RecordingError
             If the topic is not in the bag, or a message of a step is too short to have a stamp.
         """
-        recorded = self._of(topic)
-        if topic in TOPICS:
-            return self._stamps(topic, recorded.messages)
+        recorded, name = self._of(topic), self.name_of(topic)
+        if name in self._step_topics:
+            return self._stamps(name, recorded.messages)
         log_times = np.array(recorded.log_times, np.int64)
         received, stamps = self._clock
         if np.array_equal(received, stamps):
@@ -174,9 +185,10 @@ class Bag:
         RecordingError
             If the topic is not in the bag or a message does not fit its definition.
         """
-        if topic not in self._columns:
-            self._columns[topic] = self.track(topic).columns()
-        return self._columns[topic]
+        name = self.name_of(topic)
+        if name not in self._columns:
+            self._columns[name] = self.track(topic).columns()
+        return self._columns[name]
 
     def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Yield time in nanoseconds and message of a topic, deserialized one by one.
@@ -196,10 +208,10 @@ class Bag:
         RecordingError
             If the topic is not in the bag.
         """
-        recorded = self._of(topic)
+        recorded, name = self._of(topic), self.name_of(topic)
         if (kind := recorded.schema.name) not in self.types.fielddefs:
-            raise RecordingError(f"{self.path}: topic {topic}: the definition of {kind} cannot be used")
-        return Track(topic, kind, self.types, self.times(topic).tolist(), recorded.messages, str(self.path))
+            raise RecordingError(f"{self.path}: topic {name}: the definition of {kind} cannot be used")
+        return Track(name, kind, self.types, self.times(topic).tolist(), recorded.messages, str(self.path))
 
     def text(self, name: str) -> str:
         """Return an attachment as text.
@@ -234,7 +246,9 @@ class Bag:
         ours: dict[str, str] = {}
         others: dict[str, str] = {}
         for topic, recorded in self._topics.items():
-            (ours if _is_ours(topic) else others)[recorded.schema.name] = self._text(recorded.schema)
+            (ours if _is_ours(topic) or topic in self.roles.values() else others)[recorded.schema.name] = self._text(
+                recorded.schema
+            )
         return message_types(list(ours.items()), str(self.path), list(others.items()))
 
     def _text(self, schema: Schema) -> str:
@@ -244,9 +258,10 @@ class Bag:
             raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
 
     def _of(self, topic: str) -> _Recorded:
-        if topic in self._topics:
-            return self._topics[topic]
-        raise RecordingError(f"{self.path}: no topic {topic}, only {', '.join(sorted(self.topics))}")
+        name = self.name_of(topic)
+        if name in self._topics:
+            return self._topics[name]
+        raise RecordingError(f"{self.path}: no topic {name}, only {', '.join(sorted(self.topics))}")
 
     def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
         """Return the stamps that the messages of a step topic begin with, right behind the header of the CDR."""
@@ -258,9 +273,13 @@ class Bag:
         return np.asarray(stamps["sec"].astype(np.int64) * 10**9 + stamps["nanosec"])
 
     @cached_property
+    def _step_topics(self) -> frozenset[str]:
+        return frozenset(name for role, name in self.roles.items() if role in TOPICS)
+
+    @cached_property
     def _clock(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Log times at which steps were received, ascending, and the latest stamp received until then."""
-        steps = [topic for topic in TOPICS if topic in self._topics]
+        steps = sorted(self._step_topics)
         received = np.concatenate([np.array([], np.int64), *(self._topics[topic].log_times for topic in steps)])
         stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
         order = np.argsort(received, kind="stable")
@@ -290,6 +309,9 @@ class Bag:
         self.loss.counted &= not self.loss.files
         self.custom_data = self.custom_data or custom_data(recorded_by)
         self.distro = str(recorded_by.get("ros_distro") or DISTRO)
+        kinds = {name: recorded.schema.name for name, recorded in self._topics.items()}
+        self.roles = roles(kinds, self.custom_data, str(self.path))
+        self.namespace = namespace_of(self.roles)
 
     def _read_file(self, scan: Scan) -> tuple[int, int, int, dict[str, Any]]:
         """Add what a file holds; return the messages read, those of unknown topics, attachments, rosbag2's metadata."""
@@ -359,7 +381,7 @@ class Bag:
             return
         if schema is None or not decodable:
             raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
-        if schema.name != (expected := _KNOWN.get(name, schema.name)):
+        if schema.name != (expected := _USUAL.get(name, schema.name)):
             raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
         first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
         if (schema.name, schema.data) != (first.name, first.data):
@@ -371,9 +393,9 @@ class Bag:
             raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
         if not self._topics and not self.complete:
             raise RecordingError(f"{self.path}: is cut off before its first messages")
-        if not any(topic.startswith(NAMESPACE) for topic in self._topics):
-            raise RecordingError(f"{self.path}: has no topic below {NAMESPACE}, expected a bag of this project")
+        if not any(_OURS in topic for topic in (*self._topics, *map(resolved, self.roles))):
+            raise RecordingError(f"{self.path}: has no topic below {_OURS}, expected a bag of this project")
 
 
 def _is_ours(topic: str) -> bool:
-    return topic in _KNOWN or topic.startswith(NAMESPACE)
+    return topic in _USUAL or _OURS in topic

@@ -18,7 +18,7 @@ def shortcomings(bag: Bag) -> list[str]:
         words.append(f"cut off after {bag.span[1] * 1e-9:.2f} s, hsv recover mends it")
     elif bag.loss:
         words.append("hsv recover makes a whole bag of the rest")
-    if missing := [topic for topic in TOPICS if topic not in bag.topics]:
+    if missing := [bag.name_of(topic) for topic in TOPICS if topic not in bag.roles]:
         words.append(f"no topic {', '.join(missing)}")
     try:
         words += irregularities(bag)

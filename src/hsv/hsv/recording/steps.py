@@ -8,12 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.errors import RecordingError
-from hsv.graph.description import TOPICS
+from hsv.graph.description import RUN, STATE, TOPICS
 from hsv.recording.columns import Columns
 from hsv.recording.reader import Bag
 from hsv.recording.recover import RECOVERED
-
-RUN, STATE = "/hsv/run", "/hsv/state"
 
 
 def cut_off(bag: Bag) -> bool:
@@ -57,7 +55,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
     if not announced:
         return found
     period, last = announced
-    state = bag.columns(STATE) if STATE in bag.topics else Columns()
+    state = bag.columns(STATE) if STATE in bag.roles else Columns()
     if {"status", "step"} <= state.keys() and len(ends := np.flatnonzero(state["status"])):
         last = int(state["step"][ends[0]])
     return np.union1d(np.round(np.arange(last + 1) * period * 1e9).astype(np.int64), found)
@@ -65,7 +63,7 @@ def expected_stamps(bag: Bag) -> NDArray[np.int64]:
 
 def _announced(bag: Bag) -> tuple[float, int] | None:
     """Return period and last step of the run as the plant announced it, None where it is not in the bag."""
-    columns = bag.columns(RUN) if RUN in bag.topics else Columns()
+    columns = bag.columns(RUN) if RUN in bag.roles else Columns()
     if not {"period", "last_step"} <= columns.keys() or not len(columns["period"]):
         return None
     return float(columns["period"][-1]), int(columns["last_step"][-1])
@@ -82,7 +80,7 @@ def _numbered(bag: Bag) -> tuple[float, int] | None:
 
 
 def _stamps(bag: Bag) -> dict[str, NDArray[np.int64]]:
-    return {topic: bag.times(topic) for topic in TOPICS if topic in bag.topics}
+    return {bag.name_of(topic): bag.times(topic) for topic in TOPICS if topic in bag.roles}
 
 
 def complete_stamps(bag: Bag) -> NDArray[np.int64]:

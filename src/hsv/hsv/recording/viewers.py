@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+
+from hsv.errors import RecordingError
+from hsv.graph.description import DIAGNOSTICS, TOPICS, resolved
+from hsv.recording.reader import Bag
 
 LAYOUTS = Path(str(files("hsv.recording").joinpath("layouts")))
 """Folder of the layouts."""
@@ -19,25 +24,50 @@ class Viewer:
     name: str
     programs: tuple[str, ...]
     """Names under which it may be installed."""
-    arguments: Callable[[Path], list[str]]
-    """From the MCAP file to the arguments of the program."""
-    layout: Path | None
-    """A layout to be imported in the program by hand; None where there is none or the arguments name it."""
+    arguments: Callable[[Path, Path | None], list[str]]
+    """From the MCAP file and the layout to the arguments of the program."""
+    layout: str
+    """File name of the layout; empty where there is none."""
+    imports: bool
+    """Whether the layout has to be imported in the program by hand."""
     source: str
     """Where to get it."""
 
-    def command(self, mcap: Path) -> list[str] | None:
-        """Return the command that opens ``mcap``, None if the program is not installed."""
-        found = next(filter(None, map(shutil.which, self.programs)), None)
-        return [found, *self.arguments(mcap)] if found else None
+    def program(self) -> str | None:
+        """Return the path of the program, None if it is not installed."""
+        return next(filter(None, map(shutil.which, self.programs)), None)
 
 
-def _file(mcap: Path) -> list[str]:
+def layout_for(bag: Bag, name: str) -> Path:
+    """Return the layout of file name ``name`` for the topics of ``bag``.
+
+    That is the shipped one, or, for a graph in a namespace or with remapped topics, one beside the bag, written now.
+
+    Raises:
+        RecordingError: It cannot be written.
+    """
+    shipped = LAYOUTS / name
+    names = {resolved(role): bag.name_of(role) for role in (*TOPICS, DIAGNOSTICS)}
+    if all(usual == name for usual, name in names.items()):
+        return shipped
+    # What follows a topic in a layout is a field, or the end of the text.
+    pattern = re.compile(rf"(?<=[\">])({'|'.join(map(re.escape, names))})(?=[./\"<])")
+    target = bag.folder / f"layout_{name}"
+    try:
+        target.write_text(
+            pattern.sub(lambda found: names[found[1]], shipped.read_text(encoding="utf-8")), encoding="utf-8"
+        )
+    except OSError as error:
+        raise RecordingError(f"{target}: the layout cannot be written: {error.strerror}") from None
+    return target
+
+
+def _file(mcap: Path, _: Path | None) -> list[str]:
     return [str(mcap)]
 
 
-def _plotjuggler(mcap: Path) -> list[str]:
-    return ["--datafile", str(mcap), "--layout", str(LAYOUTS / "plotjuggler.xml")]
+def _plotjuggler(mcap: Path, layout: Path | None) -> list[str]:
+    return ["--datafile", str(mcap), "--layout", str(layout)]
 
 
 VIEWERS = {
@@ -45,23 +75,26 @@ VIEWERS = {
         "Foxglove",
         ("foxglove-studio", "foxglove-desktop"),
         _file,
-        LAYOUTS / "foxglove.json",
+        "foxglove.json",
+        True,
         "https://foxglove.dev/download",
     ),
     "lichtblick": Viewer(
         "Lichtblick",
         ("lichtblick",),
         _file,
-        LAYOUTS / "foxglove.json",
+        "foxglove.json",
+        True,
         "https://github.com/lichtblick-suite/lichtblick/releases",
     ),
     "plotjuggler": Viewer(
         "PlotJuggler",
         ("plotjuggler",),
         _plotjuggler,
-        None,
+        "plotjuggler.xml",
+        False,
         "https://plotjuggler.io, or: apt install ros-jazzy-plotjuggler-ros",
     ),
-    "rerun": Viewer("Rerun", ("rerun",), _file, None, "pip install rerun-sdk"),
+    "rerun": Viewer("Rerun", ("rerun",), _file, "", False, "pip install rerun-sdk"),
 }
 """In the order in which they are tried."""

@@ -14,7 +14,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign, find_design, parse_parameters, read_design_parameters
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
-from hsv.graph.description import TOPICS, TUBE_MPC
+from hsv.graph.description import COMMAND, FAULT_STATUS, NOMINAL, STATE, TOPICS, TUBE_MPC, TUBE_STATUS
 from hsv.graph.preparation import design_files, parameter_yaml
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
@@ -108,7 +108,7 @@ def complete_steps(bag: Bag, topics: Iterable[str] = TOPICS) -> int:
 
 def broken_off(bag: Bag) -> bool:
     """Whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
-    status = bag.columns("/hsv/state")["status"]
+    status = bag.columns(STATE)["status"]
     return not len(status) or int(status[-1]) == 0 or cut_off(bag)
 
 
@@ -118,7 +118,7 @@ def refuse_vacuous(bag: Bag) -> None:
     Raises:
         RecordingError: The controller was active for less than ten seconds of simulated time, or there is no step.
     """
-    command, nominal = joined(bag, ("/hsv/command", "/hsv/nominal")).values()
+    command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
     deviation = input_columns(command) - input_columns(nominal, "reference_input.")
     active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT
     stamps = nominal["header.stamp"] * 1e-9
@@ -136,7 +136,7 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False
-    for _, status in bag.decode("/hsv/fault_status"):
+    for _, status in bag.decode(FAULT_STATUS):
         recorded = [Fault(f.channel, f.type, f.value) for f in status.active]
         planned = list(injector.acting(status.step))
         if planned != recorded:
@@ -154,10 +154,10 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 def _tau_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
-    recorded_status = [status for _, status in bag.decode("/hsv/tube_status")]
+    recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]
     if recorded_status and not np.shape(recorded_status[0].tau):
         raise RecordingError(
-            f"{bag.path}: topic /hsv/tube_status: recorded with another definition, one number for tau"
+            f"{bag.path}: topic {bag.name_of(TUBE_STATUS)}: recorded with another definition, one number for tau"
         )
     if controller_of(values) != TUBE_MPC.name:
         return {}

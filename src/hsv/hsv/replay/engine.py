@@ -11,7 +11,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.graph.description import TOPICS
+from hsv.graph.description import CLOCK, COMMAND, STATE, TOPICS
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
@@ -72,7 +72,7 @@ class _Outputs:
                 ) from None
             track = self.tracks[topic]
             track.data.append(data + bytes(-len(data) % WIRE_ALIGNMENT))
-            track.times.append(nanoseconds(message.clock if topic == "/clock" else message.header.stamp))
+            track.times.append(nanoseconds(message.clock if topic == CLOCK else message.header.stamp))
 
 
 def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Progress) -> ProcessComparison:
@@ -148,15 +148,15 @@ def fly(
         latest |= outputs.messages
     last = components["plant"].steps
     first = True
-    while first or latest["/hsv/state"].status == 0:
+    while first or latest[STATE].status == 0:
         for name, process in processes.items():
             inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
             outputs = made[name]
             process.step(components[name], inputs, tuple(outputs.messages.values()), types.types.__getitem__)
             outputs.keep()
         first = False
-        if latest["/hsv/state"].step % PROGRESS_INTERVAL == 0:
-            progress("rerun", latest["/hsv/state"].step, last)
+        if latest[STATE].step % PROGRESS_INTERVAL == 0:
+            progress("rerun", latest[STATE].step, last)
     progress("rerun", last, last)
     return {topic: track for outputs in made.values() for topic, track in outputs.tracks.items()}
 
@@ -169,7 +169,7 @@ def require(bag: Bag, topics: Iterable[str]) -> None:
 
 def chosen(controller: str) -> dict[str, Process]:
     """Return the processes of a graph with ``controller``, in the order in which a step passes through them."""
-    names = [name for name in PROCESSES if name == controller or PROCESSES[name].node.publishes[0] != "/hsv/command"]
+    names = [name for name in PROCESSES if name == controller or PROCESSES[name].node.publishes[0] != COMMAND]
     return {name: PROCESSES[name] for name in names}
 
 

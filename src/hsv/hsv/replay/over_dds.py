@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from hsv.errors import RecordingError
-from hsv.graph.description import PEER_EMULATOR, PLANT, TOPICS, NodeDescription, graph
+from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, TOPICS, NodeDescription, graph
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import parameter_yaml
 from hsv.recording.reader import Bag
 from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process, require
-
-RUN = "/hsv/run"
 
 
 def replay_all(
@@ -29,7 +27,7 @@ def replay_all(
     for name in names:
         require(bag, (*chosen(controller)[name].inputs, *chosen(controller)[name].outputs))
     if not bag.messages(RUN):
-        raise RecordingError(f"{bag.path}: topic {RUN}: no message, expected the announcement of the run")
+        raise RecordingError(f"{bag.path}: topic {bag.name_of(RUN)}: no message, expected the announcement of the run")
     for name in names:
         process = chosen(controller)[name]
         with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
@@ -40,7 +38,7 @@ def replay_all(
                 "peer_emulator.node": name,
                 "peer_emulator.directory": str(answers),
             }
-            steps = len(bag.messages("/hsv/state"))
+            steps = len(bag.messages(STATE))
             _run((process.node, PEER_EMULATOR), {**values, **run}, Path(folder), name, steps, progress)
             made = Bag(answers)
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
@@ -56,7 +54,7 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
     require(bag, TOPICS)
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         again = Path(folder, "again")
-        steps = len(bag.messages("/hsv/state"))
+        steps = len(bag.messages(STATE))
         run = {"recorder": True, "bag.directory": str(again)}
         _run(graph(controller), {**values, **run}, Path(folder), PLANT.name, steps, progress)
         made = Bag(again)

@@ -19,6 +19,7 @@ from hsv.graph.description import (
     NOTCH_FILTER,
     PLANT,
     ROBUST_MPC,
+    STATE,
     TUBE_MPC,
     NodeDescription,
 )
@@ -50,7 +51,7 @@ class Process:
     @property
     def inputs(self) -> tuple[str, ...]:
         """Topics that one step needs."""
-        return (*self.node.subscribes, "/hsv/state") if self.restarts else self.node.subscribes
+        return (*self.node.subscribes, STATE) if self.restarts else self.node.subscribes
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hsv.graph.description import STATE, TUBE_STATUS
 from hsv.recording.reader import Bag
-from hsv.recording.report.panels import PANELS, STATE, TUBE_STATUS, Curve, Kind, Panel, error_panel
+from hsv.recording.report.panels import PANELS, Curve, Kind, Panel, error_panel
 from hsv.recording.steps import joined
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hsv.recording.info import TUBE_STATUS
+from hsv.graph.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE, TUBE_STATUS
 from hsv.recording.reader import Bag
-from hsv.recording.report.panels import INPUTS, STATE
+from hsv.recording.report.panels import INPUTS
 from hsv.recording.track import expecting_fields
 
 JOIN_WITHIN = 0.5
@@ -79,7 +79,7 @@ def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
 
 
 def _saturation(bag: Bag) -> Iterator[Event]:
-    if TUBE_STATUS not in bag.topics:
+    if TUBE_STATUS not in bag.roles:
         return
     columns = bag.columns(TUBE_STATUS)
     time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
@@ -100,30 +100,35 @@ def _ending(bag: Bag, description: dict[str, Any]) -> Iterator[Event]:
 
 
 def _diagnostics(bag: Bag) -> Iterator[Event]:
-    if "/diagnostics" not in bag.topics:
+    if DIAGNOSTICS not in bag.roles:
         return
-    for time, message in bag.decode("/diagnostics"):
+    for time, message in bag.decode(DIAGNOSTICS):
         for status in message.status:
             if status.level in _DIAGNOSTIC_LEVELS:
                 kind = _DIAGNOSTIC_LEVELS[status.level]
-                yield Event(time * 1e-9, time * 1e-9, kind, f"{status.name}: {status.message}", status.name)
+                node = status.name.partition(": ")[0]  # "node: task"
+                yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {status.message}", node)
 
 
 def _log(bag: Bag) -> Iterator[Event]:
-    if "/rosout" not in bag.topics:
+    """Yield the warnings of this graph: another one in the domain logs to the same topic."""
+    if ROSOUT not in bag.roles:
         return
-    for time, message in bag.decode("/rosout"):
-        if message.level >= LOG_WARNING:
+    for time, message in bag.decode(ROSOUT):
+        # A logger has the name of its node with dots for slashes.
+        space, _, node = message.name.rpartition(".")
+        if message.level >= LOG_WARNING and space == bag.namespace.strip("/").replace("/", "."):
             kind = "warning" if message.level == LOG_WARNING else "error"
-            yield Event(time * 1e-9, time * 1e-9, kind, f"{message.name}: {message.msg}", message.name)
+            yield Event(time * 1e-9, time * 1e-9, kind, f"{node}: {message.msg}", node)
 
 
 def _parameter_changes(bag: Bag) -> Iterator[Event]:
-    if "/parameter_events" not in bag.topics:
+    if PARAMETER_EVENTS not in bag.roles:
         return
-    for time, message in bag.decode("/parameter_events"):
+    for time, message in bag.decode(PARAMETER_EVENTS):
         names = ", ".join(parameter.name for parameter in message.changed_parameters)
-        if names and time > 0:
+        space, _, _ = message.node.rpartition("/")
+        if names and time > 0 and space == bag.namespace.rstrip("/"):
             yield Event(time * 1e-9, time * 1e-9, "change", f"{message.node}: {names} changed", message.node)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+from hsv.graph.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
+
 
 class Kind(StrEnum):
     """What a curve shows; the page draws and switches each kind in its own way."""
@@ -50,8 +52,6 @@ GROUPS = {
 }
 """Headings of the groups, in the order of the page."""
 
-FILTERED_STATE, NOMINAL, STATE = "/hsv/filtered_state", "/hsv/nominal", "/hsv/state"
-COMMAND, ACTUATOR, TUBE_STATUS = "/hsv/command", "/hsv/actuator", "/hsv/tube_status"
 INPUTS = ("fuel_equivalence_ratio", "elevator_deflection")
 
 
