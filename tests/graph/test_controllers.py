@@ -74,7 +74,7 @@ def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processe
         (message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec, {v.key: v.value for v in entry.values})
         for _, message in bag.decode("/diagnostics")
         for entry in message.status
-        if entry.name == "tube_mpc" and entry.level == 1
+        if entry.name == "tube_mpc: tube" and entry.level == 1
     ]
     assert warned[0][0] == pytest.approx(0.02 * first) and warned[0][1]["component"]
     said = [message.msg for _, message in bag.decode("/rosout")]
