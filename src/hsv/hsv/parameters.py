@@ -62,7 +62,7 @@ class Parameter:
         Raises:
             ParameterError: Wrong type (an integer is not a double), not finite, outside the range or the choices.
         """
-        wrong = ParameterError(f"parameter {self.name} = {_shown(value)}: expected {self.constraint}")
+        wrong = self.refusal(value)
         if self.kind.endswith("_array"):
             if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
                 raise wrong
@@ -84,8 +84,24 @@ class Parameter:
             raise wrong
         return value
 
+    def refusal(self, value: object) -> ParameterError:
+        """Return the error that tells why ``value`` is not admissible, and what to write for a whole number."""
+        hint = ""
+        if self.kind == "double" and _is_whole(value):
+            hint = f" (write {float(cast(int, value))})"
+        elif self.kind == "double_array" and isinstance(value, Iterable) and not isinstance(value, str):
+            values = list(value)
+            if any(map(_is_whole, values)) and all(_is_whole(entry) or isinstance(entry, float) for entry in values):
+                hint = f" (write {_shown([float(entry) for entry in values])})"
+        shown = value.tolist() if hasattr(value, "tolist") else value
+        return ParameterError(f"parameter {self.name} = {_shown(shown)}: expected {self.constraint}{hint}")
+
     def _in_range(self, value: object) -> bool:
         return isinstance(value, int | float) and math.isfinite(value) and self.minimum <= value <= self.maximum
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 def _shown(value: object) -> str:

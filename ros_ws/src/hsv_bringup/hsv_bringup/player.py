@@ -22,7 +22,7 @@ from hsv.recording.topic import Qos
 from hsv_node.lockstep import SAID_EVERY
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
-from hsv_node.parameters import refuse_sim_time
+from hsv_node.parameters import refuse_sim_time, refuse_unknown
 from hsv_node.process import ProcessNode
 
 
@@ -41,6 +41,7 @@ class PlayerNode(ProcessNode):
         """
         # In the namespace of the bag, so that a remapping of the player's own moves its topics as well.
         super().__init__("player", bag.namespace)
+        refuse_unknown(self, "", self.of_others)
         if bag.roles.get(CLOCK) in topics:
             refuse_sim_time(self)
         self._rate = rate
@@ -185,4 +186,4 @@ def main(args: Sequence[str] | None = None) -> int:
             topics.pop(bag.name_of(CLOCK), None)
         return PlayerNode(bag, list(topics), options.rate, options.paused, options.delay)
 
-    return run_node(build, "player", args)
+    return run_node(build, "player", args, own_arguments=True)

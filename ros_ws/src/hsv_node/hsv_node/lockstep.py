@@ -17,7 +17,7 @@ from hsv.graph.description import NodeDescription
 from hsv.graph.exclusive import claim_topic
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
-from hsv_node.parameters import declare
+from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
 from hsv_node.qos import LATCHED, STEP
 
@@ -55,6 +55,8 @@ class LockstepNode(ProcessNode):
         self._claims: list[socket.socket] = []
         for topic in role.own_topics:
             self.claim(topic)
+        if role.known_by:
+            refuse_unknown(self, role.name, self.of_others)
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
         self._inputs: dict[str, Any] = {}

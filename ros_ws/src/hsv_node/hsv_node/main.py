@@ -12,17 +12,22 @@ from rclpy.exceptions import ParameterException
 from rclpy.executors import Executor
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.utilities import remove_ros_args
 
-from hsv.errors import HsvError
+from hsv.errors import HsvError, ParameterError
+from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.process import ProcessNode
 
 
-def run_node(build: Callable[[], ProcessNode], name: str, args: Sequence[str] | None = None) -> int:
+def run_node(
+    build: Callable[[], ProcessNode], name: str, args: Sequence[str] | None = None, *, own_arguments: bool = False
+) -> int:
     """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
 
-    Bad parameters end it before it joins the graph, with one line on standard error and exit code 2.
+    Bad parameters end it before it joins the graph, with one line on standard error and exit code 2. So do arguments
+    that are not for ROS, unless the process has ``own_arguments``, which it has checked itself.
     """
-    return run_nodes(lambda: iter([build()]), name, args)
+    return run_nodes(lambda: iter([build()]), name, args, own_arguments=own_arguments, several=False)
 
 
 def run_nodes(
@@ -30,12 +35,24 @@ def run_nodes(
     name: str,
     args: Sequence[str] | None = None,
     executor_class: Callable[[], Executor] = EventsExecutor,
+    *,
+    own_arguments: bool = False,
+    several: bool = True,
 ) -> int:
     """Spin several nodes with one executor, as :func:`run_node` does one, until the first of them finishes."""
+    words = list(sys.argv if args is None else args)
     try:
-        rclpy.init(args=None if args is None else list(args), signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        check_names(words, several)
+        # Looked through before they are used: then rcl logs nothing of its own about what is wrong.
+        others = remove_ros_args(words)[1:]
+        if others and not own_arguments:
+            raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
+        rclpy.init(args=words, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+    except rclpy_implementation.UnknownROSArgsError as error:
+        return _refuse(name, ParameterError(f"unknown ROS arguments {error}"))
     except Exception as error:  # rcl reports a malformed command line or parameter file by several exception types
         return _refuse(name, error)
+    ProcessNode.of_others = shared_parameters(words, several)
     # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
     stop: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -76,5 +93,7 @@ def run_nodes(
 
 
 def _refuse(name: str, error: BaseException) -> int:
-    print(f"{name}: error: {' '.join(str(error).split())}", file=sys.stderr, flush=True)
+    # rcl adds where in its sources it was.
+    text = " ".join(str(error).split()).partition(", at /")[0]
+    print(f"{name}: error: {text}", file=sys.stderr, flush=True)
     return 2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -12,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from hsv.errors import ParameterError
+from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 
 
@@ -29,17 +32,28 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
             values[parameter.name] = node.get_parameter(parameter.name).value
             continue
         default = (defaults or {}).get(parameter.name, parameter.default)
+        override = node._parameter_overrides.get(parameter.name)
+        # Neither a file nor rclpy knows of what an empty list is one: there it is no value at all.
+        empty = parameter.kind.endswith("_array") and (default == [] if override is None else override.value is None)
         try:
-            # An empty list has no element type in ROS 2: it is declared by type, and set only if somebody gives it.
-            value = default if default != [] else None
-            declared = node.declare_parameter(parameter.name, value, _descriptor(parameter))
-        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            given = node._parameter_overrides[parameter.name].value
-            raise ParameterError(
-                f"parameter {parameter.name} = {_short(given)}: expected {parameter.constraint}"
-            ) from error
-        values[parameter.name] = parameter.check(declared.value if declared.value is not None else [])
+            declared = _declare_empty(node, parameter) if empty else _declare(node, parameter, default)
+        except (InvalidParameterTypeException, InvalidParameterValueException, TypeError) as error:
+            raise parameter.refusal(override.value if override else default) from error
+        values[parameter.name] = parameter.check(declared)
     return values
+
+
+def _declare(node: Node, parameter: Parameter, default: Any) -> Any:
+    return node.declare_parameter(parameter.name, default, _descriptor(parameter)).value
+
+
+def _declare_empty(node: Node, parameter: Parameter) -> Any:
+    kind = RosParameter.Type.STRING_ARRAY if parameter.kind == "string_array" else RosParameter.Type.DOUBLE_ARRAY
+    # Its type is declared first, then its value set, and then it may be read-only.
+    node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
+    node.set_parameters([RosParameter(parameter.name, kind, [])])
+    node.set_descriptor(parameter.name, _descriptor(parameter, kind))
+    return []
 
 
 def given(node: Node, name: str) -> bool:
@@ -64,26 +78,57 @@ def refuse_sim_time(node: Node) -> None:
     node.add_on_set_parameters_callback(check)
 
 
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
+    """Refuse parameters that were given to ``node`` and are none of its own.
+
+    Args:
+        node: A new node, with no more than what ROS has declared.
+        role: Its role, whose parameters it will declare; empty for none.
+        of_others: Names that may be there for other nodes of the graph: the files of a run address all of them.
+
+    Raises:
+        ParameterError: A parameter that the node does not have, named with the nearest one.
+    """
+    if not node._parameter_overrides:
+        return
+    from hsv.graph.node_parameters import NODE_PARAMETERS  # all components: not for a node that is given nothing
+
+    tables = {name: {parameter.name for parameter in table} for name, table in NODE_PARAMETERS.items()}
+    own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
+    for name in node._parameter_overrides:
+        owner = next((other for other, names in tables.items() if name in names), "")
+        if name in own or (owner and name in of_others):
+            continue
+        nearest = difflib.get_close_matches(name, own.union(*tables.values()) if name in of_others else own, 1, 0.0)
+        of = f", {owner} has" if owner else ""
+        raise ParameterError(f"parameter {name}: {node.get_name()} has none of this name{of}; nearest is {nearest[0]}")
+
+
+def _descriptor(parameter: Parameter, kind: RosParameter.Type | None = None) -> ParameterDescriptor:
     unit = f" [{parameter.unit}]" if parameter.unit else ""
     descriptor = ParameterDescriptor(
         description=parameter.description + unit,
         read_only=parameter.read_only,
         additional_constraints=parameter.constraint,
-        dynamic_typing=parameter.default == [],
     )
-    if math.isfinite(parameter.minimum) and math.isfinite(parameter.maximum):
+    if kind is not None:
+        descriptor.type = kind.value
+    # ROS knows ranges with two ends, and of single numbers; what a list must satisfy stands in the words above.
+    if math.isfinite(parameter.minimum) or math.isfinite(parameter.maximum):
         if parameter.kind == "double":
+            largest = sys.float_info.max
             descriptor.floating_point_range = [
-                FloatingPointRange(from_value=parameter.minimum, to_value=parameter.maximum, step=0.0)
+                FloatingPointRange(
+                    from_value=max(parameter.minimum, -largest), to_value=min(parameter.maximum, largest), step=0.0
+                )
             ]
         elif parameter.kind == "integer":
+            largest_integer = 2**63 - 1
             descriptor.integer_range = [
-                IntegerRange(from_value=int(parameter.minimum), to_value=int(parameter.maximum), step=1)
+                IntegerRange(
+                    from_value=int(max(parameter.minimum, -largest_integer)),
+                    to_value=int(min(parameter.maximum, largest_integer)),
+                    step=1,
+                )
             ]
     return descriptor
-
-
-def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from rclpy.node import Node
 
 
 class ProcessNode(Node):
     """A node with an exit code, and with something to do between messages."""
+
+    of_others: ClassVar[frozenset[str]] = frozenset()
+    """Names of the parameters that this process was given for several nodes; set before any is made."""
 
     def __init__(self, name: str, namespace: str | None = None) -> None:
         super().__init__(name, namespace=namespace)

@@ -1,0 +1,89 @@
+"""What stands on the command line of a node that ROS does not tell: which parameters are meant for several nodes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from hsv.errors import ParameterError
+from hsv.graph.description import checked_namespace
+
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_PARAMETERS = "ros__parameters"
+
+
+def shared_parameters(words: Sequence[str], several: bool) -> frozenset[str]:
+    """Return the names of the parameters that the arguments of a process give to more than one node.
+
+    These are those in a section for every node, such as ``/**``, of a parameter file, and, in a process of ``several``
+    nodes, those that are given with ``-p``. ROS has taken the arguments before: what it refuses is not looked at.
+    """
+    names: set[str] = set()
+    for flag, value in pairwise(_ros_arguments(words)):
+        if flag == "--params-file":
+            content = yaml.load(Path(value).read_text(encoding="utf-8"), _LOADER)
+            names.update(_of_all_nodes(content if isinstance(content, Mapping) else {}))
+        elif several and flag in ("-p", "--param"):
+            names.add(value.partition(":=")[0])
+    return frozenset(names)
+
+
+def check_names(words: Sequence[str], several: bool) -> None:
+    """Check the names that the arguments of a process give to its nodes: ROS says what is wrong in several lines.
+
+    Args:
+        words: The arguments.
+        several: Whether the process has several nodes, which one name would make indistinguishable.
+
+    Raises:
+        ParameterError: A namespace or node name that is none by the rules of ROS 2.
+    """
+    for flag, rule in pairwise(_ros_arguments(words)):
+        if flag not in ("-r", "--remap"):
+            continue
+        left, _, name = rule.partition(":=")
+        node, _, kind = left.rpartition(":")
+        if kind == "__ns":
+            if not name.startswith("/"):
+                raise ParameterError(f"{rule}: expected a namespace with a leading slash, such as /veh1")
+            checked_namespace(name)
+        elif kind in ("__node", "__name"):
+            if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+                raise ParameterError(f"{rule}: expected a name of letters, digits and underscores, no digit first")
+            if several and not node:
+                raise ParameterError(f"{rule}: all nodes of this process would have one name, expected NODE:{rule}")
+
+
+def _ros_arguments(words: Sequence[str]) -> Iterator[str]:
+    inside = False
+    for word in words:
+        if word == "--ros-args":
+            inside = True
+        elif word == "--":
+            inside = False
+        elif inside:
+            yield word
+
+
+def _of_all_nodes(content: Mapping[str, Any], wildcard: bool = False) -> Iterator[str]:
+    """Yield the names in the sections of a parameter file whose node has a wildcard in its name."""
+    for name, value in content.items():
+        if not isinstance(value, Mapping):
+            continue
+        if name == _PARAMETERS:
+            yield from _flattened(value) if wildcard else ()
+        else:
+            yield from _of_all_nodes(value, wildcard or "*" in str(name))
+
+
+def _flattened(tree: Mapping[str, Any], prefix: str = "") -> Iterator[str]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}"
