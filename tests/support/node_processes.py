@@ -88,7 +88,7 @@ class Processes:
 def recorded_steps(bag: Path) -> int:
     """Return how many steps are on the disk."""
     try:
-        return Bag(bag).topics["/hsv/state"].count
+        return len(Bag(bag).times("hsv/state"))
     except RecordingError:
         return 0  # not begun yet
 

@@ -44,11 +44,17 @@ def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] 
 
 
 def _declare(node: Node, parameter: Parameter, default: Any) -> Any:
-    return node.declare_parameter(parameter.name, default, _descriptor(parameter)).value
+    # What is given has to be of the type that an empty list does not tell.
+    declared = _array_type(parameter) if default == [] else default
+    return node.declare_parameter(parameter.name, declared, _descriptor(parameter)).value
+
+
+def _array_type(parameter: Parameter) -> RosParameter.Type:
+    return RosParameter.Type.STRING_ARRAY if parameter.kind == "string_array" else RosParameter.Type.DOUBLE_ARRAY
 
 
 def _declare_empty(node: Node, parameter: Parameter) -> Any:
-    kind = RosParameter.Type.STRING_ARRAY if parameter.kind == "string_array" else RosParameter.Type.DOUBLE_ARRAY
+    kind = _array_type(parameter)
     # Its type is declared first, then its value set, and then it may be read-only.
     node.declare_parameter(parameter.name, kind, ParameterDescriptor(), ignore_override=True)
     node.set_parameters([RosParameter(parameter.name, kind, [])])

@@ -135,7 +135,7 @@ def commit() -> str:
         return "unknown"
 
 
-def parameter_yaml(parameters: Mapping[str, Any]) -> str:
-    """Return flat parameters as the text of a ROS 2 parameter file for every node."""
+def parameter_yaml(parameters: Mapping[str, Any], node: str = "/**") -> str:
+    """Return flat parameters as the text of a ROS 2 parameter file for every node, or for one that is named."""
     # Dotted names need no nesting: rcl takes them as they are.
-    return yaml.safe_dump({"/**": {"ros__parameters": dict(parameters)}}, sort_keys=False)
+    return yaml.safe_dump({node: {"ros__parameters": dict(parameters)}}, sort_keys=False)

@@ -32,14 +32,14 @@ def replay_all(
         process = chosen(controller)[name]
         with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
             answers = Path(folder, "answers")
-            run = {
-                "recorder": False,
+            emulated = {
                 "peer_emulator.bag": str(bag.path.absolute()),
                 "peer_emulator.node": name,
                 "peer_emulator.directory": str(answers),
             }
             steps = len(bag.messages(STATE))
-            _run((process.node, PEER_EMULATOR), {**values, **run}, Path(folder), name, steps, progress)
+            text = parameter_yaml({**values, "recorder": False}) + parameter_yaml(emulated, PEER_EMULATOR.name)
+            _run((process.node, PEER_EMULATOR), text, Path(folder), name, steps, progress)
             made = Bag(answers)
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
@@ -56,7 +56,7 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
         again = Path(folder, "again")
         steps = len(bag.messages(STATE))
         run = {"recorder": True, "bag.directory": str(again)}
-        _run(graph(controller), {**values, **run}, Path(folder), PLANT.name, steps, progress)
+        _run(graph(controller), parameter_yaml({**values, **run}), Path(folder), PLANT.name, steps, progress)
         made = Bag(again)
         for process in chosen(controller).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
@@ -64,15 +64,15 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
 
 def _run(
     nodes: Sequence[NodeDescription],
-    values: Mapping[str, Any],
+    parameters: str,
     folder: Path,
     title: str,
     steps: int,
     progress: Progress,
 ) -> None:
-    """Run ``nodes`` until the last of them has ended: the emulator or, where there is none, the plant."""
+    """Run ``nodes``, with the text of a parameter file, until the last has ended: the emulator or else the plant."""
     file = folder / "parameters.yaml"
-    file.write_text(parameter_yaml(values), encoding="utf-8")
+    file.write_text(parameters, encoding="utf-8")
 
     def line(_: str, text: str) -> None:
         if text.startswith("step "):

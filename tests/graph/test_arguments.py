@@ -1,0 +1,60 @@
+"""Whatever is wrong on the command line of a node: one line that says what, and exit code 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from node_processes import Processes
+
+pytestmark = pytest.mark.graph
+
+FILES = {
+    "own.yaml": "tube_mpc:\n  ros__parameters:\n    duration: 10.0\n",
+    "full.yaml": "/veh1/tube_mpc:\n  ros__parameters:\n    feedback:\n      tua: [0.8]\n",
+    "all.yaml": "/**:\n  ros__parameters:\n    feedback.tua: [0.8]\n",
+    "broken.yaml": "/**:\n  ros__parameters:\n   - x\n",
+}
+
+PLANT, TUBE_MPC = ("hsv_plant", "plant"), ("hsv_ctrl", "tube_mpc")
+COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
+
+
+@pytest.mark.parametrize(
+    ("node", "arguments", "words"),
+    [
+        (PLANT, "-p nosuch:=1", ["parameter nosuch", "plant has none", "nearest is"]),
+        (PLANT, "-p durations:=200.0", ["parameter durations", "nearest is duration"]),
+        (PLANT, "-p duration:=200", ["duration = 200", "expected double", "(write 200.0)"]),
+        (PLANT, "-p bag.directory:=here", ["parameter bag.directory", "recorder has"]),
+        (TUBE_MPC, "-p feedback.tau:=[1]", ["feedback.tau = [1]", "expected double array", "(write [1.0])"]),
+        (TUBE_MPC, "--params-file own.yaml", ["parameter duration", "plant has"]),
+        (TUBE_MPC, "-r __ns:=/veh1 --params-file full.yaml", ["feedback.tua", "nearest is feedback.tau"]),
+        (TUBE_MPC, "--params-file all.yaml", ["feedback.tua", "nearest is feedback.tau"]),
+        (TUBE_MPC, "--params-file broken.yaml", ["broken.yaml"]),
+        (COMPOSED, "-p nosuch:=1", ["parameter nosuch"]),
+        (COMPOSED, "-r __node:=x", ["__node:=x", "expected NODE:__node:=x"]),
+        (RECORDER, "-p bag.attachments:=[1]", ["bag.attachments = [1]", "expected string array"]),
+        (PLANT, "-p use_sim_time:=true", ["use_sim_time", "makes the clock itself"]),
+        (PLANT, "-r __ns:=//veh", ["namespace = '//veh'", "/veh1"]),
+        (PLANT, "-r __ns:=veh1", ["__ns:=veh1", "leading slash"]),
+        (PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
+        (PLANT, "-r hsv/state", ["'-r hsv/state'"]),
+        (PLANT, "-p duration", ["'-p duration'"]),
+        (PLANT, "--nosuch", ["unknown ROS arguments", "--nosuch"]),
+        (PLANT, "--log-level nosuch", ["'--log-level nosuch'"]),
+        (PLANT, "-- duration=10", ["argument 'duration=10'"]),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_wrong_argument_is_one_line(
+    shared_processes: Processes, node: tuple[str, str], arguments: str, words: list[str]
+) -> None:
+    for name, text in FILES.items():
+        Path(shared_processes.folder, name).write_text(text)
+    done = shared_processes.run("ros2", "run", *node, "--ros-args", *arguments.split())
+    said = [line for line in done.stdout.splitlines() if not line.startswith("[ros2run]")]
+    assert done.returncode == 2 and len(said) == 1, done.stdout
+    assert said[0].startswith(f"{node[1]}: error: ")
+    for word in words:
+        assert word in said[0]

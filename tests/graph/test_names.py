@@ -1,0 +1,147 @@
+"""Graphs that are moved and remapped, duplicates of their nodes, and their parameters dumped and loaded again."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+import parameter_dump
+import pytest
+from node_processes import Processes, recorded_steps, short_scenario
+from waiting import output_of, wait_until
+
+from hsv.graph.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, RECORDER, TUBE_MPC, NodeDescription, graph
+from hsv.graph.launcher import parameter_arguments
+from hsv.graph.preparation import prepare
+from hsv.recording.flight import flight_fingerprint, state_columns
+from hsv.recording.reader import Bag
+from hsv.replay.attached import complete_steps
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+DURATION = 11.0
+"""Seconds; a replay wants ten in which the controller does something."""
+
+REMAPPED = ["-r", "hsv/state:=truth", "-r", "hsv/command:=/wish/command", "-r", "clock:=tick"]
+"""Of all topics some: given to every node, as they are only remapped where they are used."""
+
+
+def by_hand(
+    processes: Processes, nodes: Sequence[NodeDescription], arguments: Mapping[str, Sequence[str]]
+) -> dict[str, subprocess.Popen[str]]:
+    """Start nodes one by one, with the arguments of each under its name."""
+    return {
+        node.name: processes.start("ros2", "run", node.package, node.executable, "--ros-args", *arguments[node.name])
+        for node in nodes
+    }
+
+
+def test_two_graphs_in_one_domain(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder, DURATION, 3)
+    words = ("hsv", "run", scenario, "--no-report", "--json", "--bag")
+    first = processes.start(*words, processes.folder / "first", "--namespace", "/lab/veh1")
+    second = processes.start(*words, processes.folder / "second", "--namespace", "veh2", "--composed")
+    for run in (first, second):
+        said = output_of(run)
+        assert run.returncode == 0, said
+    flight = fly(assemble(flight_parameters(load_scenario(str(scenario)))))
+    bags = [Bag(processes.folder / name) for name in ("first", "second")]
+    assert [flight_fingerprint(bag) for bag in bags] == [flight.fingerprint] * 2
+    assert [bag.namespace for bag in bags] == ["/lab/veh1", "/veh2"]
+    # The logs of both are on one topic, and each bag has its own events only; so they are one flight, step by step.
+    compared = processes.run("hsv", "diff", processes.folder / "first", processes.folder / "second")
+    assert compared.returncode == 0 and "identical in every byte" in compared.stdout, compared.stdout
+    for words in (("--node", "tube_mpc"), ("--rerun",)):
+        replayed = processes.run("hsv", "replay", processes.folder / "first", "--over-dds", *words)
+        assert replayed.returncode == 0, replayed.stdout
+
+
+@pytest.mark.long
+def test_two_graphs_in_one_domain_fly_as_published(processes: Processes) -> None:
+    words = ("hsv", "run", "case1", "--no-report", "--json", "--bag")
+    runs = [processes.start(*words, processes.folder / name, "--namespace", f"/{name}") for name in ("veh1", "veh2")]
+    assert all(output_of(run) and run.returncode == 0 for run in runs)
+    for name in ("veh1", "veh2"):
+        found = json.loads(processes.run("hsv", "info", processes.folder / name, "--json").stdout)
+        assert found["as_published"] is True
+
+
+def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes: Processes) -> None:
+    processes, folder = shared_processes, shared_processes.folder
+    alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
+    # Nothing that is done to this flight comes too late; it is interrupted.
+    prepared = prepare(str(short_scenario(folder, 3600, 3)), bag=folder / "remapped", real_time_factor=4.0)
+    files = parameter_arguments(prepared.parameter_files)
+    arguments = {node.name: [*files, *REMAPPED] for node in graph()}
+    arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]
+    nodes = by_hand(processes, graph(), arguments)
+    pids = [popen.pid for popen in nodes.values()]
+    wait_until(lambda: recorded_steps(prepared.bag) > 10, pids)
+    _refuse_duplicates(processes, files)
+    names = ["/nf2" if node is NOTCH_FILTER else f"/{node.name}" for node in graph()]
+    (folder / "dumps").mkdir()
+    dumped = processes.run(sys.executable, parameter_dump.__file__, folder / "dumps", *names)
+    assert dumped.returncode == 0, dumped.stdout
+    steps = recorded_steps(prepared.bag)
+    wait_until(lambda: recorded_steps(prepared.bag) > steps, pids, lambda: recorded_steps(prepared.bag))
+    processes.stop()
+    bag = Bag(prepared.bag)
+    roles = {"hsv/state": "/truth", "hsv/command": "/wish/command", "clock": "/tick", "hsv/nominal": "/hsv/nominal"}
+    assert {role: bag.name_of(role) for role in roles} == roles
+    scenario = load_scenario(str(short_scenario(folder, 0.02 * (complete_steps(bag) + 1), 3)))
+    flown = fly(assemble(flight_parameters(scenario))).history.state
+    recorded = state_columns(bag.columns("hsv/state"))
+    assert np.array_equal(recorded[:steps], flown[:steps])
+    # Quiet: said once, then every ten seconds.
+    stamps = [float(found[1]) for found in re.finditer(r"\[(\d+\.\d+)\].*waiting for", output_of(alone))]
+    assert stamps and all(later - earlier > 9.0 for earlier, later in pairwise(stamps))
+
+
+def _refuse_duplicates(processes: Processes, files: Sequence[str]) -> None:
+    """Start everything a second time beside the flight; each ends by itself with one line."""
+    second = [
+        processes.start("ros2", "run", node.package, node.executable, "--ros-args", *files, *REMAPPED, *words)
+        for node, words in (
+            (PLANT, []),
+            (TUBE_MPC, ["-r", "__node:=another"]),
+            (FAULT_INJECTOR, []),
+            (RECORDER, ["-p", "bag.directory:=other"]),
+        )
+    ]
+    second.append(processes.start("ros2", "run", "hsv_bringup", "composed", "--ros-args", *files))
+    for refused in second:
+        said = output_of(refused)
+        errors = [line for line in said.splitlines() if not line.startswith("[ros2run]")]
+        assert refused.returncode == 2 and len(errors) == 1 and "another node publishes /" in errors[0], said
+    run = processes.run("hsv", "run", "case1", "--no-report", "--bag", processes.folder / "other")
+    assert run.returncode == 1 and "expected no other" in run.stdout and len(run.stdout.splitlines()) == 1, run.stdout
+    assert not (processes.folder / "other").exists()
+
+
+def test_dumped_parameters_fly_the_same(shared_processes: Processes) -> None:
+    """Those that the test before has dumped; with simulated time for all who do not make it, which changes no bit."""
+    folder = shared_processes.folder
+    arguments = {
+        node.name: ["--params-file", str(folder / "dumps" / f"{'nf2' if node is NOTCH_FILTER else node.name}.yaml")]
+        for node in graph()
+    }
+    for name in arguments:
+        shortened = ["-p", f"duration:={DURATION}", "-p", "real_time_factor:=0.0"]
+        arguments[name] += shortened if name == PLANT.name else ["-p", "use_sim_time:=true"]
+    arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]
+    arguments[RECORDER.name] += ["-p", f"bag.directory:={folder / 'again'}", "-p", "bag.attachments:=['']"]
+    nodes = by_hand(shared_processes, graph(), arguments)
+    said = output_of(nodes["plant"])
+    assert nodes["plant"].returncode == 0, said
+    shared_processes.stop()
+    scenario = load_scenario(str(short_scenario(folder, DURATION, 3)))
+    expected = fly(assemble(flight_parameters(scenario))).fingerprint
+    assert flight_fingerprint(Bag(folder / "again")) == expected
