@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import typer
 from rich.text import Text
 
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, print_json
 
 
-def scenarios(json: JsonOption = False) -> None:
-    """List the shipped scenarios.
+def scenarios(
+    show: Annotated[str, typer.Option(metavar="NAME", help="Print this one whole, a shipped one or a file.")] = "",
+    json: JsonOption = False,
+) -> None:
+    """List the shipped scenarios, or print one with everything that it takes from the one it extends.
 
-    Example: hsv scenarios
+    Example: hsv scenarios --show case2_derived
     """
-    from hsv.simulation.scenario import load_scenario, scenario_names
+    import tomllib
 
+    from hsv.simulation.scenario import load_scenario, scenario_names, scenario_text
+
+    if show:
+        load_scenario(show)
+        text = scenario_text(show)
+        if json:
+            print_json(tomllib.loads(text))
+        else:
+            print(text, end="")
+        return
     titles = {name: load_scenario(name).title for name in scenario_names()}
     if json:
         print_json(titles)

@@ -11,6 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from hsv.control.design_file import find_file
 from hsv.errors import DesignError
+from hsv.inheritance import is_path, whole
 from hsv.units import parse_quantity
 from hsv.vehicle.dynamics import N_RIGID
 
@@ -294,16 +295,21 @@ def read_inputs(path: Path) -> DesignInputs:
     Raises:
         DesignError: The file is missing or is not TOML, or a field is wrong.
     """
-    try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design input file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: {error}, expected TOML") from error
+    table = whole(str(path), _read, lambda name, why: DesignError(f"{name}: {why}"))
     try:
         return parse_inputs(table)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from error
+
+
+def _read(name: str) -> dict[str, Any]:
+    path = Path(name) if is_path(name) else find_inputs(name)
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design input file") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: {error}, expected TOML") from error
 
 
 def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:

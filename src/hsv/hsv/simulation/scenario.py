@@ -9,12 +9,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import tomli_w
 from pydantic import Field, StrictBool, StrictInt, ValidationError
 
 from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
+from hsv.inheritance import EXTENDS, is_path, whole
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
 from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
 from hsv.simulation.metrics import METRICS
@@ -167,18 +169,33 @@ class Scenario(Table):
         return values
 
 
+REPLACED = ("limits",)
+"""Tables that a scenario does not share with the one it extends: what is expected of a flight is its own."""
+
+
 def scenario_names() -> list[str]:
     """Return the names of the shipped scenarios."""
     return sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml"))
 
 
 def scenario_text(name: str) -> str:
-    """Return the text of a shipped scenario (by name) or of a file (by path).
+    """Return the text of a shipped scenario (by name) or of a file (by path), with what it extends written out.
 
     Raises:
-        ScenarioError: No such scenario or file.
+        ScenarioError: No such scenario or file, or it cannot be read.
     """
-    if "/" in name or name.endswith(".toml"):
+    text = _own_text(name)
+    if EXTENDS not in _table(text, name):
+        return text
+    return tomli_w.dumps(whole(name, lambda other: _table(_own_text(other), other), _refused, REPLACED))
+
+
+def _refused(name: str, why: object) -> ScenarioError:
+    return ScenarioError(f"scenario {Path(name).stem!r}: {why}")
+
+
+def _own_text(name: str) -> str:
+    if is_path(name):
         try:
             return Path(name).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
@@ -187,6 +204,13 @@ def scenario_text(name: str) -> str:
     if name not in scenario_names():
         raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
     return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _table(text: str, name: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _refused(name, error) from error
 
 
 def load_scenario(name: str) -> Scenario:
@@ -199,11 +223,8 @@ def load_scenario(name: str) -> Scenario:
 
 
 def parse_scenario(text: str, name: str) -> Scenario:
-    """Return the scenario written in ``text``; errors as in :func:`load_scenario`."""
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"scenario {name!r}: {error}") from error
+    """Return the scenario written in ``text``, as :func:`scenario_text` returns it; errors as :func:`load_scenario`."""
+    table = _table(text, name)
     for key in ("name", "own"):
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
