@@ -98,7 +98,7 @@ def _to_the_same_goals(base: Scenario, initial: Mapping[str, float]) -> tuple[Co
 def scenario_toml(base: Scenario, factors: Sequence[Factor], sample: Sequence[float]) -> str:
     """Return :func:`flown_scenario` as a file that ``hsv run`` takes; no digit is lost on the way."""
     flown = flown_scenario(base, factors, sample)
-    table = flown.model_dump(exclude={"name", "limits"}, exclude_defaults=True)
+    table = {**flown.model_dump(exclude={"name", "limits", "own"}, exclude_defaults=True), **flown.own}
     for path, unit in _UNITS.items():
         *tables, key = path.split(".")
         for place in _places(table, tables):

@@ -114,7 +114,9 @@ def _print_tables(
         values = (number(v, d.unit) for v in (d.minimum, d.median, d.percentile_95, d.maximum))
         table.add_row(d.name.replace("_", " "), *values, shown((1.0, d.unit), units)[1].removesuffix("1"))
     console.print(table)
-    console.print("worst flights, by what they use of their limits:")
+    worst = [w for w in worst if w.limit]  # of a scenario without limits, those that diverged
+    if worst:
+        console.print("worst flights, by what they use of their limits:")
     for w in worst:
         used = w.limit if w.limit == "diverged" else f"{100 * w.ratio:.0f} % of {w.limit.replace('_', ' ')}"
         console.print(f"  {w.flight}: {used}; {sample_words(w.sample)}", soft_wrap=True)
