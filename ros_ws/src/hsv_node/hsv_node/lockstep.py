@@ -8,7 +8,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from hsv_msgs.msg import Ready, Run
+from hsv_msgs.msg import Ready, Run, VehicleState
+from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 from rclpy.node import NodeNameNonExistentError
 
 from hsv.errors import RunError
@@ -195,27 +196,42 @@ class LockstepNode(ProcessNode):
 
 
 class PeerNode(LockstepNode):
-    """A node other than the plant: it announces itself ready to every run that the plant announces."""
+    """A node other than the plant: it announces itself ready to every run that the plant announces.
+
+    How the run ended it learns from the plant; a plant that is gone without a word has broken it off.
+    """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
         super().__init__(role, task)
         self._run: Run | None = None
-        self._announced = False
+        self._announced = self._over = False
         self._ready = self.create_publisher(Ready, description.READY, LATCHED)
-        self._runs = self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
+        # Before the run, so that the end of one is heard before the beginning of the next.
+        self.create_subscription(VehicleState, description.LAST_STATE, self._on_last_state, LATCHED)
+        links = SubscriptionEventCallbacks(matched=self._on_plant)
+        self._runs = self.create_subscription(Run, description.RUN, self._on_run, LATCHED, event_callbacks=links)
 
     def start_run(self, run: Run) -> None:
         """Forget the run before; overridden by every node."""
+
+    def end_run(self, how: str) -> None:
+        """Say how the run ended; overridden where there is more to say."""
+        self.get_logger().info(how)
+
+    def missing(self) -> list[str]:
+        """Return what this node waits for before it is ready; overridden where that is more than links."""
+        return self.missing_links()
 
     def poll(self) -> None:
         """Announce this node as ready as soon as all its links are matched; until then say for whom it waits."""
         if self._announced:
             return
-        if self._run is not None and self.links_are_counted() and not self.missing_links():
+        if self._run is not None and self.links_are_counted() and not self.missing():
             self._announced = True
             self._ready.publish(Ready(node=self.role.name, run_id=self._run.run_id))
+            self.get_logger().info(f"ready for {run_in_words(self._run)}")
         else:
-            self.say_waiting(lambda: self.missing_links() or [f"plant ({self._runs.topic_name})"])
+            self.say_waiting(lambda: self.missing() or [f"plant ({self._runs.topic_name})"])
 
     def wait_timeout(self) -> float:
         """Look at the links more often until they stand."""
@@ -228,5 +244,37 @@ class PeerNode(LockstepNode):
             self.finish(2)
             return
         self._run = run
-        self._announced = False
+        self._announced = self._over = False
         self.start_run(run)
+
+    def _on_last_state(self, state: VehicleState) -> None:
+        if state.status == VehicleState.RUNNING:
+            self._end(f"broken off by the plant at {step_in_words(state)}")
+        else:
+            how = "finished" if state.status == VehicleState.FINISHED else "diverged"
+            self._end(f"{how} at {step_in_words(state)}")
+
+    def _on_plant(self, info: QoSSubscriptionMatchedInfo) -> None:
+        if info.current_count == 0:
+            self._end("broken off, the plant is gone")
+
+    def _end(self, how: str) -> None:
+        """Note the end of the run that this node is ready for, once: the plant says it, and then is gone."""
+        if self._run is not None and self._announced and not self._over:
+            self._over = True
+            self.end_run(f"run {short_id(self._run)} {how}")
+
+
+def short_id(run: Run) -> str:
+    """Return as much of the run's id as tells it from others, for people."""
+    return str(run.run_id[:8])
+
+
+def run_in_words(run: Run) -> str:
+    """Return which run this is, and how long it will be."""
+    return f"run {short_id(run)}: {run.last_step + 1} steps, {run.last_step * run.period:g} s"
+
+
+def step_in_words(state: VehicleState) -> str:
+    """Return at which time and step a state is."""
+    return f"t = {state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec:.2f} s, step {state.step}"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import signal
 import time
 import uuid
 from collections.abc import Sequence
 
 import numpy as np
 from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
+from rclpy.duration import Duration
 from rosgraph_msgs.msg import Clock
 
 from hsv.graph.description import (
@@ -16,6 +18,7 @@ from hsv.graph.description import (
     EXIT_DIVERGED,
     FAULT_INJECTOR,
     FORCES,
+    LAST_STATE,
     PLANT,
     READY,
     RECORDER,
@@ -28,7 +31,7 @@ from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_sta
 from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
-from hsv_node.lockstep import LINK_LOOK, LockstepNode
+from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
@@ -36,6 +39,9 @@ from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
 """Steps that the plant may be ahead of the recorder."""
+
+LAST_WORDS = 1.0
+"""Seconds for which a plant that ends waits for those whom it has told so; on a run that ends in order, a fraction."""
 
 
 class PlantNode(LockstepNode):
@@ -59,6 +65,9 @@ class PlantNode(LockstepNode):
         self._run = Run(run_id=uuid.uuid4().hex, period=self.plant.period, last_step=self.plant.steps)
         self._announcer = self.create_publisher(Run, RUN, LATCHED)
         self._announcer.publish(self._run)
+        self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
+        self._broken_off = ""
+        """By what, if it was."""
         self._result = self.plant.reset()
         self._started = False
         self._recorded_step = -1
@@ -140,13 +149,28 @@ class PlantNode(LockstepNode):
 
     def stopped(self, signal_number: int) -> int:
         """Say that the flight is incomplete."""
+        self._broken_off = signal.Signals(signal_number).name
         return 128 + signal_number
+
+    def close(self) -> None:
+        """Say how the run ended, here and to the other nodes."""
+        if not self._started:
+            return
+        run, where = f"run {short_id(self._run)}", step_in_words(self._state_message)
+        match self._result.status:
+            case FlightStatus.RUNNING:
+                self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
+            case FlightStatus.FINISHED:
+                self.get_logger().info(f"{run} finished at {where}")
+        self._last_state.publish(self._state_message)
+        self._last_state.wait_for_all_acked(Duration(seconds=LAST_WORDS))
 
     def _try_start(self) -> None:
         if self._is_ready() and self.links_are_counted() and not self.missing_links():
             self._started = True
             self._begun = time.monotonic()
             self._standstill = Standstill()
+            self.get_logger().info(f"starts {run_in_words(self._run)}")
             self._publish()
             return
         self.say_waiting(self._missing, decides=True)
@@ -174,6 +198,7 @@ class PlantNode(LockstepNode):
         silent = unresponsive(self, self._peers)
         blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
         self.get_logger().fatal(f"step {step}: no {topic} (from {source.name}) for {waited:.1f} s; {blame}")
+        self._broken_off = blame
         self.finish(1)
 
     def _land(self) -> None:

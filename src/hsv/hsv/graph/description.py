@@ -56,6 +56,10 @@ OTHER_TOPICS = {
 Those with a leading slash are ROS's own: every node of a domain has them under this name, in whatever namespace it is.
 """
 
+LAST_STATE = "hsv/last_state"
+"""Topic on which the plant says, latched, with which state a run ended: finished, diverged, or running where it was
+broken off. One message a run, and not recorded: the bag holds the state itself."""
+
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
 
