@@ -11,7 +11,7 @@ import pytest
 from flown_bags import flown_bag, parameters, write_bag
 
 from hsv.graph.description import TOPICS
-from hsv.graph.preparation import parameter_yaml
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.metadata import FILE_NAME
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
@@ -46,7 +46,7 @@ def test_replay_names_process_step_and_field(hsv: Hsv, bag: Path, tmp_path: Path
     gain = list(design["feedback.gain"])
     gain[9 + 3] *= 1.0 + 1e-6
     file = tmp_path / "under_test.yaml"
-    file.write_text(parameter_yaml(design | {"feedback.gain": gain}))
+    file.write_text(ParameterSections(design | {"feedback.gain": gain}).to_yaml())
     done = hsv("replay", str(bag), "--parameters", str(file))
     assert done.code == 1
     (line,) = [line for line in done.out.splitlines() if line.startswith("tube_mpc")]

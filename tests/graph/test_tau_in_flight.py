@@ -67,7 +67,7 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     values = flown_parameters(bag)
     results = [replay(bag, chosen("tube_mpc")["tube_mpc"], values, lambda *_: None)]
     # The graph repeats scheduled changes as the loop in process does: tests/graph/test_lockstep.py.
-    values["duration"] = complete_steps(bag) * values["period"]
+    values.shared["duration"] = complete_steps(bag) * values.shared["period"]
     results += rerun(bag, "tube_mpc", values, lambda *_: None)
     assert all(result.identical for result in results)
     done = processes.run("hsv", "replay", bag_path, "--over-dds", "--node", "tube_mpc")

@@ -12,7 +12,7 @@ from flown_bags import flown_bag, parameters, types, write_bag
 from hsv.errors import RecordingError
 from hsv.faults.actuator import Fault
 from hsv.graph.description import CONTROLLERS, RECORDER, TOPICS, graph
-from hsv.graph.preparation import parameter_yaml
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track
 from hsv.replay.attached import flown_parameters, refuse_vacuous
@@ -71,7 +71,7 @@ def test_a_gain_changed_by_a_millionth_is_found(bag: Bag, tmp_path: Path) -> Non
     gain = list(design["feedback.gain"])
     gain[9 + 3] *= 1.0 + 1e-6
     file = tmp_path / "under_test.yaml"
-    file.write_text(parameter_yaml(design | {"feedback.gain": gain}))
+    file.write_text(ParameterSections(design | {"feedback.gain": gain}).to_yaml())
     results = replay_all(bag, file)
     assert [name for name, result in results.items() if not result.passed] == ["tube_mpc"]
     first = results["tube_mpc"].topics[0].first
@@ -91,7 +91,7 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
     }
     bag = Bag(flown_bag(tmp_path / "flown", in_flight=in_flight))
     values = flown_parameters(bag)
-    assert sorted(values["fault.stops"]) != []
+    assert sorted(values.shared["fault.stops"]) != []
     assert all(result.identical for result in replay_all(bag).values())
     assert all(result.identical for result in rerun(bag, CONTROLLER, values, quiet))
 
@@ -151,13 +151,13 @@ def test_tau_changed_in_flight_is_repeated_from_what_was_recorded(tmp_path: Path
     design, scenario = parameters(12.0, 6.0)
     design |= {"feedback.tau_minimum": [0.5]}
     changes = {"tau_change.starts": [3.0, 7.02], "tau_change.values": [0.7, 1.0]}
-    tracks = fly(types(), CONTROLLER, design | scenario | {"feedback.tau": [0.9]} | changes, quiet)
+    tracks = fly(types(), CONTROLLER, ParameterSections(design | scenario | {"feedback.tau": [0.9]} | changes), quiet)
     bag = Bag(write_bag(tmp_path / "changed", tracks, design, scenario))
     values = flown_parameters(bag)
-    assert values["feedback.tau"] == [0.9] * 5
-    assert values["tau_change.starts"] == pytest.approx([3.0, 7.02])
+    assert values.shared["feedback.tau"] == [0.9] * 5
+    assert values.shared["tau_change.starts"] == pytest.approx([3.0, 7.02])
     results = [replay(bag, process, values, quiet) for process in chosen(CONTROLLER).values()]
     assert all(result.identical for result in [*results, *rerun(bag, CONTROLLER, values, quiet)])
     # What was scheduled is no change in flight.
     again = Bag(write_bag(tmp_path / "scheduled", tracks, design, scenario | {"feedback.tau": [0.9]} | changes))
-    assert flown_parameters(again)["feedback.tau"] == [0.9]
+    assert flown_parameters(again).shared["feedback.tau"] == [0.9]

@@ -11,7 +11,7 @@ from rosbags.typesys.store import Typestore
 
 from hsv.faults.actuator import FaultInjector
 from hsv.graph.description import TOPICS, resolved
-from hsv.graph.preparation import parameter_yaml
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.track import Track
@@ -57,8 +57,9 @@ def as_flown(values: Mapping[str, Any], in_flight: InFlight) -> dict[str, Any]:
 def flown_bag(path: Path, duration: float = 12.0, fault: float = 6.0, in_flight: InFlight = NOTHING) -> Path:
     """Fly a shortened Case 1 and record it as the recorder does, parameters attached."""
     design, scenario = parameters(duration, fault)
-    values = design | scenario
-    tracks = fly(types(), controller_of(values), values | as_flown(values, in_flight), lambda *_: None)
+    values = ParameterSections(design | scenario)
+    values = values.updated(as_flown(values.shared, in_flight))
+    tracks = fly(types(), controller_of(values), values, lambda *_: None)
     return write_bag(path, tracks, design, scenario)
 
 
@@ -69,7 +70,7 @@ def write_bag(path: Path, tracks: Mapping[str, Track], design: Mapping[str, Any]
     writer = BagWriter(path, topics, {"scenario": "short", "commit": "0" * 40})
     for name, values in (("design.yaml", design), ("scenario.yaml", scenario)):
         plain = {key: value.tolist() if hasattr(value, "tolist") else value for key, value in values.items()}
-        writer.attach(name, "application/yaml", parameter_yaml(plain).encode())
+        writer.attach(name, "application/yaml", ParameterSections(plain).to_yaml().encode())
     longest = max(len(track.data) for track in tracks.values())
     for row in range(longest):
         for topic in kinds:

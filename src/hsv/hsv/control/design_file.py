@@ -261,18 +261,36 @@ def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
     Raises:
         DesignError: The text is not parameter YAML; the message names ``source``.
     """
+    sections = parse_sections(text, source)
+    flat: dict[str, Any] = {}
+    for section in ("/**", node, f"/{node}"):
+        flat |= sections.get(section, {})
+    if not flat:
+        raise _no_parameters(source)
+    return flat
+
+
+def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
+    """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes.
+
+    Raises:
+        DesignError: As :func:`parse_parameters`.
+    """
     try:
         tree = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.YAMLError as error:
         raise DesignError(f"design {source!r}: {' '.join(str(error).split())}") from error
-    flat: dict[str, Any] = {}
-    for section in ("/**", node, f"/{node}"):
-        branch = tree.get(section) if isinstance(tree, dict) else None
+    sections: dict[str, dict[str, Any]] = {}
+    for section, branch in tree.items() if isinstance(tree, dict) else ():
         if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
-            _flatten(branch["ros__parameters"], "", flat)
-    if not flat:
-        raise DesignError(f"design {source!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
-    return flat
+            _flatten(branch["ros__parameters"], "", sections.setdefault(str(section), {}))
+    if not any(sections.values()):
+        raise _no_parameters(source)
+    return sections
+
+
+def _no_parameters(source: str) -> DesignError:
+    return DesignError(f"design {source!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
 
 
 def read_design(path: Path) -> ControlDesign:

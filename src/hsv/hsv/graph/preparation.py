@@ -6,16 +6,14 @@ import datetime
 import subprocess
 import tempfile
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from hsv.control.design_file import digest, find_design, read_parameters
 from hsv.errors import RecordingError, ScenarioError
 from hsv.graph.description import CONTROLLERS, NodeDescription, graph
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
@@ -68,7 +66,11 @@ def prepare(
     run_id = uuid.uuid4().hex
     temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
     folder = Path(temporary.name)
-    files = {"scenario.toml": text, "scenario.yaml": parameter_yaml(scenario.parameters()), **design_files(design_file)}
+    files = {
+        "scenario.toml": text,
+        "scenario.yaml": ParameterSections(scenario.parameters()).to_yaml(),
+        **design_files(design_file),
+    }
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
@@ -95,7 +97,7 @@ def prepare(
             }.items()
         ],
     }
-    (folder / "run.yaml").write_text(parameter_yaml(run), encoding="utf-8")
+    (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
     nodes = graph(scenario.controller)
     return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
@@ -133,9 +135,3 @@ def commit() -> str:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
-
-
-def parameter_yaml(parameters: Mapping[str, Any], node: str = "/**") -> str:
-    """Return flat parameters as the text of a ROS 2 parameter file for every node, or for one that is named."""
-    # Dotted names need no nesting: rcl takes them as they are.
-    return yaml.safe_dump({node: {"ros__parameters": dict(parameters)}}, sort_keys=False)

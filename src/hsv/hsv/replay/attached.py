@@ -11,11 +11,24 @@ import numpy as np
 
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import ControlDesign, find_design, parse_parameters, read_design_parameters
+from hsv.control.design_file import ControlDesign, find_design, read_design_parameters
+from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.actuator import Fault, FaultInjector
-from hsv.graph.description import COMMAND, FAULT_STATUS, NOMINAL, STATE, TOPICS, TUBE_MPC, TUBE_STATUS
-from hsv.graph.preparation import design_files, parameter_yaml
+from hsv.graph.description import (
+    COMMAND,
+    FAULT_INJECTOR,
+    FAULT_STATUS,
+    NOMINAL,
+    PLANT,
+    STATE,
+    TOPICS,
+    TUBE_MPC,
+    TUBE_STATUS,
+)
+from hsv.graph.parameter_sections import ParameterSections
+from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS
+from hsv.graph.preparation import design_files
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
 from hsv.recording.reader import Bag
@@ -26,6 +39,11 @@ from hsv.simulation.scenario import parse_scenario, scenario_text
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 """Attachments: the parameters of the design and, over them, those of the scenario."""
+
+_OF_THE_RUN = {p.name for p in (*PACE_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)} - {
+    p.name for p in CONTROLLER_PARAMETERS
+}
+"""Parameters that say how and where the flight was made, such as its pace, and nothing of the flight itself."""
 
 LEAST_ACTIVE_TIME = 10.0
 """Seconds of simulated time for which the controller must have done something."""
@@ -50,7 +68,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
     if scenario is not None:
         text = scenario_text(scenario)
         parsed = parse_scenario(text, Path(scenario).stem)
-        files = {"scenario.toml": text, SCENARIO: parameter_yaml(parsed.parameters())}
+        files = {"scenario.toml": text, SCENARIO: ParameterSections(parsed.parameters()).to_yaml()}
         with blamed_on(parsed):
             design = design or find_design(parsed.design)
     if design is not None:
@@ -61,11 +79,11 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
         bag.media_types[name] = mimetypes.guess_type(name)[0] or "text/plain"
 
 
-def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
-    """Return the flat parameters of a recorded run; what was changed in flight, faults and tau, is part of them.
+def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
+    """Return the parameters of the nodes in a recorded run; what was changed in flight, faults and tau, is part of them.
 
     Args:
-        bag: A bag of ``hsv run``, or one that :func:`supply` gave what it lacks.
+        bag: A bag of our recorder, or one that :func:`supply` gave what it lacks.
         design: Parameter file to put in place of the attached design.
 
     Raises:
@@ -78,21 +96,22 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> dict[str, Any]:
                 f"{bag.path}: no attachment {name}: ros2 bag record and convert keep none, expected --scenario "
                 "NAME|FILE and, where the flight had another design than the scenario's, --design FILE"
             )
-    attached = {name: parse_parameters(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO)}
-    values = attached[DESIGN] | attached[SCENARIO]
+    designed, scenario = (ParameterSections.parse(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO))
+    scenario = scenario.only(scenario.names - _OF_THE_RUN)
+    values = designed.overlaid(scenario)
     with expecting_fields(bag.path):
         try:
-            changed = _faults_as_flown(bag, values) | _tau_as_flown(bag, values)
+            changed = _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)) | _tau_as_flown(bag, values)
         except (DesignError, ParameterError) as error:
             raise RecordingError(f"{bag.path}: attached {error}") from error
     if design is not None:
-        values = read_design_parameters(design) | attached[SCENARIO]
-    return values | changed
+        values = ParameterSections(read_design_parameters(design)).overlaid(scenario)
+    return values.updated(changed)
 
 
-def controller_of(values: dict[str, Any]) -> str:
+def controller_of(values: ParameterSections) -> str:
     """Return the name of the controller node that these parameters choose."""
-    return str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+    return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
 
 
 def complete_steps(bag: Bag, topics: Iterable[str] = TOPICS) -> int:
@@ -152,15 +171,16 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     return injector.parameters(float(values["period"])) if changed else {}
 
 
-def _tau_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
+def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
     """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]
     if recorded_status and not np.shape(recorded_status[0].tau):
         raise RecordingError(
             f"{bag.path}: topic {bag.name_of(TUBE_STATUS)}: recorded with another definition, one number for tau"
         )
-    if controller_of(values) != TUBE_MPC.name:
+    if controller_of(sections) != TUBE_MPC.name:
         return {}
+    values = sections.of(TUBE_MPC.name)
     design = ControlDesign.from_parameters(values)
     schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]
     flown: list[tuple[int, np.ndarray]] = []

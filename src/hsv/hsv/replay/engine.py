@@ -12,6 +12,7 @@ from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
 from hsv.graph.description import CLOCK, COMMAND, STATE, TOPICS
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
@@ -75,13 +76,13 @@ class _Outputs:
             track.times.append(nanoseconds(message.clock if topic == CLOCK else message.header.stamp))
 
 
-def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Progress) -> ProcessComparison:
+def replay(bag: Bag, process: Process, values: ParameterSections, progress: Progress) -> ProcessComparison:
     """Feed ``process`` with its recorded inputs and compare what it makes of them.
 
     Args:
         bag: The recorded run.
         process: The process under test.
-        values: Flat parameters of the component under test.
+        values: Parameters of the nodes; the component under test takes those of its own.
         progress: Told how far it is.
 
     Raises:
@@ -89,7 +90,7 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
         ParameterError, DesignError: The component refuses its parameters.
     """
     require(bag, process.outputs)
-    component = process.build(values)
+    component = process.build(values.of(process.node.name))
     outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
     recorded = [bag.track(topic) for topic in process.inputs]
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
@@ -111,13 +112,13 @@ def replay(bag: Bag, process: Process, values: Mapping[str, Any], progress: Prog
     return compare_process(bag, process, outputs.tracks)
 
 
-def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progress) -> list[ProcessComparison]:
+def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
     """Fly the whole loop again in this process and compare every step topic.
 
     Args:
         bag: The recorded run.
         controller: Name of the controller that closes the loop.
-        values: Flat parameters of all components.
+        values: Parameters of the nodes.
         progress: Told how far it is.
 
     Raises:
@@ -130,7 +131,7 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
 
 
 def fly(
-    types: Typestore, controller: str, values: Mapping[str, Any], progress: Progress, source: str = "types"
+    types: Typestore, controller: str, values: ParameterSections, progress: Progress, source: str = "types"
 ) -> dict[str, Track]:
     """Fly the loop in this process, message by message as the graph does, and return every step topic.
 
@@ -138,7 +139,7 @@ def fly(
         RecordingError: ``types``, which ``source`` defines, lack a field.
     """
     processes = chosen(controller)
-    components = {name: process.build(values) for name, process in processes.items()}
+    components = {name: process.build(values.of(name)) for name, process in processes.items()}
     made = {
         name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
         for name, process in processes.items()

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from hsv.errors import RecordingError
 from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, TOPICS, NodeDescription, graph
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.preparation import parameter_yaml
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag
 from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process, require
 
 
 def replay_all(
-    bag: Bag, names: Sequence[str], controller: str, values: Mapping[str, Any], progress: Progress
+    bag: Bag, names: Sequence[str], controller: str, values: ParameterSections, progress: Progress
 ) -> Iterator[ProcessComparison]:
     """Run each of the nodes ``names`` alone, fed from ``bag`` by a peer emulator, and compare its answers.
 
@@ -38,13 +37,13 @@ def replay_all(
                 "peer_emulator.directory": str(answers),
             }
             steps = len(bag.messages(STATE))
-            text = parameter_yaml({**values, "recorder": False}) + parameter_yaml(emulated, PEER_EMULATOR.name)
-            _run((process.node, PEER_EMULATOR), text, Path(folder), name, steps, progress)
+            run = values.overlaid(ParameterSections({"recorder": False}, {PEER_EMULATOR.name: emulated}))
+            _run((process.node, PEER_EMULATOR), run, Path(folder), name, steps, progress)
             made = Bag(answers)
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
 
-def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progress) -> Iterator[ProcessComparison]:
+def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
     """Fly the whole graph again and compare every step topic.
 
     Raises:
@@ -56,7 +55,7 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
         again = Path(folder, "again")
         steps = len(bag.messages(STATE))
         run = {"recorder": True, "bag.directory": str(again)}
-        _run(graph(controller), parameter_yaml({**values, **run}), Path(folder), PLANT.name, steps, progress)
+        _run(graph(controller), values.updated(run), Path(folder), PLANT.name, steps, progress)
         made = Bag(again)
         for process in chosen(controller).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
@@ -64,15 +63,15 @@ def rerun(bag: Bag, controller: str, values: Mapping[str, Any], progress: Progre
 
 def _run(
     nodes: Sequence[NodeDescription],
-    parameters: str,
+    values: ParameterSections,
     folder: Path,
     title: str,
     steps: int,
     progress: Progress,
 ) -> None:
-    """Run ``nodes``, with the text of a parameter file, until the last has ended: the emulator or else the plant."""
+    """Run ``nodes`` until the last of them has ended: the emulator or, where there is none, the plant."""
     file = folder / "parameters.yaml"
-    file.write_text(parameters, encoding="utf-8")
+    file.write_text(values.to_yaml(), encoding="utf-8")
 
     def line(_: str, text: str) -> None:
         if text.startswith("step "):
