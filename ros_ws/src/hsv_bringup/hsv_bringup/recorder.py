@@ -8,17 +8,19 @@ import struct
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from hsv_msgs.msg import RecorderProgress, Run, VehicleState
 from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
-from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS
+from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS, peers
 from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
+from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
 from hsv_node.lockstep import PeerNode
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
@@ -54,8 +56,10 @@ class RecorderNode(PeerNode):
         self._names = {topic: self.resolve_topic_name(topic) for topic in (TOPICS | OTHER_TOPICS)}
         self.bag = BagWriter(directory, custom_data=custom_data | naming(self._names, self.get_namespace()))
         for path in attachments:
-            media_type = mimetypes.guess_type(path.name)[0] or "text/plain"
-            self.bag.attach(path.name, media_type, path.read_bytes())
+            self._attach(path.name, path.read_bytes())
+        self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in attachments}
+        """Whether the nodes are to be asked for their parameters: nobody else has attached them."""
+        self._peers: PeerParameters | None = None
         for topic, kind in (TOPICS | OTHER_TOPICS).items():
             latched = topic in LATCHED_TOPICS
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
@@ -72,7 +76,7 @@ class RecorderNode(PeerNode):
             self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
         self._progress_message = RecorderProgress()
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
-        self.get_logger().info(f"recording to {directory}")
+        self.get_logger().info(f"records to {self.bag.directory}")
 
     def start_run(self, run: Run) -> None:
         """Note how many steps will come; a second run would need a second bag."""
@@ -82,8 +86,54 @@ class RecorderNode(PeerNode):
                 "and a ROS_DOMAIN_ID or a namespace of its own for each that flies at the same time"
             )
             self.finish(1)
+        if self._peers:
+            self._peers.close()
+        self._peers = None
         self._last_step = run.last_step
         self._nanoseconds_per_step = round(run.period * 1e9)
+
+    def end_run(self, how: str) -> None:
+        """Say how the run ended, and what is left to do by hand."""
+        self.get_logger().info(f"{how}; Ctrl-C closes the bag")
+
+    def missing(self) -> list[str]:
+        """Wait for the links, then, of a run that nobody prepared, for the parameters of all nodes in it."""
+        missing = super().missing()
+        if missing or self._run is None or not self._asks:
+            return missing
+        if self._peers is None:
+            roles = peers(RECORDER, self.controller, recorded=True)
+            names = {role.name: name for role in roles if (name := self.node_in_role(role))}
+            if unknown := [role.name for role in roles if role.name not in names]:
+                return unknown
+            self._peers = PeerParameters(self, names)
+        silent = self._peers.silent()
+        if silent and not self._peers.gave_up:
+            return [f"{role} ({service})" for role, service in silent.items()]
+        self._keep_parameters(self._run, self._peers.values(), list(silent))
+        self._peers.close()
+        return []
+
+    def _keep_parameters(self, run: Run, values: dict[str, dict[str, Any]], silent: list[str]) -> None:
+        if silent:
+            self.get_logger().warning(
+                f"no answer from {', '.join(silent)} for {GIVE_UP_AFTER:g} s: the bag lacks the parameters of the run, "
+                "hsv replay will need --scenario and --design"
+            )
+            return
+        # Not at the top: the components' tables take their time, and a prepared run does without.
+        from hsv.graph.parameter_sections import disagreements
+        from hsv.graph.preparation import provenance, recorded_files
+
+        for words in disagreements(values):
+            self.get_logger().warning(words)
+        for name, text in recorded_files(values, self.controller).items():
+            self._attach(name, text.encode())
+        design = values[self.controller]
+        self.bag.add_custom_data({"run_id": run.run_id, **provenance(design.get("design.name", ""), design)})
+
+    def _attach(self, name: str, data: bytes) -> None:
+        self.bag.attach(name, mimetypes.guess_type(name)[0] or "text/plain", data)
 
     def _on_step_message(self, topic: str, data: bytes) -> None:
         # Every step topic begins with the simulated time, right behind the four bytes of the CDR header.
@@ -122,6 +172,7 @@ class RecorderNode(PeerNode):
             for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])
         self.bag.close()
+        self.get_logger().info(f"closed the bag {self.bag.directory}: {self._complete + 1} steps")
 
 
 def _status_place(state: bytes) -> int:

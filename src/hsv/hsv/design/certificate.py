@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from hsv.control.design_file import find_design
 from hsv.errors import DesignError
 from hsv.parameters import Parameter
 
@@ -18,6 +19,22 @@ CERTIFICATE_PARAMETERS = (
 def certificate_path(design_file: Path) -> Path:
     """Return where the certificate of a parameter file lies: ``baseline.yaml`` has ``baseline.certificate.json``."""
     return design_file.with_suffix(".certificate.json")
+
+
+def find_certificate(design: str, named: str = "") -> Path | None:
+    """Return the certificate ``named``, or where none is the one beside the design's own file; None if there is none.
+
+    Args:
+        design: Name of the design, or path of its parameter file.
+        named: Path of a certificate; not looked for.
+    """
+    if named:
+        return Path(named)
+    try:
+        path = certificate_path(find_design(design))
+    except DesignError:
+        return None
+    return path if path.is_file() else None
 
 
 def write_certificate(path: Path, report: dict[str, Any]) -> None:

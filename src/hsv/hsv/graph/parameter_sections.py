@@ -1,4 +1,4 @@
-"""The parameters of all nodes of a graph, in the form of a ROS 2 parameter file: what they share, and what is each's."""
+"""Parameters of all nodes of a graph, in the form of a ROS 2 parameter file: what they share, and what is their own."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any, Self
 
 import yaml
 
-from hsv.control.design_file import parse_sections
+from hsv.control.adjustable import TAU
+from hsv.control.design_file import DESIGN_PARAMETERS, parse_sections
 
 _ALL = "/**"
 
@@ -26,9 +27,7 @@ class ParameterSections:
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
         """Return the parameters of the nodes in ``values``: shared is what all that have it agree on."""
         differing = differences(values)
-        shared = {
-            name: value for flat in values.values() for name, value in flat.items() if name not in differing
-        }
+        shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
         return cls(shared, {node: flat for node, flat in own.items() if flat})
 
@@ -85,5 +84,29 @@ def differences(values: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, 
         for name, value in flat.items():
             by_name.setdefault(name, {})[node] = value
     return {
-        name: having for name, having in by_name.items() if any(v != next(iter(having.values())) for v in having.values())
+        name: having
+        for name, having in by_name.items()
+        if any(v != next(iter(having.values())) for v in having.values())
     }
+
+
+def disagreements(values: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Say which parameters nodes of one graph have with different values although they need the same.
+
+    Not ``feedback.tau``, which the controller alone flies with. Of two designs, their digests say enough.
+    """
+    differing = differences(values)
+    differing.pop(TAU.name, None)
+    if "design.hash" in differing:
+        for parameter in DESIGN_PARAMETERS:
+            if parameter.name not in ("design.hash", "period"):
+                differing.pop(parameter.name, None)
+    return [
+        f"parameter {name} differs: " + ", ".join(f"{_short(value)} in {node}" for node, value in having.items())
+        for name, having in differing.items()
+    ]
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 24 else text[:21] + "..."

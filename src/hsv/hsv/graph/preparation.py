@@ -6,11 +6,13 @@ import datetime
 import subprocess
 import tempfile
 import uuid
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from hsv.control.design_file import digest, find_design, read_parameters
+from hsv.control.design_file import DESIGN_PARAMETERS, digest, find_design, read_parameters
+from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import RecordingError, ScenarioError
 from hsv.graph.description import CONTROLLERS, NodeDescription, graph
 from hsv.graph.parameter_sections import ParameterSections
@@ -89,11 +91,7 @@ def prepare(
                 "run_id": run_id,
                 "scenario": scenario.name,
                 "title": scenario.title,
-                "commit": commit(),
-                "design": scenario.design,
-                "design_hash": digest(design),
-                "seed": "none",
-                "started": now.isoformat(timespec="seconds"),
+                **provenance(scenario.design, design),
             }.items()
         ],
     }
@@ -103,13 +101,42 @@ def prepare(
     return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
 
 
+def provenance(name: str, design: Mapping[str, Any]) -> dict[str, str]:
+    """Return what a bag says of where its flight comes from, with which design, and when: now."""
+    return {
+        "commit": commit(),
+        "design": name,
+        "design_hash": digest(design),
+        "seed": "none",
+        "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+    }
+
+
+def recorded_files(values: Mapping[str, Mapping[str, Any]], controller: str) -> dict[str, str]:
+    """Return the attachments of a bag whose run was not prepared here, by name: parameters and certificate.
+
+    Args:
+        values: Flat parameters of every node, by its role.
+        controller: Role of the controller, whose design it is.
+    """
+    sections = ParameterSections.gathered(values)
+    design = {parameter.name for parameter in DESIGN_PARAMETERS}
+    files = {
+        "design.yaml": sections.only(sections.names & design).to_yaml(),
+        "scenario.yaml": sections.only(sections.names - design).to_yaml(),
+    }
+    flown = values[controller]
+    certificate = find_certificate(flown.get("design.name", ""), flown.get("design.certificate", ""))
+    return files | _certificate(certificate)
+
+
 def design_files(design: Path) -> dict[str, str]:
     """Return what a design brings to the attachments of a bag, by name: parameters and certificate."""
-    files = {"design.yaml": design.read_text(encoding="utf-8")}
-    certificate = design.with_suffix(".certificate.json")
-    if certificate.is_file():
-        files["certificate.json"] = certificate.read_text(encoding="utf-8")
-    return files
+    return {"design.yaml": design.read_text(encoding="utf-8")} | _certificate(certificate_path(design))
+
+
+def _certificate(path: Path | None) -> dict[str, str]:
+    return {"certificate.json": path.read_text(encoding="utf-8")} if path and path.is_file() else {}
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:

@@ -79,7 +79,7 @@ class BagWriter:
         self._tallies: dict[str, Tally] = {}
         self._custom_data: dict[str, str] = {}
         self._pending = 0
-        self._add_custom_data(custom_data or {})
+        self.add_custom_data(custom_data or {})
         for topic in topics:
             self.add_topic(topic)
 
@@ -156,7 +156,7 @@ class BagWriter:
         custom_data
             What is known only at the end (outcome, wall time); added to that given at the start.
         """
-        self._add_custom_data(custom_data or {})
+        self.add_custom_data(custom_data or {})
         topics = [
             TopicInformation(name, topic.type, topic.qos.as_yaml(), topic.type_hash, self._tallies[name].count)
             for name, topic in self._topics.items()
@@ -168,7 +168,8 @@ class BagWriter:
             self._stream.close()
             write_metadata(self.directory, values)
 
-    def _add_custom_data(self, custom_data: Mapping[str, str]) -> None:
+    def add_custom_data(self, custom_data: Mapping[str, str]) -> None:
+        """Add to what is known of the run, over what was said before."""
         if custom_data:
             self._custom_data |= custom_data
             with self._writing():

@@ -80,7 +80,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
 
 
 def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
-    """Return the parameters of the nodes in a recorded run; what was changed in flight, faults and tau, is part of them.
+    """Return the parameters of the nodes in a recorded run, with what was changed in flight, faults and tau.
 
     Args:
         bag: A bag of our recorder, or one that :func:`supply` gave what it lacks.

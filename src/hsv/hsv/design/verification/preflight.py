@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 
-from hsv.control.design_file import ControlDesign, find_design
-from hsv.design.certificate import certificate_path, read_certificate
+from hsv.control.design_file import ControlDesign
+from hsv.design.certificate import find_certificate, read_certificate
 from hsv.design.verification.claims import Subject, gathered, require
 from hsv.design.verification.quick import QUICK
 from hsv.errors import DesignError
@@ -25,7 +24,7 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     Raises:
         DesignError: Names the claim that refuses, or the certificate that cannot be read.
     """
-    path = Path(certificate) if certificate else _beside(design.name)
+    path = find_certificate(design.name, certificate)
     if path is None:
         return f"design {design.name!r}: no certificate found, not verified"
     subject = Subject(design, read_certificate(path))
@@ -35,11 +34,3 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     except DesignError as error:
         raise DesignError(f"design {design.name!r}: {error}") from error
     return next((f"design {design.name!r} is not as certified: {claim}" for claim in claims if not claim.ok), "")
-
-
-def _beside(name: str) -> Path | None:
-    try:
-        path = certificate_path(find_design(name))
-    except DesignError:
-        return None
-    return path if path.is_file() else None
