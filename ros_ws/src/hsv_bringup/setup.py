@@ -18,8 +18,10 @@ setup(
         "console_scripts": [
             "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
+            "fault = hsv_bringup.fault:main",
             "player = hsv_bringup.player:main",
             "set_parameter = hsv_bringup.set_parameter:main",
+            "topic = hsv_bringup.topic:main",
             "peer_emulator = hsv_bringup.peer_emulator:main",
         ],
     },

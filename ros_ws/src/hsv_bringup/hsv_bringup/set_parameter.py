@@ -1,90 +1,85 @@
-"""Sets a parameter of a running node: ``ros2 run hsv_bringup set_parameter tube_mpc feedback.tau "[0.8]"``."""
+"""Changes a parameter in flight, one of those that may: ``ros2 run hsv_bringup set_parameter tau 0.8``."""
 
 from __future__ import annotations
 
 import argparse
-import sys
-import time
+import re
 from collections.abc import Sequence
-from pathlib import Path
 
-import rclpy
-import yaml
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.exceptions import NameValidationException
-from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.parameter_client import AsyncParameterClient
-from rclpy.utilities import remove_ros_args
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter as RosParameter
 
-from hsv.graph.description import COMPOSED
-from hsv.graph.progress import Standstill, processor_time_of
+from hsv.errors import ParameterError, RunError
+from hsv.graph.description import NodeDescription, graph
+from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.parameters import Parameter
+from hsv.units import parse_quantity
+from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 
-WAIT_TIMEOUT = 30.0
-"""Seconds to wait for a node that is not there while no process of its name does anything, nor other nodes come."""
+SETTABLE: dict[str, tuple[NodeDescription, Parameter]] = {
+    parameter.name: (node, parameter)
+    for node in graph()
+    for parameter in NODE_PARAMETERS[node.name]
+    if not parameter.read_only
+}
+"""Parameters that may change in flight, by name, with the node that has them."""
 
-_LOOK = 1.0
-"""Seconds between two looks at what moves."""
+_STEP = re.compile(r"from step (\d+) on")
 
 
-def set_parameter(node_name: str, name: str, value: object) -> SetParametersResult:
-    """Return what the node says to a new ``value``; not successful as well where no such node comes.
+def find(name: str) -> tuple[NodeDescription, Parameter]:
+    """Return the node and the parameter that a full name, or the last word of one, means.
 
-    A node that is there, or on its way, may take its time: its absence is an error, slowness is only told.
+    Raises:
+        ParameterError: None that may change in flight.
     """
-    parameter = Parameter(name, value=value).to_parameter_msg()
-    node = rclpy.create_node("set_parameter", enable_rosout=False)
-    try:
-        client = AsyncParameterClient(node, node_name)
-        answer = None
-        standstill, begun, looks = Standstill(), time.monotonic(), 0
-        while not (answer and answer.done()):
-            if answer is None and client.services_are_ready():
-                answer = client.set_parameters([parameter])
-            rclpy.spin_once(node, timeout_sec=0.1)
-            if time.monotonic() - begun < looks * _LOOK:
-                continue
-            looks += 1
-            if standstill.look(_moves(node, node_name)) > WAIT_TIMEOUT:
-                return SetParametersResult(successful=False, reason=f"no node {node_name!r} in {WAIT_TIMEOUT:g} s")
-            if looks % 5 == 0:
-                print(f"waiting for {node_name}", file=sys.stderr, flush=True)
-        return answer.result().results[0]
-    except NameValidationException:
-        expected = "expected the name of a node, such as tube_mpc"
-        return SetParametersResult(successful=False, reason=f"node = {node_name!r}: {expected}")
-    finally:
-        node.destroy_node()
+    found = [entry for full, entry in SETTABLE.items() if name in (full, full.rpartition(".")[2])]
+    if len(found) != 1:
+        raise ParameterError(f"name = {name!r}: expected a parameter that may change in flight, {', '.join(SETTABLE)}")
+    return found[0]
 
 
-def _moves(node: Node, name: str) -> object:
-    """Return what changes as long as node ``name`` is there or may come."""
-    names = sorted(space.rstrip("/") + "/" + other for other, space in node.get_node_names_and_namespaces())
-    if "/" + name.lstrip("/") in names:
-        return time.monotonic()
-    return names, processor_time_of((Path(name).name, COMPOSED.executable))
+def parse(text: str, parameter: Parameter) -> list[float]:
+    """Return the value in ``text``: numbers with their units between commas, in brackets or not.
+
+    Raises:
+        QuantityError, ParameterError: It is none that the parameter takes.
+    """
+    words = text.strip().removeprefix("[").removesuffix("]").split(",")
+    values = [parse_quantity(word, parameter.unit or "1", parameter.name) for word in words]
+    return list(parameter.check(values))
+
+
+def _set(client: GraphClient, options: argparse.Namespace) -> None:
+    node, parameter = find(options.name)
+    value = parse(options.value, parameter)
+    run = client.find_run()
+    request = SetParameters.Request(parameters=[RosParameter(parameter.name, value=value).to_parameter_msg()])
+    response = client.call(SetParameters, f"{_full_name(client, node)}/set_parameters", request)
+    result: SetParametersResult = response.results[0]
+    if not result.successful:
+        raise ParameterError(result.reason)
+    step = _STEP.search(result.reason)
+    assert step, "a parameter that may change in flight answers from which step on"
+    time, values = acting_from(run, int(step[1]))
+    named = {"node": node.name, "parameter": parameter.name, "value": value}
+    answer(f"{result.reason}, {time}", named | values, options.json)
+
+
+def _full_name(client: GraphClient, node: NodeDescription) -> str:
+    """Return the name of the node that plays the part of ``node``, which is whoever publishes its topics."""
+    topic = node.publishes[0]
+    if not client.wait_for(lambda: client.get_publishers_info_by_topic(topic), f"{node.name} ({topic})"):
+        raise RunError(f"no node publishes {topic}: expected {node.name}")
+    publisher = client.get_publishers_info_by_topic(topic)[0]
+    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Set the parameter and print the answer; return 0 only if the node took it."""
-    parser = argparse.ArgumentParser(prog="set_parameter", description=__doc__)
-    parser.add_argument("node", help="name of the node, e.g. tube_mpc")
-    parser.add_argument("parameter", help="e.g. feedback.tau")
-    parser.add_argument("value", help='in YAML, e.g. "[0.8]"')
-    given = list(sys.argv[1:] if args is None else args)
-    asked = parser.parse_args(remove_ros_args(given))
-    rclpy.init(args=given)
-    try:
-        result = set_parameter(asked.node, asked.parameter, yaml.safe_load(asked.value))
-    except (OverflowError, TypeError, ValueError, yaml.YAMLError) as error:
-        result = SetParametersResult(successful=False, reason=" ".join(str(error).split()))
-    finally:
-        rclpy.try_shutdown()
-    said = f"{asked.parameter} = {asked.value}"
-    if result.successful:
-        print(f"{said} is set")
-        return 0
-    # ROS itself refuses a value of another type without naming the parameter.
-    named = asked.parameter in result.reason
-    print(result.reason if named else f"{said}: {result.reason}", file=sys.stderr)
-    return 1
+    """Run the command."""
+    parser = OneLineParser(prog="set_parameter", description=__doc__)
+    parser.add_argument("name", help="e.g. tau, or feedback.tau")
+    parser.add_argument("value", help="e.g. 0.8, or a number for each element: 0.8,0.8,0.9,0.9,1")
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    return run_client(parser, _set, args)

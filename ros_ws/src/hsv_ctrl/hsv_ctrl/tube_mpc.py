@@ -32,7 +32,17 @@ class TubeMpcNode(ControllerNode):
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
         self.law = self._tube_law = TubeLaw.from_parameters(values, design)
+        self._changed = ""
+        """Which change is being made, and from which step on it acts."""
         self.add_on_set_parameters_callback(self._on_change)
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Say in the result from which step on the change acts, for whoever has asked for it."""
+        self._changed = ""
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful:
+            result.reason = self._changed
+        return result
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
         """Fly with another ``feedback.tau``, the one parameter that is not read-only, from the next step on."""
@@ -43,8 +53,8 @@ class TubeMpcNode(ControllerNode):
                     step = self._tube_law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                # Logged, and so recorded: what a parameter service answers has no room for the step.
-                self.get_logger().info(f"{TAU.name} = {values} from step {step} on")
+                self._changed = f"{TAU.name} = {values} from step {step} on"
+                self.get_logger().info(self._changed)
         return SetParametersResult(successful=True)
 
 

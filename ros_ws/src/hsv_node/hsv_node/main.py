@@ -6,6 +6,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from types import FrameType
 
 import rclpy
 from rclpy.exceptions import ParameterException
@@ -55,8 +56,7 @@ def run_nodes(
     ProcessNode.of_others = shared_parameters(words, several)
     # An orderly end must never wait for a message: the handler only asks, and the loop looks four times a second.
     stop: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, _frame: stop.append(received))
+    take_signals(lambda received, _frame: stop.append(received))
     nodes: list[ProcessNode] = []
     code = 0
     try:
@@ -90,6 +90,16 @@ def run_nodes(
             node.destroy_node()
         rclpy.try_shutdown()
     return code
+
+
+def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
+    """Have ``handler`` called at Ctrl-C and SIGTERM, also for those that came while this process was still starting.
+
+    Who has started it may have blocked them for that time: :func:`hsv.graph.launcher.become`.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
 
 
 def _refuse(name: str, error: BaseException) -> int:

@@ -15,6 +15,7 @@ from hsv.cli.claims import claims
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
+from hsv.cli.fault import fault
 from hsv.cli.figures import figures
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
@@ -27,8 +28,10 @@ from hsv.cli.replay import replay
 from hsv.cli.report import report
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
+from hsv.cli.set import set
 from hsv.cli.simulate import simulate
 from hsv.cli.study import study
+from hsv.cli.topic import topic
 from hsv.cli.trim import trim
 from hsv.cli.verify import verify
 from hsv.cli.view import view
@@ -67,9 +70,12 @@ for command in (
     figures,
     claims,
     study,
+    set,
+    topic,
 ):
     app.command()(command)
 app.add_typer(montecarlo, name="montecarlo")
+app.add_typer(fault, name="fault")
 
 
 def main() -> None:

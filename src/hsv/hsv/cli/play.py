@@ -25,20 +25,16 @@ def play(
 
     Example: hsv play bags/case1_20260101T000000Z --rate 10 --topic /hsv/state
     """
-    import os
-
-    from hsv.graph.description import PLAYER, checked_namespace
-    from hsv.graph.launcher import executable
+    from hsv.graph.description import PLAYER
+    from hsv.graph.launcher import become
     from hsv.recording.reader import Bag
 
     warn_of_shortcomings(Bag(bag))
-    path = str(executable(PLAYER))
-    words = [path, str(bag), "--rate", str(rate), "--delay", str(delay)]
-    remapped = ["--ros-args", "-r", f"__ns:={checked_namespace(namespace)}"] if namespace else []
+    words = [str(bag), "--rate", str(rate), "--delay", str(delay)]
     if topic:
         words += ["--topics", *topic]
     if not clock:
         words.append("--no-clock")
     if paused:
         words.append("--paused")
-    os.execv(path, [*words, *remapped])
+    become(PLAYER, words, namespace)

@@ -116,6 +116,11 @@ PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator",
 PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 """Not of the graph: republishes a bag."""
 
+FAULT, SET_PARAMETER, TOPIC = (
+    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic")
+)
+"""Not of the graph: commands that ask a running one."""
+
 
 def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
     """Return all nodes of the graph with the named controller, in start order."""

@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 from hsv.errors import RunError
 from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, ROOT, NodeDescription, graph, resolved
@@ -48,6 +49,20 @@ def executable(node: NodeDescription) -> Path:
         f"no executable {node.executable} of package {node.package}: expected a built and sourced workspace "
         "(make setup, then source env.sh)"
     )
+
+
+def become(node: NodeDescription, words: Sequence[str]) -> NoReturn:
+    """Run the executable of ``node`` with these ``words`` in place of this process.
+
+    Ctrl-C and SIGTERM wait until it takes them (:func:`hsv_node.main.take_signals`): in the midst of its imports they
+    would end it with a traceback.
+
+    Raises:
+        RunError: As :func:`executable`.
+    """
+    path = str(executable(node))
+    signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
+    os.execv(path, [path, *words])
 
 
 def parameter_arguments(files: Iterable[Path]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hsv.errors import RecordingError, reason
 from hsv.recording.reader import Bag
 from hsv.recording.shortcomings import shortcomings
-from hsv.recording.units import units_of
+from hsv.recording.units import Units, units_of
 
 INCOMPLETE = "incomplete"
 """Where an export says what its bag lacks."""
@@ -46,7 +46,9 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
     npz = form is Format.npz
     topics = [bag.name_of(topic) for topic in topics]
     lacking = "; ".join(shortcomings(bag))
-    contents: dict[str, Any] = _arrays(bag, topics) if npz else {topic: _table(bag, topic) for topic in topics}
+    contents: dict[str, Any] = (
+        _arrays(bag, topics) if npz else {topic: table(bag.columns(topic), _units(bag, topic)) for topic in topics}
+    )
     try:
         (target.parent if npz else target).mkdir(parents=True, exist_ok=npz)
     except OSError as error:
@@ -96,11 +98,15 @@ def _fields(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
     return fields
 
 
-def _table(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
-    """Return one column per number; sequences as wide as the longest, the rest empty."""
-    units = _units(bag, topic)
+def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
+    """Return one column per number, with its unit in its name; sequences as wide as the longest, the rest empty.
+
+    Args:
+        columns: The fields of messages, as :mod:`hsv.recording.columns` has them.
+        units: Of every field, from :func:`hsv.recording.units.units_of`.
+    """
     table: dict[str, NDArray[Any]] = {}
-    for name, column in bag.columns(topic).items():
+    for name, column in columns.items():
         if column.dtype == object and len(column) and all(_is_numbers(value) for value in column):
             column = _padded(column)
         if column.ndim > 1:
@@ -113,7 +119,7 @@ def _table(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
     return table
 
 
-def _units(bag: Bag, topic: str) -> Any:
+def _units(bag: Bag, topic: str) -> dict[str, Units]:
     return units_of(bag.definition(topic), bag.types.fielddefs, bag.topics[topic].type)
 
 

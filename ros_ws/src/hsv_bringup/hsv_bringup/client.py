@@ -1,0 +1,173 @@
+"""What the commands share that ask something of a running graph: finding it, waiting for it, answering, ending."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import signal
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NoReturn
+
+import rclpy
+from hsv_msgs.msg import Run
+from rclpy.node import Node
+from rclpy.utilities import remove_ros_args
+
+from hsv.errors import HsvError, RunError
+from hsv.graph.description import COMPOSED, PLANT
+from hsv.graph.progress import Standstill, processor_time_of
+from hsv_node.main import take_signals
+from hsv_node.qos import LATCHED
+
+ABSENT_AFTER = 3.0
+"""Seconds without a change in the ROS domain after which nobody else is in it, if no process of this machine may be."""
+
+SILENT_AFTER = 30.0
+"""Seconds without a change in the ROS domain after which somebody who is there, or may be, is given up."""
+
+SETTLED_AFTER = 1.0
+"""Seconds without a change in the topics after which all are known."""
+
+SAY_AFTER = 5.0
+"""Seconds of waiting after which this is said, and between saying it again."""
+
+INTERRUPTED = 130
+
+_LOOK = 0.1
+
+
+class GraphClient(Node):
+    """A node that is not of the graph: it asks, and is gone."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
+        self._runs: list[Run] = []
+        self.create_subscription(Run, "/hsv/run", self._runs.append, LATCHED)
+
+    def find_run(self) -> Run:
+        """Return the run of the plant that is there.
+
+        Raises:
+            RunError: There is none.
+        """
+        if not self.wait_for(lambda: self._runs, "the plant (/hsv/run)", (PLANT.executable, COMPOSED.executable)):
+            raise RunError(f"no run in {domain()}: expected hsv run, or the nodes by hand, in this domain")
+        return self._runs[-1]
+
+    def call(self, kind: Any, service: str, request: Any) -> Any:
+        """Return what a service of the graph answers.
+
+        Raises:
+            RunError: It does not.
+        """
+        client = self.create_client(kind, service)
+        if self.wait_for(client.service_is_ready, service):
+            future = client.call_async(request)
+            if self.wait_for(future.done, service):
+                return future.result()
+        raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
+
+    def settle(self) -> None:
+        """Wait until nothing changes in the domain any more, for a while."""
+        standstill = Standstill()
+        while standstill.look(self.get_topic_names_and_types()) < SETTLED_AFTER:
+            rclpy.spin_once(self, timeout_sec=_LOOK)
+
+    def wait_for(
+        self, done: Callable[[], object], what: str, executables: Sequence[str] = (), for_ever: bool = False
+    ) -> bool:
+        """Wait until ``done``; return whether it is.
+
+        Args:
+            done: What is waited for.
+            what: How it is called.
+            executables: Where somebody has to come, who on this machine may be it. While there is a process of them,
+                on this machine or nowhere to be seen, it may take its time.
+            for_ever: Whether to wait however long nothing changes.
+        """
+        standstill, says = Standstill(), Standstill()
+        while not done():
+            rclpy.spin_once(self, timeout_sec=_LOOK)
+            absent = executables and not processor_time_of(executables)
+            still = standstill.look(sorted(self.get_node_names_and_namespaces()))
+            if not for_ever and still > (ABSENT_AFTER if absent else SILENT_AFTER):
+                return False
+            if says.look(None) > SAY_AFTER:
+                says = Standstill()
+                print(f"waiting for {what}", file=sys.stderr, flush=True)
+        return True
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Refuses wrong words in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with exit code 2."""
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+def run_client(
+    parser: argparse.ArgumentParser,
+    act: Callable[[GraphClient, argparse.Namespace], None],
+    args: Sequence[str] | None = None,
+) -> int:
+    """Run a command and return its exit code: 1 without a run, 2 for what is refused, in one line each."""
+    given = list(sys.argv if args is None else args)
+    options = parser.parse_args(remove_ros_args(given)[1:])
+    try:
+        take_signals(signal.default_int_handler)
+        rclpy.init(args=given, signal_handler_options=rclpy.SignalHandlerOptions.NO)
+        act(GraphClient(parser.prog), options)
+        sys.stdout.flush()
+        return 0
+    except KeyboardInterrupt:
+        return _refuse(parser.prog, "interrupted", INTERRUPTED)
+    except BrokenPipeError:
+        # Nobody reads any more: Python must not find that out a second time at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except HsvError as error:
+        return _refuse(parser.prog, error, 1 if isinstance(error, RunError) else 2)
+    finally:
+        with suppress(KeyboardInterrupt):
+            rclpy.try_shutdown()
+
+
+def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
+    """Print an answer: ``text`` for people, ``values`` as a JSON object on one line for programs."""
+    print(json.dumps(finite(values), allow_nan=False) if as_json else text, flush=True)
+
+
+def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
+    """Return from which time on something acts that begins at ``step``, in words and as numbers.
+
+    Raises:
+        RunError: The run will have ended before.
+    """
+    if step > run.last_step:
+        raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
+    time = step * run.period
+    return f"t = {time:.2f} s", {"step": step, "time_s": round(time, 9)}
+
+
+def domain() -> str:
+    """Return the ROS domain of this process as it is set."""
+    return f"ROS_DOMAIN_ID={os.environ.get('ROS_DOMAIN_ID') or 0}"
+
+
+def finite(value: Any) -> Any:
+    """Return plain data with null, for JSON, in place of numbers that are not finite."""
+    if isinstance(value, Mapping):
+        return {key: finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _refuse(name: str, problem: object, code: int) -> int:
+    print(f"{name}: error: {' '.join(str(problem).split())}", file=sys.stderr, flush=True)
+    return code

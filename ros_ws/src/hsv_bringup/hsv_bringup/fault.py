@@ -1,0 +1,61 @@
+"""Injects, clears and lists faults in flight: ``ros2 run hsv_bringup fault inject elevator_deflection ...``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from hsv_msgs.msg import Fault, FaultStatus
+from hsv_msgs.srv import ClearFault, InjectFault
+
+from hsv.errors import ParameterError, RunError
+from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
+from hsv_node.qos import STEP
+
+
+def _inject(client: GraphClient, options: argparse.Namespace) -> None:
+    fault = Fault(channel=options.channel, type=options.type, value=options.value)
+    _change(client, options, InjectFault, "/hsv/inject_fault", InjectFault.Request(fault=fault))
+
+
+def _clear(client: GraphClient, options: argparse.Namespace) -> None:
+    _change(client, options, ClearFault, "/hsv/clear_fault", ClearFault.Request(channel=options.channel))
+
+
+def _change(client: GraphClient, options: argparse.Namespace, kind: type, service: str, request: object) -> None:
+    run = client.find_run()
+    response = client.call(kind, service, request)
+    if not response.accepted:
+        raise ParameterError(response.message)
+    time, values = acting_from(run, response.step)
+    answer(f"{response.message}, {time}", {"message": response.message, **values}, options.json)
+
+
+def _list(client: GraphClient, options: argparse.Namespace) -> None:
+    run = client.find_run()
+    statuses: list[FaultStatus] = []
+    client.create_subscription(FaultStatus, "/hsv/fault_status", statuses.append, STEP)
+    if not client.wait_for(lambda: statuses, "a step (/hsv/fault_status)"):
+        raise RunError("no step is flown: no message on /hsv/fault_status")
+    status = statuses[-1]
+    active = [{"channel": f.channel, "type": f.type, "value": f.value} for f in status.active]
+    time, values = acting_from(run, status.step)
+    words = "; ".join(f"{f.type} {f.value:g} of {f.channel}" for f in status.active) or "no fault"
+    answer(f"step {status.step}, {time}: {words}", {**values, "active": active}, options.json)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    parser = OneLineParser(prog="fault", description="Inject, clear and list faults of the actuators in flight.")
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
+    commands = parser.add_subparsers(required=True, metavar="{inject,clear,list}", parser_class=OneLineParser)
+    inject = commands.add_parser("inject", help="begin a fault with the next step")
+    inject.add_argument("channel", help="e.g. elevator_deflection")
+    inject.add_argument("type", help="e.g. loss_of_effectiveness")
+    inject.add_argument("value", type=float, help="parameter of the type, e.g. 0.8")
+    inject.set_defaults(act=_inject)
+    clear = commands.add_parser("clear", help="end faults with the next step")
+    clear.add_argument("channel", nargs="?", default="", help="default: all channels")
+    clear.set_defaults(act=_clear)
+    commands.add_parser("list", help="which faults act now").set_defaults(act=_list)
+    return run_client(parser, lambda client, options: options.act(client, options), args)

@@ -1,0 +1,164 @@
+"""Prints the topics of a running graph, or the messages of one: ``ros2 run hsv_bringup topic /hsv/state --once``."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from hsv.errors import ParameterError, RecordingError, RunError
+from hsv.graph.description import graph
+from hsv.recording.definitions import definition
+from hsv.recording.export import table
+from hsv.recording.track import Track
+from hsv.recording.typestore import message_types
+from hsv.recording.units import units_of
+from hsv_bringup.client import GraphClient, OneLineParser, answer, domain, run_client
+from hsv_node.messages import message_class
+
+DEPTH = 1000
+"""Messages that wait while this process prints."""
+
+_EXECUTABLES = tuple(node.executable for node in graph())
+
+
+class Decoder:
+    """Makes columns with units of the messages of a type, as its installed definition states them."""
+
+    def __init__(self, topic: str, kind: str) -> None:
+        """Read the definition.
+
+        Raises:
+            RecordingError: It is not installed.
+        """
+        self._topic, self._kind = topic, kind
+        text = definition(kind)
+        self._types = message_types([(kind, text)], topic)
+        self._units = units_of(text, self._types.fielddefs, kind)
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        """Return the numbers and texts of a message by field, with the unit in its name, as an export names them."""
+        columns = Track(self._topic, self._kind, self._types, [0], [data]).columns()
+        return {
+            name: column[0].item() if hasattr(column[0], "item") else column[0]
+            for name, column in table(columns, self._units).items()
+        }
+
+
+def _topic(client: GraphClient, options: argparse.Namespace) -> None:
+    if options.every < 1:
+        raise ParameterError(f"every = {options.every}: expected a number of messages, at least 1")
+    if options.name:
+        _print_messages(client, options)
+    else:
+        _print_topics(client, options)
+
+
+def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
+    topics = _topics(client)
+    rows = []
+    for name, kinds in topics.items():
+        ends = client.get_publishers_info_by_topic(name), client.get_subscriptions_info_by_topic(name)
+        publishers, subscribers = (
+            sorted({i.node_name for i in infos if i.node_name != client.get_name()}) for infos in ends
+        )
+        rows.append((name, ", ".join(kinds), publishers, subscribers))
+    width = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for name, kind, publishers, subscribers in rows:
+        text = (
+            f"{name:{width[0]}}  {kind:{width[1]}}  {', '.join(publishers) or '-'} -> {', '.join(subscribers) or '-'}"
+        )
+        values = {"topic": name, "type": kind, "publishers": publishers, "subscribers": subscribers}
+        answer(text, values, options.json)
+
+
+def _topics(client: GraphClient) -> dict[str, list[str]]:
+    """Return the topics of the domain with their types once no more come.
+
+    Raises:
+        RunError: There are none of a graph.
+    """
+
+    def known() -> dict[str, list[str]]:
+        return dict(client.get_topic_names_and_types())
+
+    def published() -> bool:
+        return any(client.get_publishers_info_by_topic(topic) for node in graph() for topic in node.publishes)
+
+    if not client.wait_for(published, "a node of the graph", _EXECUTABLES):
+        raise RunError(f"no node of the graph in {domain()}: expected hsv run, or the nodes by hand, in this domain")
+    client.settle()
+    return known()
+
+
+def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
+    name = client.resolve_topic_name(options.name)
+
+    def publishers() -> list[Any]:
+        return list(client.get_publishers_info_by_topic(name))
+
+    if not publishers():
+        topics = _topics(client)
+        if not publishers():
+            close = difflib.get_close_matches(name, topics, n=1)
+            meant = f"{close[0]}?" if close else ", ".join(topics)
+            raise ParameterError(f"topic {name}: no node publishes it, expected {meant}")
+    offered = publishers()[0]
+    try:
+        kind = message_class(offered.topic_type)
+    except (ImportError, AttributeError, ValueError):
+        raise RecordingError(f"topic {name}: message type {offered.topic_type} is not installed") from None
+    decoder = Decoder(name, offered.topic_type)
+    qos = QoSProfile(
+        depth=DEPTH, reliability=offered.qos_profile.reliability, durability=offered.qos_profile.durability
+    )
+    received: list[bytes] = []
+    client.create_subscription(kind, name, received.append, qos, raw=True)
+    for number, data in enumerate(_messages(client, name, received)):
+        if number % options.every == 0:
+            fields = decoder.decode(data)
+            answer("\n".join(_lines(name, fields)), fields, options.json)
+            if options.once:
+                return
+
+
+def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
+    """Yield the messages of a topic as they come, for as long as somebody publishes it.
+
+    Raises:
+        RunError: None has come.
+    """
+    came = False
+    while client.wait_for(lambda: received or not client.count_publishers(name), f"a message on {name}", for_ever=True):
+        if not received:
+            break
+        came = True
+        yield received.pop(0)
+    if not came:
+        raise RunError(f"no message on {name}, and no node that publishes it any more")
+
+
+def _lines(name: str, fields: dict[str, Any]) -> Iterator[str]:
+    """Yield the lines that show a message: quantity, value, unit."""
+    yield name
+    width = max(len(field.partition(" [")[0]) for field in fields)
+    for field, value in fields.items():
+        label, _, unit = field.partition(" [")
+        unit = unit.removesuffix("]")
+        if unit == "ns":
+            value, unit = f"{value * 1e-9:.9g}", "s"
+        text = f"{value:.9g}" if isinstance(value, float) else str(value)
+        yield f"  {label:{width}}  {text} {unit}".rstrip()
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the command."""
+    parser = OneLineParser(prog="topic", description="Print the topics of a running graph, or the messages of one.")
+    parser.add_argument("name", nargs="?", default="", help="e.g. /hsv/state; default: list the topics")
+    parser.add_argument("--once", action="store_true", help="one message only")
+    parser.add_argument("--every", type=int, default=1, help="print every N-th message")
+    parser.add_argument("--json", action="store_true", help="print a JSON object on a line for each")
+    return run_client(parser, _topic, args)

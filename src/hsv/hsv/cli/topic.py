@@ -1,0 +1,28 @@
+"""The command ``hsv topic``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import JsonOption
+
+
+def topic(
+    name: Annotated[str, typer.Argument(help="Topic, e.g. /hsv/state; default: list the topics.")] = "",
+    once: Annotated[bool, typer.Option("--once", help="Print one message only.")] = False,
+    every: Annotated[int, typer.Option(min=1, help="Print every N-th message.")] = 1,
+    json: JsonOption = False,
+) -> None:
+    """Print the messages of a topic of a running graph, with units, until nobody publishes it any more.
+
+    Without a name: the topics, their types, who publishes and who subscribes. With --json: an object a line.
+
+    Example: hsv topic /hsv/state --every 50
+    """
+    from hsv.graph.description import TOPIC
+    from hsv.graph.launcher import become
+
+    flags = [f"--{flag}" for flag, given in (("once", once), ("json", json)) if given]
+    become(TOPIC, [*flags, "--every", str(every), *(["--", name] if name else [])])
