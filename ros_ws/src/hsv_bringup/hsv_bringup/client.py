@@ -29,13 +29,16 @@ ABSENT_AFTER = 3.0
 SILENT_AFTER = 30.0
 """Seconds without a change in the ROS domain after which somebody who is there, or may be, is given up."""
 
-SETTLED_AFTER = 1.0
-"""Seconds without a change in the topics after which all are known."""
+SETTLED_AFTER = 3.0
+"""Seconds without a change in the topics after which all that there are are known."""
 
 SAY_AFTER = 5.0
 """Seconds of waiting after which this is said, and between saying it again."""
 
 INTERRUPTED = 130
+
+_UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
+"""What rmw calls a node whose endpoint is known and whose name is not yet."""
 
 _LOOK = 0.1
 
@@ -71,10 +74,19 @@ class GraphClient(Node):
                 return future.result()
         raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
 
-    def settle(self) -> None:
-        """Wait until nothing changes in the domain any more, for a while."""
+    def publishers_of(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish ``topic``, as far as they are known."""
+        return _names(self.get_publishers_info_by_topic(topic))
+
+    def subscribers_of(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that subscribe ``topic``, as far as they are known, but not this one."""
+        own = f"{self.get_namespace().rstrip('/')}/{self.get_name()}"
+        return [name for name in _names(self.get_subscriptions_info_by_topic(topic)) if name != own]
+
+    def settle(self, whole: Callable[[], object]) -> None:
+        """Wait until all of a graph is known, which ``whole`` says, or nothing new comes for a while."""
         standstill = Standstill()
-        while standstill.look(self.get_topic_names_and_types()) < SETTLED_AFTER:
+        while not whole() and standstill.look(self.get_topic_names_and_types()) < SETTLED_AFTER:
             rclpy.spin_once(self, timeout_sec=_LOOK)
 
     def wait_for(
@@ -166,6 +178,11 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _names(endpoints: Sequence[Any]) -> list[str]:
+    # An endpoint is known sooner than its node.
+    return sorted({f"{e.node_namespace.rstrip('/')}/{e.node_name}" for e in endpoints if e.node_name != _UNKNOWN_NODE})
 
 
 def _refuse(name: str, problem: object, code: int) -> int:

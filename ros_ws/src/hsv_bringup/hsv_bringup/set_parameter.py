@@ -70,10 +70,15 @@ def _set(client: GraphClient, options: argparse.Namespace) -> None:
 def _full_name(client: GraphClient, node: NodeDescription) -> str:
     """Return the name of the node that plays the part of ``node``, which is whoever publishes its topics."""
     topic = node.publishes[0]
-    if not client.wait_for(lambda: client.get_publishers_info_by_topic(topic), f"{node.name} ({topic})"):
+    names: list[str] = []
+
+    def found() -> bool:
+        names[:] = client.publishers_of(topic)
+        return bool(names)
+
+    if not client.wait_for(found, f"{node.name} ({topic})"):
         raise RunError(f"no node publishes {topic}: expected {node.name}")
-    publisher = client.get_publishers_info_by_topic(topic)[0]
-    return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"
+    return names[0]
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from hsv.errors import ParameterError, RecordingError, RunError
-from hsv.graph.description import graph
+from hsv.graph.description import TOPICS, graph
 from hsv.recording.definitions import definition
 from hsv.recording.export import table
 from hsv.recording.track import Track
@@ -58,14 +58,9 @@ def _topic(client: GraphClient, options: argparse.Namespace) -> None:
 
 
 def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
-    topics = _topics(client)
     rows = []
-    for name, kinds in topics.items():
-        ends = client.get_publishers_info_by_topic(name), client.get_subscriptions_info_by_topic(name)
-        publishers, subscribers = (
-            sorted({i.node_name for i in infos if i.node_name != client.get_name()}) for infos in ends
-        )
-        rows.append((name, ", ".join(kinds), publishers, subscribers))
+    for name, kinds in _topics(client).items():
+        rows.append((name, ", ".join(kinds), client.publishers_of(name), client.subscribers_of(name)))
     width = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for name, kind, publishers, subscribers in rows:
         text = (
@@ -75,38 +70,35 @@ def _print_topics(client: GraphClient, options: argparse.Namespace) -> None:
         answer(text, values, options.json)
 
 
-def _topics(client: GraphClient) -> dict[str, list[str]]:
-    """Return the topics of the domain with their types once no more come.
+def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
+    """Return the topics of the domain with their types, once all are known or ``wanted`` is published.
 
     Raises:
-        RunError: There are none of a graph.
+        RunError: No node of a graph is there.
     """
 
-    def known() -> dict[str, list[str]]:
-        return dict(client.get_topic_names_and_types())
+    def found() -> bool:
+        return bool(wanted and client.count_publishers(wanted)) or any(map(client.publishers_of, TOPICS))
 
-    def published() -> bool:
-        return any(client.get_publishers_info_by_topic(topic) for node in graph() for topic in node.publishes)
+    def whole() -> bool:
+        return bool(wanted and client.count_publishers(wanted)) or all(
+            set(client.subscribers_of(topic)) and client.publishers_of(topic) for topic in TOPICS
+        )
 
-    if not client.wait_for(published, "a node of the graph", _EXECUTABLES):
+    if not client.wait_for(found, "a node of the graph", _EXECUTABLES):
         raise RunError(f"no node of the graph in {domain()}: expected hsv run, or the nodes by hand, in this domain")
-    client.settle()
-    return known()
+    client.settle(whole)
+    return dict(client.get_topic_names_and_types())
 
 
 def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
     name = client.resolve_topic_name(options.name)
-
-    def publishers() -> list[Any]:
-        return list(client.get_publishers_info_by_topic(name))
-
-    if not publishers():
-        topics = _topics(client)
-        if not publishers():
-            close = difflib.get_close_matches(name, topics, n=1)
-            meant = f"{close[0]}?" if close else ", ".join(topics)
-            raise ParameterError(f"topic {name}: no node publishes it, expected {meant}")
-    offered = publishers()[0]
+    topics = _topics(client, name)
+    if not client.count_publishers(name):
+        close = difflib.get_close_matches(name, topics, n=1)
+        meant = f"{close[0]}?" if close else f"one of {', '.join(topics)}"
+        raise ParameterError(f"topic {name}: no node publishes it, expected {meant}")
+    offered = client.get_publishers_info_by_topic(name)[0]
     try:
         kind = message_class(offered.topic_type)
     except (ImportError, AttributeError, ValueError):

@@ -16,7 +16,7 @@ fault = typer.Typer(
 )
 
 
-@fault.command()
+@fault.command(context_settings={"ignore_unknown_options": True})  # a value below zero is none
 def inject(
     channel: Annotated[str, typer.Argument(help="Actuator, e.g. elevator_deflection.")],
     type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
@@ -58,4 +58,5 @@ def _ask(*words: str, json: bool) -> None:
     from hsv.graph.launcher import become
 
     # Behind the dashes stand words, also those that begin with one, as a value below zero.
-    become(FAULT, [*(["--json"] if json else []), words[0], "--", *words[1:]])
+    command, *values = words
+    become(FAULT, [*(["--json"] if json else []), command, *(["--", *values] if values else [])])
