@@ -18,13 +18,14 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
 from hsv.errors import HsvError, RunError
-from hsv.graph.description import COMPOSED, PLANT
-from hsv.graph.progress import Standstill, processor_time_of
+from hsv.graph.description import RUN, STATE
+from hsv.graph.exclusive import is_published
+from hsv.graph.progress import Standstill
 from hsv_node.main import take_signals
 from hsv_node.qos import LATCHED
 
 ABSENT_AFTER = 3.0
-"""Seconds without a change in the ROS domain after which nobody else is in it, if no process of this machine may be."""
+"""Seconds without a change in the ROS domain after which nobody is looked for who is not on this machine."""
 
 SILENT_AFTER = 30.0
 """Seconds without a change in the ROS domain after which somebody who is there, or may be, is given up."""
@@ -49,7 +50,7 @@ class GraphClient(Node):
     def __init__(self, name: str) -> None:
         super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
         self._runs: list[Run] = []
-        self.create_subscription(Run, "/hsv/run", self._runs.append, LATCHED)
+        self._announcement = self.create_subscription(Run, RUN, self._runs.append, LATCHED)
 
     def find_run(self) -> Run:
         """Return the run of the plant that is there.
@@ -57,9 +58,15 @@ class GraphClient(Node):
         Raises:
             RunError: There is none.
         """
-        if not self.wait_for(lambda: self._runs, "the plant (/hsv/run)", (PLANT.executable, COMPOSED.executable)):
-            raise RunError(f"no run in {domain()}: expected hsv run, or the nodes by hand, in this domain")
+        if not self.wait_for(lambda: self._runs, f"the plant ({self._announcement.topic_name})", (STATE,)):
+            raise RunError(f"no run in {self.where}: expected hsv run, or the nodes by hand, in this place")
         return self._runs[-1]
+
+    @property
+    def where(self) -> str:
+        """The domain and namespace in which this node looks for a graph."""
+        namespace = self.get_namespace()
+        return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
     def call(self, kind: Any, service: str, request: Any) -> Any:
         """Return what a service of the graph answers.
@@ -75,13 +82,12 @@ class GraphClient(Node):
         raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the full names of the nodes that publish ``topic``, as far as they are known."""
-        return _names(self.get_publishers_info_by_topic(topic))
+        """Return the full names of the nodes that publish ``topic``, as far as they are known, but not this one."""
+        return self._others(self.get_publishers_info_by_topic(topic))
 
     def subscribers_of(self, topic: str) -> list[str]:
         """Return the full names of the nodes that subscribe ``topic``, as far as they are known, but not this one."""
-        own = f"{self.get_namespace().rstrip('/')}/{self.get_name()}"
-        return [name for name in _names(self.get_subscriptions_info_by_topic(topic)) if name != own]
+        return self._others(self.get_subscriptions_info_by_topic(topic))
 
     def settle(self, whole: Callable[[], object]) -> None:
         """Wait until all of a graph is known, which ``whole`` says, or nothing new comes for a while."""
@@ -90,21 +96,25 @@ class GraphClient(Node):
             rclpy.spin_once(self, timeout_sec=_LOOK)
 
     def wait_for(
-        self, done: Callable[[], object], what: str, executables: Sequence[str] = (), for_ever: bool = False
+        self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
     ) -> bool:
         """Wait until ``done``; return whether it is.
 
         Args:
             done: What is waited for.
             what: How it is called.
-            executables: Where somebody has to come, who on this machine may be it. While there is a process of them,
-                on this machine or nowhere to be seen, it may take its time.
+            published: Where somebody has to be there, what he publishes. Who does on this machine may take his time;
+                otherwise nobody is long looked for.
             for_ever: Whether to wait however long nothing changes.
         """
         standstill, says = Standstill(), Standstill()
+        absent = bool(published)
         while not done():
             rclpy.spin_once(self, timeout_sec=_LOOK)
-            absent = executables and not processor_time_of(executables)
+            if absent:
+                absent = not any(
+                    is_published(self.context.get_domain_id(), self.resolve_topic_name(topic)) for topic in published
+                )
             still = standstill.look(sorted(self.get_node_names_and_namespaces()))
             if not for_ever and still > (ABSENT_AFTER if absent else SILENT_AFTER):
                 return False
@@ -112,6 +122,11 @@ class GraphClient(Node):
                 says = Standstill()
                 print(f"waiting for {what}", file=sys.stderr, flush=True)
         return True
+
+    def _others(self, endpoints: Sequence[Any]) -> list[str]:
+        # An endpoint is known sooner than its node.
+        known = [e for e in endpoints if e.node_name not in (_UNKNOWN_NODE, self.get_name())]
+        return sorted({f"{e.node_namespace.rstrip('/')}/{e.node_name}" for e in known})
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -166,11 +181,6 @@ def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
     return f"t = {time:.2f} s", {"step": step, "time_s": round(time, 9)}
 
 
-def domain() -> str:
-    """Return the ROS domain of this process as it is set."""
-    return f"ROS_DOMAIN_ID={os.environ.get('ROS_DOMAIN_ID') or 0}"
-
-
 def finite(value: Any) -> Any:
     """Return plain data with null, for JSON, in place of numbers that are not finite."""
     if isinstance(value, Mapping):
@@ -178,11 +188,6 @@ def finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [finite(entry) for entry in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _names(endpoints: Sequence[Any]) -> list[str]:
-    # An endpoint is known sooner than its node.
-    return sorted({f"{e.node_namespace.rstrip('/')}/{e.node_name}" for e in endpoints if e.node_name != _UNKNOWN_NODE})
 
 
 def _refuse(name: str, problem: object, code: int) -> int:

@@ -9,17 +9,18 @@ from hsv_msgs.msg import Fault, FaultStatus
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError, RunError
+from hsv.graph.description import CLEAR_FAULT, FAULT_STATUS, INJECT_FAULT
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 from hsv_node.qos import STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
     fault = Fault(channel=options.channel, type=options.type, value=options.value)
-    _change(client, options, InjectFault, "/hsv/inject_fault", InjectFault.Request(fault=fault))
+    _change(client, options, InjectFault, INJECT_FAULT, InjectFault.Request(fault=fault))
 
 
 def _clear(client: GraphClient, options: argparse.Namespace) -> None:
-    _change(client, options, ClearFault, "/hsv/clear_fault", ClearFault.Request(channel=options.channel))
+    _change(client, options, ClearFault, CLEAR_FAULT, ClearFault.Request(channel=options.channel))
 
 
 def _change(client: GraphClient, options: argparse.Namespace, kind: type, service: str, request: object) -> None:
@@ -34,9 +35,9 @@ def _change(client: GraphClient, options: argparse.Namespace, kind: type, servic
 def _list(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     statuses: list[FaultStatus] = []
-    client.create_subscription(FaultStatus, "/hsv/fault_status", statuses.append, STEP)
-    if not client.wait_for(lambda: statuses, "a step (/hsv/fault_status)"):
-        raise RunError("no step is flown: no message on /hsv/fault_status")
+    name = client.create_subscription(FaultStatus, FAULT_STATUS, statuses.append, STEP).topic_name
+    if not client.wait_for(lambda: statuses, f"a step ({name})"):
+        raise RunError(f"no step is flown: no message on {name}")
     status = statuses[-1]
     active = [{"channel": f.channel, "type": f.type, "value": f.value} for f in status.active]
     time, values = acting_from(run, status.step)

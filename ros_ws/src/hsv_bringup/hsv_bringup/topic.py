@@ -16,13 +16,14 @@ from hsv.recording.export import table
 from hsv.recording.track import Track
 from hsv.recording.typestore import message_types
 from hsv.recording.units import units_of
-from hsv_bringup.client import GraphClient, OneLineParser, answer, domain, run_client
+from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
 from hsv_node.messages import message_class
 
 DEPTH = 1000
 """Messages that wait while this process prints."""
 
-_EXECUTABLES = tuple(node.executable for node in graph())
+_PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
+"""A topic of every node."""
 
 
 class Decoder:
@@ -85,8 +86,8 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
             set(client.subscribers_of(topic)) and client.publishers_of(topic) for topic in TOPICS
         )
 
-    if not client.wait_for(found, "a node of the graph", _EXECUTABLES):
-        raise RunError(f"no node of the graph in {domain()}: expected hsv run, or the nodes by hand, in this domain")
+    if not client.wait_for(found, "a node of the graph", _PUBLISHED):
+        raise RunError(f"no node of the graph in {client.where}: expected hsv run, or the nodes by hand, in this place")
     client.settle(whole)
     return dict(client.get_topic_names_and_types())
 

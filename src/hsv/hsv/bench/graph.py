@@ -10,7 +10,7 @@ from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
 from hsv.graph.description import COMPOSED
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.preparation import parameter_yaml, prepare
+from hsv.graph.parameter_sections import prepare
 
 _PERIOD = 0.02
 

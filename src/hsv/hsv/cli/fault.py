@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import JsonOption
+from hsv.cli.options import GraphNamespaceOption, JsonOption
 
 fault = typer.Typer(
     no_args_is_help=True,
@@ -21,6 +21,7 @@ def inject(
     channel: Annotated[str, typer.Argument(help="Actuator, e.g. elevator_deflection.")],
     type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
     value: Annotated[str, typer.Argument(help="Value of the type: 0.8 or '80 %' of the effectiveness is left.")],
+    namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
     """Begin a fault with the next step that is not flown yet; the answer says which one.
@@ -29,34 +30,35 @@ def inject(
     """
     from hsv.units import parse_quantity
 
-    _ask("inject", channel, type, repr(parse_quantity(value, "1", "value")), json=json)
+    _ask("inject", channel, type, repr(parse_quantity(value, "1", "value")), namespace=namespace, json=json)
 
 
 @fault.command()
 def clear(
     channel: Annotated[str, typer.Argument(help="Actuator; default: all of them.")] = "",
+    namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
     """End the faults of an actuator, or of all, with the next step that is not flown yet.
 
     Example: hsv fault clear elevator_deflection
     """
-    _ask("clear", *([channel] if channel else []), json=json)
+    _ask("clear", *([channel] if channel else []), namespace=namespace, json=json)
 
 
 @fault.command(name="list")
-def list_(json: JsonOption = False) -> None:
+def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> None:
     """Show which faults act now.
 
     Example: hsv fault list --json
     """
-    _ask("list", json=json)
+    _ask("list", namespace=namespace, json=json)
 
 
-def _ask(*words: str, json: bool) -> None:
+def _ask(*words: str, namespace: str, json: bool) -> None:
     from hsv.graph.description import FAULT
     from hsv.graph.launcher import become
 
     # Behind the dashes stand words, also those that begin with one, as a value below zero.
     command, *values = words
-    become(FAULT, [*(["--json"] if json else []), command, *(["--", *values] if values else [])])
+    become(FAULT, [*(["--json"] if json else []), command, *(["--", *values] if values else [])], namespace)

@@ -6,12 +6,13 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import JsonOption
+from hsv.cli.options import GraphNamespaceOption, JsonOption
 
 
 def set(
     name: Annotated[str, typer.Argument(help="Parameter that may change in flight: tau (feedback.tau).")],
     value: Annotated[str, typer.Argument(help="Its value, with a unit where it has one: 0.8, or 0.8,0.8,0.9,0.9,1.")],
+    namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
     """Change a parameter in a flight that is on its way, with the next step that is not flown yet.
@@ -21,4 +22,4 @@ def set(
     from hsv.graph.description import SET_PARAMETER
     from hsv.graph.launcher import become
 
-    become(SET_PARAMETER, [*(["--json"] if json else []), "--", name, value])
+    become(SET_PARAMETER, [*(["--json"] if json else []), "--", name, value], namespace)

@@ -6,13 +6,14 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.options import JsonOption
+from hsv.cli.options import GraphNamespaceOption, JsonOption
 
 
 def topic(
     name: Annotated[str, typer.Argument(help="Topic, e.g. /hsv/state; default: list the topics.")] = "",
     once: Annotated[bool, typer.Option("--once", help="Print one message only.")] = False,
     every: Annotated[int, typer.Option(min=1, help="Print every N-th message.")] = 1,
+    namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
     """Print the messages of a topic of a running graph, with units, until nobody publishes it any more.
@@ -25,4 +26,4 @@ def topic(
     from hsv.graph.launcher import become
 
     flags = [f"--{flag}" for flag, given in (("once", once), ("json", json)) if given]
-    become(TOPIC, [*flags, "--every", str(every), *(["--", name] if name else [])])
+    become(TOPIC, [*flags, "--every", str(every), *(["--", name] if name else [])], namespace)

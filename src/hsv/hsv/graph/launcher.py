@@ -16,7 +16,16 @@ from pathlib import Path
 from typing import NoReturn
 
 from hsv.errors import RunError
-from hsv.graph.description import COMPOSED, EXIT_DIVERGED, PLANT, ROOT, NodeDescription, graph, resolved
+from hsv.graph.description import (
+    COMPOSED,
+    EXIT_DIVERGED,
+    PLANT,
+    ROOT,
+    NodeDescription,
+    checked_namespace,
+    graph,
+    resolved,
+)
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
 
@@ -51,18 +60,20 @@ def executable(node: NodeDescription) -> Path:
     )
 
 
-def become(node: NodeDescription, words: Sequence[str]) -> NoReturn:
-    """Run the executable of ``node`` with these ``words`` in place of this process.
+def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> NoReturn:
+    """Run the executable of ``node`` with these ``words``, in a namespace if one is given, in place of this process.
 
     Ctrl-C and SIGTERM wait until it takes them (:func:`hsv_node.main.take_signals`): in the midst of its imports they
     would end it with a traceback.
 
     Raises:
         RunError: As :func:`executable`.
+        ParameterError: ``namespace`` is none.
     """
+    remapped = ["--ros-args", "-r", f"__ns:={checked_namespace(namespace)}"] if namespace else []
     path = str(executable(node))
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
-    os.execv(path, [path, *words])
+    os.execv(path, [path, *words, *remapped])
 
 
 def parameter_arguments(files: Iterable[Path]) -> list[str]:
