@@ -10,7 +10,8 @@ from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
 from hsv.graph.description import COMPOSED
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.parameter_sections import prepare
+from hsv.graph.parameter_sections import ParameterSections
+from hsv.graph.preparation import prepare
 
 _PERIOD = 0.02
 
@@ -26,7 +27,7 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
         prepared = prepare("case1", bag=Path(folder, "bag"))
         nodes = (COMPOSED,) if composed else prepared.nodes
         shortened = Path(folder, "duration.yaml")
-        shortened.write_text(parameter_yaml({"duration": float(duration)}), encoding="utf-8")
+        shortened.write_text(ParameterSections({"duration": float(duration)}).to_yaml(), encoding="utf-8")
         arguments = parameter_arguments([*prepared.parameter_files, shortened])
 
         def on_step(step: int) -> None:

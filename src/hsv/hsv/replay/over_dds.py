@@ -31,13 +31,13 @@ def replay_all(
         process = chosen(controller)[name]
         with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
             answers = Path(folder, "answers")
-            emulated = {
+            emulator = {
                 "peer_emulator.bag": str(bag.path.absolute()),
                 "peer_emulator.node": name,
                 "peer_emulator.directory": str(answers),
             }
+            run = values.overlaid(ParameterSections({"recorder": False}, {PEER_EMULATOR.name: emulator}))
             steps = len(bag.messages(STATE))
-            run = values.overlaid(ParameterSections({"recorder": False}, {PEER_EMULATOR.name: emulated}))
             _run((process.node, PEER_EMULATOR), run, Path(folder), name, steps, progress)
             made = Bag(answers)
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
