@@ -1,51 +1,189 @@
-"""Launch the whole graph of the bench on a full ROS 2 installation, from the same description as ``hsv run``.
+"""Launch the graph of the bench; ends with the summary, the verdict and the exit code of its flight.
 
 ros2 launch hsv_bringup sil.launch.py scenario:=case1
+
+It runs under the interpreter of the ROS 2 installation, which need not have the packages that the bench computes with.
+So it asks the command ``hsv``, which the build has installed for its own interpreter, for the prepared run.
 """
 
-from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
-from launch.event_handlers import OnProcessExit
+import atexit
+import difflib
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from launch.actions import DeclareLaunchArgument, EmitEvent, ExecuteProcess, OpaqueFunction
+from launch.event_handlers import OnShutdown
 from launch.events import Shutdown
-from launch.substitutions import LaunchConfiguration
+from launch.events.process import ProcessExited, ShutdownProcess
 from launch_ros.actions import Node
 
-from hsv.graph.preparation import PreparedRun, prepare
-from launch import LaunchContext, LaunchDescription
+from launch import Action, LaunchContext, LaunchDescription
 
-_prepared: list[PreparedRun] = []
-"""Kept for as long as the launch file runs: with it goes the folder of parameter files."""
+ARGUMENTS = {
+    "scenario": ("case1", "name of a shipped scenario (hsv scenarios lists them), or path of a TOML file"),
+    "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
+    "real_time_factor": ("0.0", "pace: 1 is real time, 0 as fast as possible"),
+    "step_timeout": ("10.0", "wall time (s) after which a silent node ends the run"),
+    "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
+    "report": ("true", "true: write the report into the bag's folder; or false"),
+    "units": ("si", "units of the summary and the report: si, or paper for ft, ft/s, deg"),
+    "log_level": ("info", "what the nodes log: debug, info, warn, error or fatal"),
+    "namespace": ("", "namespace of all nodes, topics and services, e.g. /vehicle_1"),
+}
+"""Default and description of each, by name; those of hsv run, as launch files spell them."""
+
+CHOICES = {
+    "composed": ("true", "false"),
+    "report": ("true", "false"),
+    "units": ("si", "paper"),
+    "log_level": ("debug", "info", "warn", "error", "fatal"),
+}
+
+LAUNCH_OWN = ("emulate_tty", "launch-prefix", "launch-prefix-filter", "sigkill_timeout", "sigterm_timeout")
+"""Arguments that every launch file takes."""
+
+GRACE = 20
+"""Seconds between asking a node to end and forcing it: on a busy machine the recorder takes its time."""
 
 
-def _nodes(context: LaunchContext) -> list[object]:
-    prepared = prepare(
-        LaunchConfiguration("scenario").perform(context),
-        real_time_factor=float(LaunchConfiguration("real_time_factor").perform(context)),
-    )
-    _prepared.append(prepared)
-    nodes = [
-        Node(
-            package=node.package,
-            executable=node.executable,
-            output="screen",
-            parameters=[str(path) for path in prepared.parameter_files],
-        )
-        for node in prepared.nodes
-    ]
-    # Whoever ends first ends the run: the plant when the flight is over, any other node when something went wrong.
-    watch = [
-        RegisterEventHandler(OnProcessExit(target_action=node, on_exit=[EmitEvent(event=Shutdown())])) for node in nodes
-    ]
-    return [*nodes, *watch]
+class Flight:
+    """The processes of one run: ends them all with the first, has the flight concluded, and keeps its verdict."""
+
+    def __init__(self, hsv: str, run: dict[str, Any], options: dict[str, str]) -> None:
+        """Take what ``hsv prepare`` has printed, the path of that command, and the launch arguments."""
+        self._hsv = hsv
+        self._run = run
+        self._options = options
+        self._running: dict[Action, dict[str, Any]] = {}
+        self._failure = ""
+        self._verdict = ""
+
+    def actions(self) -> list[Action]:
+        """Return the actions that start the nodes."""
+        for node in self._run["nodes"]:
+            action = Node(
+                package=node["package"],
+                executable=node["executable"],
+                namespace=self._options["namespace"],
+                parameters=self._run["parameter_files"],
+                ros_arguments=["--log-level", self._options["log_level"]],
+                output="screen",
+                sigterm_timeout=str(GRACE),
+                on_exit=self._on_exit,
+            )
+            self._running[action] = node
+        return list(self._running)
+
+    def _on_exit(self, event: ProcessExited, context: LaunchContext) -> list[Action]:
+        first = len(self._running) == len(self._run["nodes"])
+        node, code = self._running.pop(event.action), event.returncode
+        actions = []
+        if first:
+            # Whoever ends first ends the run: the plant when it has landed, any other when something went wrong.
+            if not (node["ends_run"] and code in self._run["landed_exit_codes"]):
+                what = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+                self._failure = f"{node['name']} {what}"
+            others = list(self._running)
+            actions = [EmitEvent(event=ShutdownProcess(process_matcher=lambda action: action in others))]
+        if not self._running and not context.is_shutdown:
+            actions = [self._conclusion()]
+        return actions
+
+    def _conclusion(self) -> Action:
+        options = ["--units", self._options["units"]]
+        options.append("--report" if self._options["report"] == "true" else "--no-report")
+        if self._failure:
+            options += ["--failure", self._failure]
+        command = [self._hsv, "conclude", self._run["bag"], *options]
+        return ExecuteProcess(cmd=command, output="screen", on_exit=self._on_concluded)
+
+    def _on_concluded(self, event: ProcessExited, _: LaunchContext) -> None:
+        if event.returncode:
+            self._verdict = f"{self._run['bag']}: {self._failure or 'the flight was lost'}"
+
+    def on_shutdown(self, _: Shutdown, __: LaunchContext) -> None:
+        """End with exit code 1 after a lost flight: launch does so after an exception, and tells its message."""
+        verdict, self._verdict = self._verdict, ""
+        if verdict:
+            raise RuntimeError(verdict)
+
+
+def prepare(context: LaunchContext) -> list[Action]:
+    """Return the actions that start the nodes of a prepared run; end with exit code 2 on bad arguments."""
+    options = {name: context.launch_configurations[name] for name in ARGUMENTS}
+    if Path(__file__).name in (Path(word).name for word in sys.argv):
+        # Those of the command line are for this file, and not for one that includes it.
+        refuse_unknown(argument.split(":=")[0] for argument in context.argv)
+    for name, choices in CHOICES.items():
+        if options[name] not in choices:
+            refuse(f"{name}:={options[name]}: expected {' or '.join(choices)}")
+    folder = tempfile.mkdtemp(prefix="hsv_launch_")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    try:
+        hsv = str(Path(get_package_prefix("hsv"), "bin", "hsv"))
+    except PackageNotFoundError:
+        refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
+    command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
+    command += ["--real-time-factor", options["real_time_factor"], "--step-timeout", options["step_timeout"]]
+    command += ["--bag", options["bag"]] if options["bag"] else []
+    command += ["--composed"] if options["composed"] == "true" else []
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")))
+    run = json.loads(done.stdout)
+    atexit.register(remove_if_empty, run["bag"])
+    flight = Flight(hsv, run, options)
+    # Last of all handlers, because after an exception those that follow are left out.
+    context.register_event_handler(OnShutdown(on_shutdown=flight.on_shutdown), append=True)
+    return flight.actions()
+
+
+def refuse_unknown(names: Any) -> None:
+    """Refuse the first of ``names`` that is no argument, which launch itself would ignore."""
+    for name in names:
+        if name not in (*ARGUMENTS, *LAUNCH_OWN):
+            near = difflib.get_close_matches(name, ARGUMENTS, n=1)
+            hint = f", did you mean {near[0]}?" if near else f": expected one of {', '.join(ARGUMENTS)}"
+            refuse(f"{name}: no such argument{hint}")
+
+
+def refuse(problem: str) -> None:
+    """End with one line and exit code 2 while nothing is running yet, otherwise as launch ends after an error."""
+    print(f"sil.launch.py: error: {problem}", file=sys.stderr, flush=True)
+    try:
+        os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    except ChildProcessError:
+        raise SystemExit(2) from None
+    # Included by a file that has started processes: launch ends them, and then with exit code 1.
+    raise RuntimeError(problem)
+
+
+def as_arguments(text: str) -> str:
+    """Return ``text`` with the options of hsv spelled as launch arguments."""
+    for name in ARGUMENTS:
+        text = text.replace("--" + name.replace("_", "-"), name).replace(name.replace("_", "-") + " =", name + " =")
+    return text
+
+
+def remove_if_empty(bag: str) -> None:
+    """Remove the folder of a bag that no recorder has come to write to."""
+    with suppress(OSError):
+        Path(bag).rmdir()
 
 
 def generate_launch_description() -> LaunchDescription:
-    """Return the six nodes of the graph with the parameters of a scenario."""
-    return LaunchDescription(
-        [
-            DeclareLaunchArgument("scenario", default_value="case1", description="name or path of a scenario"),
-            DeclareLaunchArgument(
-                "real_time_factor", default_value="0.0", description="0: as fast as possible, 1: real time"
-            ),
-            OpaqueFunction(function=_nodes),
-        ]
-    )
+    """Return the nodes of the graph with the parameters of a scenario."""
+    declared = [
+        DeclareLaunchArgument(name, default_value=default, description=description)
+        for name, (default, description) in ARGUMENTS.items()
+    ]
+    return LaunchDescription([*declared, OpaqueFunction(function=prepare)])

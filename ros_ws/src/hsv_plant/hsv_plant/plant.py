@@ -148,9 +148,9 @@ class PlantNode(LockstepNode):
         return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
 
     def stopped(self, signal_number: int) -> int:
-        """Say that the flight is incomplete."""
+        """Say that the flight is incomplete, unless whoever watches it has ended it by Ctrl-C."""
         self._broken_off = signal.Signals(signal_number).name
-        return 128 + signal_number
+        return 0 if signal_number == signal.SIGINT else 128 + signal_number
 
     def close(self) -> None:
         """Say how the run ended, here and to the other nodes."""

@@ -12,6 +12,7 @@ import typer
 
 from hsv.cli.bench import bench
 from hsv.cli.claims import claims
+from hsv.cli.conclude import conclude
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
@@ -23,6 +24,7 @@ from hsv.cli.montecarlo import montecarlo
 from hsv.cli.output import report_error
 from hsv.cli.play import play
 from hsv.cli.plot import plot
+from hsv.cli.prepare import prepare
 from hsv.cli.recover import recover
 from hsv.cli.replay import replay
 from hsv.cli.report import report
@@ -57,6 +59,8 @@ for command in (
     scenarios,
     simulate,
     run,
+    prepare,
+    conclude,
     info,
     plot,
     report,

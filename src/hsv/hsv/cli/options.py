@@ -18,6 +18,13 @@ AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '850
 VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
 CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
+RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
+StepTimeoutOption = Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")]
+NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
+NamespaceOption = Annotated[
+    str, typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain.")
+]
+ReportOption = Annotated[bool, typer.Option(help="Write the report into the bag's folder.")]
 BagArgument = Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")]
 SuppliedDesignOption = Annotated[
     Path | None, typer.Option("--design", help="Design YAML that the flight had, for a bag without attachments.")

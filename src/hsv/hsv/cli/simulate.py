@@ -51,7 +51,7 @@ def simulate(
         flight_metrics(flight.data()),
         fingerprint=flight.fingerprint,
         design_hash=digest(design),
-        diverged_at=flight.time[-1] if flight.status is FlightStatus.DIVERGED else None,
+        ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
         wall_time=wall,
         simulated_time=float(flight.time[-1]),
         units=units,

@@ -18,8 +18,8 @@ def report_flight(
     *,
     fingerprint: str | None,
     design_hash: str,
-    diverged_at: float | None,
-    wall_time: float,
+    ending: str,
+    wall_time: float | None,
     simulated_time: float,
     units: Units,
     json: bool,
@@ -27,19 +27,32 @@ def report_flight(
 ) -> None:
     """Print the summary of a flight.
 
+    Args:
+        scenario: What was flown.
+        metrics: By name, in SI units.
+        fingerprint: Of the flight; ``None`` where steps are missing.
+        design_hash: Digest of the design's parameters.
+        ending: ``finished``, ``diverged`` or ``broken off``.
+        wall_time: Wall time (s) that the flight took, where it is known.
+        simulated_time: Simulated time (s) of the last step.
+        units: Units of what is printed.
+        json: Whether to print JSON.
+        extra: More to print, by name.
+
     Raises:
-        RunError: The flight diverged; the message says when.
+        RunError: The flight diverged or was broken off; the message says when.
     """
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
-    judged = verdicts(scenario, metrics, ended=diverged_at is None)
-    factor = simulated_time / wall_time if wall_time > 0.0 else 0.0
+    finished = ending == "finished"
+    judged = verdicts(scenario, metrics, ended=finished)
+    factor = simulated_time / wall_time if wall_time else None
     same = as_published(fingerprint, scenario, design_hash)
     if json:
         print_json(
             {
                 "scenario": scenario.name,
-                "diverged_at_s": diverged_at,
-                "within_limits": diverged_at is None and all(verdict.within for verdict in judged.values()),
+                "diverged_at_s": simulated_time if ending == "diverged" else None,
+                "within_limits": finished and all(verdict.within for verdict in judged.values()),
                 "metrics": to_json(quantities, units),
                 "fingerprint": fingerprint,
                 "as_published": same,
@@ -51,11 +64,14 @@ def report_flight(
     else:
         print_table(scenario.title, quantities, units, limit_verdicts(judged, units))
         console.print(f"fingerprint {in_words(fingerprint, same)}", soft_wrap=True)
-        console.print(f"flown {simulated_time:.6g} s in {wall_time:.3g} s: {factor:.3g} x real time")
+        pace = f" in {wall_time:.3g} s: {factor:.3g} x real time" if wall_time and factor else ""
+        console.print(f"flown {simulated_time:.6g} s{pace}")
         for name, value in (extra or {}).items():
             console.print(f"{name:5} {value}", soft_wrap=True)
-    if diverged_at is not None:
-        raise RunError(f"flight diverged at t = {diverged_at:.2f} s: the state left the range of the model")
+    if ending == "diverged":
+        raise RunError(f"flight diverged at t = {simulated_time:.2f} s: the state left the range of the model")
+    if not finished:
+        raise RunError(f"flight broken off at t = {simulated_time:.2f} s of {scenario.duration:.2f} s")
 
 
 def limit_verdicts(judged: dict[str, Verdict], units: Units) -> dict[str, str]:

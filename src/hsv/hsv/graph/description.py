@@ -63,6 +63,9 @@ broken off. One message a run, and not recorded: the bag holds the state itself.
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
 
+LANDED = (0, EXIT_DIVERGED)
+"""Exit codes of the process that ends the run, when it has flown to the end."""
+
 
 @dataclass(frozen=True)
 class NodeDescription:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from hsv.errors import RecordingError, RunError
-from hsv.graph.description import COMPOSED, EXIT_DIVERGED, ROOT
+from hsv.graph.description import COMPOSED, ROOT
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
@@ -19,7 +19,7 @@ def fly_graph(
     namespace: str = ROOT,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
-) -> bool:
+) -> None:
     """Fly ``prepared`` with its node processes, or with all nodes in one, recorded to its bag.
 
     Args:
@@ -29,30 +29,41 @@ def fly_graph(
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
 
-    Returns:
-        Whether the flight diverged.
-
     Raises:
         RunError: A process failed or is not built, or the bag cannot be mended; last words are in the message.
     """
     started = (COMPOSED,) if composed else prepared.nodes
     failures = []
-    code = 0
     try:
         arguments = parameter_arguments(prepared.parameter_files)
         with Launcher(started, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
-            code = launcher.wait()
+            launcher.wait()
     except RunError as error:
         failures.append(str(error))
-    finally:
-        try:
-            _mend(prepared.bag)
-        except RecordingError as error:
-            failures.insert(0, str(error))
-    if failures:
-        where = f"{prepared.bag}: " if prepared.bag.is_dir() else ""
-        raise RunError(where + "; ".join(failures))
-    return code == EXIT_DIVERGED
+    except BaseException:
+        with suppress(RunError):
+            close_bag(prepared.bag)
+        raise
+    close_bag(prepared.bag, failures)
+
+
+def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
+    """Finish the bag of a graph whose processes have ended, and fail if anything did.
+
+    Args:
+        bag: The bag directory; removed where no recorder has come to write anything.
+        failures: What went wrong with the processes, in words.
+
+    Raises:
+        RunError: There are ``failures``, or the bag cannot be mended; names the bag where there is one.
+    """
+    words = list(failures)
+    try:
+        _mend(bag)
+    except RecordingError as error:
+        words.insert(0, str(error))
+    if words:
+        raise RunError((f"{bag}: " if bag.is_dir() else "") + "; ".join(words))
 
 
 def _mend(bag: Path) -> None:

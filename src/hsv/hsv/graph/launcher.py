@@ -18,7 +18,7 @@ from typing import NoReturn
 from hsv.errors import RunError
 from hsv.graph.description import (
     COMPOSED,
-    EXIT_DIVERGED,
+    LANDED,
     PLANT,
     ROOT,
     NodeDescription,
@@ -258,7 +258,7 @@ class Launcher:
 
 
 def _landed(process: _Process, code: int) -> bool:
-    return process.description in _FLYING and code in (0, EXIT_DIVERGED)
+    return process.description in _FLYING and code in LANDED
 
 
 def _die_with_parent() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from hsv.control.design_file import DESIGN_PARAMETERS, digest, find_design, read_parameters
 from hsv.design.certificate import certificate_path, find_certificate
-from hsv.errors import RecordingError, ScenarioError
+from hsv.errors import QuantityError, RecordingError, ScenarioError
 from hsv.graph.description import CONTROLLERS, NodeDescription, graph
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on
@@ -33,8 +33,8 @@ class PreparedRun:
     """Number of the last step if the flight does not diverge."""
     step_timeout: float
     """Wall time (s) to wait for a node that does nothing."""
-    folder: tempfile.TemporaryDirectory[str]
-    """Holds the parameter files; gone with this object."""
+    folder: tempfile.TemporaryDirectory[str] | None
+    """Holds the parameter files, and is gone with this object; ``None``: they are in a folder of the caller's."""
 
 
 def prepare(
@@ -44,15 +44,29 @@ def prepare(
     bag: Path | None = None,
     real_time_factor: float = 0.0,
     step_timeout: float = 10.0,
+    folder: Path | None = None,
 ) -> PreparedRun:
-    """Check scenario and design, make the bag's directory, write the parameter files of a run to a temporary folder.
+    """Check scenario and design, make the bag's directory, write the parameter files of a run.
 
     Everything that can be refused is refused here, before any process starts or anything is written.
 
+    Args:
+        scenario_name: Name or path of the scenario.
+        bags: Where the bag is made if ``bag`` is not given, named by scenario and time.
+        bag: Bag to record to, a new directory.
+        real_time_factor: Simulated over wall time; 0: as fast as possible.
+        step_timeout: Wall time (s) after which a silent node ends the run.
+        folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
+
     Raises:
+        QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
+    if not 0.0 <= real_time_factor <= 1000.0:
+        raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
+    if not 0.1 <= step_timeout <= 1e6:
+        raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
     if scenario.controller not in CONTROLLERS:
@@ -66,8 +80,12 @@ def prepare(
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
-    temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
-    folder = Path(temporary.name)
+    temporary = None
+    if folder is None:
+        temporary = tempfile.TemporaryDirectory(prefix="hsv_run_")
+        folder = Path(temporary.name)
+    folder = folder.absolute()
+    folder.mkdir(parents=True, exist_ok=True)
     files = {
         "scenario.toml": text,
         "scenario.yaml": ParameterSections(scenario.parameters()).to_yaml(),

@@ -48,7 +48,7 @@ def describe(bag: Bag) -> dict[str, Any]:
             {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
             for name, data in sorted(bag.attachments.items())
         ],
-        "ending": _ending(bag) if STATE in bag.roles else None,
+        "ending": ending(bag) if STATE in bag.roles else None,
         "faults": _faults(bag) if FAULT_STATUS in bag.roles else None,
         "saturation": _saturation(bag) if TUBE_STATUS in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
@@ -77,7 +77,12 @@ def _topic(bag: Bag, name: str) -> dict[str, Any]:
     return {"name": name, "type": topic.type, "messages": topic.count, "rate_hz": rate}
 
 
-def _ending(bag: Bag) -> str:
+def ending(bag: Bag) -> str:
+    """Return how the flight in ``bag`` ended: ``finished``, ``diverged`` or ``broken off``.
+
+    Raises:
+        RecordingError: A topic is missing or does not fit its definition.
+    """
     status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
     if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
         return "broken off"  # the last state may be there, but not what was made of it

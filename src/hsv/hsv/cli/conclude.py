@@ -1,0 +1,80 @@
+"""The command ``hsv conclude``: what ``hsv run`` does when the nodes have ended, for other launchers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import BagArgument, JsonOption, ReportOption, UnitsOption
+from hsv.cli.output import Units
+
+
+def conclude(
+    bag: BagArgument,
+    report: ReportOption = True,
+    failure: Annotated[str, typer.Option(help="What a process failed with: then this is the verdict.")] = "",
+    units: UnitsOption = Units.si,
+    json: JsonOption = False,
+) -> None:
+    """Conclude a flight whose nodes have ended: close its bag, print the summary, write the report, give the verdict.
+
+    What a launch file calls in the end, as hsv prepare in the beginning; hsv run does both by itself.
+
+    Example: hsv conclude bags/case1_20260101T000000Z
+    """
+    from hsv.graph.flight import close_bag
+
+    close_bag(bag, [failure] if failure else [])
+    conclude_flight(bag, report=report, units=units, json=json, wall_time=None)
+
+
+def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_time: float | None) -> None:
+    """Print the summary of the flight in ``bag`` and write its report into the bag's folder.
+
+    Args:
+        bag: The bag directory, closed.
+        report: Whether to write the report.
+        units: Units of what is printed.
+        json: Whether to print JSON.
+        wall_time: Wall time (s) that the flight took, where it is known.
+
+    Raises:
+        RecordingError: The bag holds no flight with its scenario, or the report cannot be written.
+        RunError: The flight diverged or was broken off; the summary is printed before.
+    """
+    from hsv.cli.summary import report_flight
+    from hsv.errors import RecordingError
+    from hsv.recording.flight import flight_data, flight_fingerprint
+    from hsv.recording.info import ending
+    from hsv.recording.reader import Bag
+    from hsv.recording.report.page import write_report
+    from hsv.simulation.metrics import flight_metrics
+    from hsv.simulation.scenario import parse_scenario
+
+    recorded = Bag(bag)
+    data = flight_data(recorded)
+    extra = {"bag": str(bag)}
+    unwritten = None
+    if report:
+        page = bag / "report.html"
+        try:
+            write_report([recorded], page, paper_units=units is Units.paper)
+            extra["report"] = str(page)
+        except RecordingError as error:
+            unwritten = error  # the flight itself is whole, and told first
+    report_flight(
+        parse_scenario(recorded.text("scenario.toml"), recorded.custom_data.get("scenario", "")),
+        flight_metrics(data),
+        fingerprint=flight_fingerprint(recorded),
+        design_hash=recorded.custom_data.get("design_hash", ""),
+        ending=ending(recorded),
+        wall_time=wall_time,
+        simulated_time=float(data.time[-1]),
+        units=units,
+        json=json,
+        extra=extra,
+    )
+    if unwritten:
+        raise unwritten

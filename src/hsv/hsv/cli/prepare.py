@@ -1,0 +1,82 @@
+"""The command ``hsv prepare``: what ``hsv run`` does before it starts the nodes, for other launchers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hsv.cli.options import (
+    JsonOption,
+    NewBagOption,
+    RealTimeFactorOption,
+    ScenarioArgument,
+    StepTimeoutOption,
+)
+from hsv.cli.output import console, print_json
+
+
+def prepare(
+    scenario: ScenarioArgument = "case1",
+    real_time_factor: RealTimeFactorOption = 0.0,
+    composed: Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")] = False,
+    bag: NewBagOption = None,
+    step_timeout: StepTimeoutOption = 10.0,
+    folder: Annotated[
+        Path | None, typer.Option(help="Folder for the parameter files; default: a new temporary one.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Prepare a flight for another launcher: check the scenario, make the bag, write the parameter files.
+
+    Prints which nodes to start, with which parameter files. Whoever starts them removes the folder of these files in
+    the end, and calls hsv conclude; hsv run does both by itself.
+
+    Example: hsv prepare case1 --json
+    """
+    import shutil
+    import tempfile
+
+    from hsv.cli.targets import check_folder
+    from hsv.graph.description import COMPOSED, LANDED
+    from hsv.graph.preparation import prepare as prepare_run
+
+    if folder:
+        check_folder(folder, "folder")
+    target = folder or Path(tempfile.mkdtemp(prefix="hsv_run_"))
+    try:
+        prepared = prepare_run(
+            scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout, folder=target
+        )
+    except BaseException:
+        if not folder:
+            shutil.rmtree(target)
+        raise
+    nodes = [COMPOSED] if composed else prepared.nodes
+    if json:
+        print_json(
+            {
+                "scenario": prepared.scenario.name,
+                "run_id": prepared.run_id,
+                "bag": str(prepared.bag),
+                "folder": str(target),
+                "parameter_files": [str(path) for path in prepared.parameter_files],
+                "nodes": [
+                    {
+                        "name": node.name,
+                        "package": node.package,
+                        "executable": node.executable,
+                        "ends_run": node is nodes[-1],
+                    }
+                    for node in nodes
+                ],
+                "landed_exit_codes": LANDED,
+                "last_step": prepared.steps,
+            }
+        )
+        return
+    files = " ".join(f"--params-file {path}" for path in prepared.parameter_files)
+    for node in nodes:
+        console.print(f"ros2 run {node.package} {node.executable} --ros-args {files}", soft_wrap=True)
+    console.print(f"bag {prepared.bag}", soft_wrap=True)
