@@ -1,0 +1,260 @@
+"""The graph among the tools of a full ROS 2 installation; skipped where none is sourced: make test-ros."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from full_installation import Terminal, needs_full_installation
+from node_processes import Processes, children, recorded_steps, short_scenario
+from waiting import exit_code_of, output_of, wait_until
+
+from hsv.graph.description import RECORDER, graph
+from hsv.recording.reader import Bag
+
+pytestmark = pytest.mark.full_ros
+
+LAUNCH = ("ros2", "launch", "hsv_bringup", "sil.launch.py")
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
+FORMS: dict[str, dict[str, Any]] = {
+    "converted": {},
+    "split": {"max_bagfile_size": 300_000},
+    "zstd by file": {"compression_mode": "file", "compression_format": "zstd"},
+    "zstd by message": {"compression_mode": "message", "compression_format": "zstd"},
+}
+"""What ros2 bag convert makes of a bag."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def installation() -> None:
+    needs_full_installation()
+
+
+def arguments(**values: object) -> list[str]:
+    return [f"{name}:={value}" for name, value in values.items()]
+
+
+def told(processes: Processes, *words: str | Path) -> Any:
+    done = processes.run("hsv", *words, "--json")
+    assert done.returncode == 0, done.stdout
+    return json.loads(done.stdout)
+
+
+def test_launch_flies_case_1_with_the_published_fingerprint(shared_processes: Processes) -> None:
+    done = shared_processes.run(*LAUNCH, *arguments(bag="case1"))
+    assert done.returncode == 0, done.stdout
+    assert ", as published" in done.stdout and "ERROR" not in done.stdout
+    assert told(shared_processes, "info", "case1")["as_published"] is True
+    assert (shared_processes.folder / "case1" / "report.html").is_file()
+
+
+def test_launch_composed_gives_the_same_bytes(shared_processes: Processes) -> None:
+    scenario = short_scenario(shared_processes.folder)
+    done = shared_processes.run(*LAUNCH, *arguments(scenario=scenario, bag="one", composed="true", report="false"))
+    assert done.returncode == 0, done.stdout
+    assert not (shared_processes.folder / "one" / "report.html").exists()
+    simulated = told(shared_processes, "simulate", scenario)
+    assert told(shared_processes, "info", "one")["fingerprint"] == simulated["fingerprint"]
+
+
+def test_launch_ends_with_1_after_a_lost_flight(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder, duration=30, coupling="derived", notch=False)
+    done = processes.run(*LAUNCH, *arguments(scenario=scenario, bag="lost", report="false"))
+    assert done.returncode == 1, done.stdout
+    assert "flight diverged at t = 17." in done.stdout and done.stdout.count("lost: the flight was lost") == 1
+    assert Bag(processes.folder / "lost").complete
+
+
+def fly_for_a_while(processes: Processes, bag: Path) -> subprocess.Popen[str]:
+    scenario = short_scenario(processes.folder, duration=10_000, fault=100)
+    words = arguments(scenario=scenario, bag=bag, real_time_factor=4, report="false")
+    flight = processes.start(*LAUNCH, *words)
+    wait_until(lambda: recorded_steps(bag) >= 50 or flight.poll() is not None, [flight.pid])
+    assert flight.poll() is None, flight.communicate()[0]
+    return flight
+
+
+@pytest.mark.parametrize("name", ["tube_mpc", RECORDER.name])
+def test_launch_ends_with_1_after_a_node_is_killed(processes: Processes, name: str) -> None:
+    bag = processes.folder / "killed"
+    flight = fly_for_a_while(processes, bag)
+    nodes = children(flight.pid)
+    assert set(nodes) == {node.name for node in graph()}
+    os.kill(nodes[name], signal.SIGKILL)
+    output = output_of(flight)
+    assert flight.returncode == 1 and f"{bag}: {name} was killed by SIGKILL" in output, output
+    assert Bag(bag).complete and recorded_steps(bag) >= 50
+    assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values())
+
+
+@pytest.mark.parametrize(
+    ("argument", "said"),
+    [
+        ("scenari:=case1", "scenari: no such argument, did you mean scenario?"),
+        ("colour:=red", "colour: no such argument: expected one of scenario, bag, "),
+        ("scenario:=nowhere", "scenario 'nowhere': expected a path or one of case1, "),
+        ("composed:=yes", "composed:=yes: expected true or false"),
+        ("real_time_factor:=quick", "Invalid value for 'real_time_factor'"),
+        ("step_timeout:=0", "step_timeout = 0.0: expected at least 0.1"),
+        ("bag:=.", "bag = '.': exists already"),
+    ],
+)
+def test_launch_names_a_wrong_argument_and_starts_nothing(processes: Processes, argument: str, said: str) -> None:
+    processes.environment["TMPDIR"] = str(processes.folder / "temporary")
+    (processes.folder / "temporary").mkdir()
+    done = processes.run(*LAUNCH, argument)
+    assert done.returncode == 2, done.stdout
+    [line] = [line for line in done.stdout.splitlines() if "[INFO] [launch]" not in line]
+    assert line.startswith(f"sil.launch.py: error: {said}")
+    assert [path.name for path in processes.folder.rglob("*")] == ["temporary"]
+
+
+def test_launch_describes_every_argument(processes: Processes) -> None:
+    done = processes.run(*LAUNCH, "-s")
+    assert done.returncode == 0
+    assert done.stdout.count("(default: ") == done.stdout.count("\n    '") == 9, done.stdout
+
+
+@pytest.fixture
+def terminal(processes: Processes) -> Iterator[Terminal]:
+    scenario = short_scenario(processes.folder, duration=10_000, fault=100)
+    words = arguments(scenario=scenario, bag="flown", real_time_factor=4, report="false")
+    opened = Terminal([*LAUNCH, *words], processes.environment, processes.folder)
+    yield opened
+    opened.stop()
+
+
+def test_ctrl_c_paints_nothing_red_and_closes_the_bag(processes: Processes, terminal: Terminal) -> None:
+    bag = processes.folder / "flown"
+    terminal.wait(lambda: recorded_steps(bag) >= 50)
+    terminal.interrupt()
+    assert terminal.exit_code() == 0, terminal.output
+    assert "ERROR" not in terminal.output and "Traceback" not in terminal.output, terminal.output
+    assert terminal.output.count("process has finished cleanly") == len(graph())
+    assert Bag(bag).complete
+
+
+INCLUDING = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, IncludeLaunchDescription, TimerAction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.substitutions import FindPackageShare
+
+
+def generate_launch_description():
+    sil = IncludeLaunchDescription(
+        [FindPackageShare("hsv_bringup"), "/launch/sil.launch.py"],
+        launch_arguments={"scenario": LaunchConfiguration("flight"), "bag": "flown", "report": "false"}.items(),
+    )
+    return LaunchDescription([
+        DeclareLaunchArgument("flight", description="what to fly"),
+        ExecuteProcess(cmd=["sleep", "4"]),
+        TimerAction(period=1.0, actions=[sil]),
+    ])
+"""
+
+
+def test_another_launch_file_includes_it(processes: Processes) -> None:
+    (processes.folder / "mine.launch.py").write_text(INCLUDING)
+    scenario = short_scenario(processes.folder)
+    done = processes.run("ros2", "launch", "./mine.launch.py", f"flight:={scenario}")
+    assert done.returncode == 0, done.stdout
+    assert Bag(processes.folder / "flown").complete and "flown 5 s" in done.stdout
+    # With a process running, launch itself has to end it: with its own exit code.
+    refused = processes.run("ros2", "launch", "./mine.launch.py", f"flight:={scenario}")
+    assert refused.returncode == 1 and "bag = 'flown': exists already" in refused.stdout, refused.stdout
+
+
+@pytest.fixture(scope="module")
+def recorded(shared_processes: Processes) -> tuple[Path, Path]:
+    """Return the bags of one flight at real-time pace: its own, and that of ros2 bag record."""
+    theirs, ours = shared_processes.folder / "theirs", shared_processes.folder / "ours"
+    with (shared_processes.folder / "record.log").open("w") as log:
+        recorder = shared_processes.start("ros2", "bag", "record", "-a", "-s", "mcap", "-o", theirs, output=log)
+    wait_until(lambda: "Recording..." in (shared_processes.folder / "record.log").read_text(), [recorder.pid])
+    scenario = short_scenario(shared_processes.folder, duration=12, fault=6)
+    words = arguments(scenario=scenario, real_time_factor=1, bag=ours, report="false")
+    done = shared_processes.run(*LAUNCH, *words)
+    assert done.returncode == 0, done.stdout
+    recorder.send_signal(signal.SIGINT)
+    assert exit_code_of(recorder) == 0
+    return ours, theirs
+
+
+def test_a_bag_of_ros2_bag_record_gives_the_metrics_of_the_flights_own(
+    shared_processes: Processes, recorded: tuple[Path, Path]
+) -> None:
+    ours, theirs = (told(shared_processes, "info", bag) for bag in recorded)
+    assert theirs["complete"] and not theirs["shortcomings"], theirs["shortcomings"]
+    assert theirs["metrics"].keys() == ours["metrics"].keys()
+    for name, value in ours["metrics"].items():
+        assert theirs["metrics"][name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
+    simulated = told(shared_processes, "simulate", shared_processes.folder / "short.toml")
+    assert theirs["fingerprint"] == simulated["fingerprint"] and theirs["faults"] == ours["faults"]
+    assert shared_processes.run("hsv", "diff", *recorded).stdout.rstrip().endswith("identical")
+
+
+@pytest.fixture(scope="module", params=[*FORMS, "reindexed"])
+def form(request: pytest.FixtureRequest, shared_processes: Processes) -> Path:
+    """Return the reference bag in a form that the tools of rosbag2 have given it."""
+    path = shared_processes.folder / request.param.replace(" ", "_")
+    if request.param == "reindexed":
+        path.mkdir()
+        (path / "case1_0.mcap").write_bytes((REFERENCE / "case1_0.mcap").read_bytes())
+        done = shared_processes.run("ros2", "bag", "reindex", path, "-s", "mcap")
+    else:
+        options = {"uri": str(path), "storage_id": "mcap", "all_topics": True, **FORMS[request.param]}
+        file = path.with_suffix(".yaml")
+        file.write_text(yaml.safe_dump({"output_bags": [options]}))
+        done = shared_processes.run("ros2", "bag", "convert", "-i", REFERENCE, "-o", file)
+    assert done.returncode == 0, done.stdout
+    return path
+
+
+def test_what_rosbag2_makes_of_a_bag_gives_what_the_bag_gives(shared_processes: Processes, form: Path) -> None:
+    theirs, ours = told(shared_processes, "info", form), told(shared_processes, "info", REFERENCE)
+    if form.name != "reindexed":
+        assert not theirs["attachments"]  # convert keeps none
+        for said in (theirs, ours):
+            del said["attachments"]
+    for said in (theirs, ours):
+        del said["path"], said["folder"]
+    assert theirs == ours
+    tables = {}
+    for bag in (form, REFERENCE):
+        out = shared_processes.folder / f"{form.name}.npz"
+        done = shared_processes.run("hsv", "export", bag, "--npz", "--out", out)
+        assert done.returncode == 0, done.stdout
+        with np.load(out) as loaded:
+            tables[bag] = dict(loaded)
+    assert tables[form].keys() == tables[REFERENCE].keys()
+    for name, table in tables[REFERENCE].items():
+        np.testing.assert_array_equal(tables[form][name], table)
+    pages = []
+    for bag in (form, REFERENCE):
+        out = shared_processes.folder / f"{form.name}.html"
+        scenario = () if Bag(bag).attachments else ("--scenario", str(REFERENCE.with_suffix(".toml")))
+        done = shared_processes.run("hsv", "report", bag, "--out", out, *scenario)
+        assert done.returncode == 0, done.stdout
+        page = out.read_text()
+        start = page.index('id="numbers">')
+        pages.append(page[start : page.index("</script>", start)].replace(bag.name, ""))
+    assert len(pages[0]) > 1000 and pages[0] == pages[1]
+
+
+def test_ros2_doctor_has_nothing_to_say_of_the_graph(processes: Processes) -> None:
+    bag = processes.folder / "flown"
+    flight = fly_for_a_while(processes, bag)
+    report = processes.run("ros2", "doctor", "--report-failed", "--exclude-packages")
+    flight.send_signal(signal.SIGINT)
+    output_of(flight)
+    assert report.returncode == 0, report.stdout
+    assert "hsv" not in report.stdout, report.stdout

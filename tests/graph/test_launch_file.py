@@ -1,0 +1,42 @@
+"""What can be said of the launch file without launch; with it: test_full_installation.py."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from pathlib import Path
+
+from hsv.cli.prepare import prepare
+from hsv.cli.run import run
+
+FILE = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_bringup" / "launch" / "sil.launch.py"
+TREE = ast.parse(FILE.read_text(encoding="utf-8"))
+INSTALLED = {"launch", "launch_ros", "ament_index_python"}
+"""What every ROS 2 installation has that can launch a file."""
+
+
+def arguments() -> set[str]:
+    """Return the names of the launch arguments."""
+    [table] = [node.value for node in TREE.body if isinstance(node, ast.Assign) and node.targets[0].id == "ARGUMENTS"]
+    return set(ast.literal_eval(table))
+
+
+def test_it_imports_nothing_that_an_installation_without_the_bench_lacks() -> None:
+    imported = set()
+    for node in ast.walk(TREE):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0
+            imported.add(str(node.module).split(".")[0])
+    assert imported >= INSTALLED
+    assert imported - INSTALLED <= sys.stdlib_module_names
+
+
+def test_it_has_an_argument_for_every_option_of_hsv_run() -> None:
+    of_the_terminal = {"verbose", "json"}
+    options = set(inspect.signature(run).parameters) - of_the_terminal
+    assert arguments() >= options
+    assert set(inspect.signature(prepare).parameters) - {"folder", "json"} <= options
+    assert arguments() - options == {"log_level", "namespace"}

@@ -1,0 +1,78 @@
+"""The tools of a full ROS 2 installation, where one is sourced: ros2 launch, bag, service, param, doctor."""
+
+from __future__ import annotations
+
+import os
+import pty
+import select
+import signal
+import subprocess
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import pytest
+from ros2 import real_command
+from waiting import wait_until
+
+COMMANDS = ("launch", "bag", "service", "param", "doctor")
+"""What the tests need, in words of the ros2 command."""
+
+
+@cache
+def missing() -> str:
+    """Return why the tests of these tools cannot run here, in words; empty where they can."""
+    command = real_command()
+    if command is None:
+        return "no full ROS 2 installation is sourced: there is no ros2 but that of .venv"
+    for word in COMMANDS:
+        asked = subprocess.run([command, word, "--help"], capture_output=True, check=False)
+        if asked.returncode:
+            return f"the installation that is sourced has no ros2 {word}"
+    return ""
+
+
+def needs_full_installation() -> None:
+    """Skip the test where there is none."""
+    if reason := missing():
+        pytest.skip(reason)
+
+
+class Terminal:
+    """A command in a terminal of its own, where Ctrl-C reaches all its processes at once, as a person's does."""
+
+    def __init__(self, command: list[str], environment: dict[str, str], folder: Path) -> None:
+        self.pid, self._terminal = pty.fork()
+        if self.pid == 0:
+            os.chdir(folder)
+            os.execvpe(command[0], command, environment)
+        self.output = ""
+        self.code: int | None = None
+
+    def wait(self, done: Callable[[], object]) -> None:
+        """Wait until ``done`` returns something true, or the command has ended."""
+        wait_until(lambda: done() or self.code is not None, [self.pid], pause=self._read)
+
+    def interrupt(self) -> None:
+        """Press Ctrl-C."""
+        os.write(self._terminal, b"\x03")
+
+    def exit_code(self) -> int:
+        """Wait for the command to end and return its exit code."""
+        self.wait(lambda: False)
+        assert self.code is not None
+        return self.code
+
+    def stop(self) -> None:
+        """End what still runs."""
+        if self.code is None:
+            os.killpg(self.pid, signal.SIGKILL)
+            self.exit_code()
+        os.close(self._terminal)
+
+    def _read(self, seconds: float) -> None:
+        if select.select([self._terminal], [], [], seconds)[0]:
+            try:
+                self.output += os.read(self._terminal, 65536).decode(errors="replace")
+            except OSError:  # nobody has the other end any more
+                self.code = os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
