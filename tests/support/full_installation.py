@@ -12,8 +12,9 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from ros2 import real_command
 from waiting import wait_until
+
+from ros2 import real_command
 
 COMMANDS = ("launch", "bag", "service", "param", "doctor")
 """What the tests need, in words of the ros2 command."""
