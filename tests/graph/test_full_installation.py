@@ -28,7 +28,8 @@ FORMS: dict[str, dict[str, Any]] = {
     "converted": {},
     "split": {"max_bagfile_size": 300_000},
     "zstd by file": {"compression_mode": "file", "compression_format": "zstd"},
-    "zstd by message": {"compression_mode": "message", "compression_format": "zstd"},
+    # With a shorter queue rosbag2 drops what it cannot compress in time.
+    "zstd by message": {"compression_mode": "message", "compression_format": "zstd", "compression_queue_size": 0},
 }
 """What ros2 bag convert makes of a bag."""
 
@@ -221,16 +222,15 @@ def form(request: pytest.FixtureRequest, shared_processes: Processes) -> Path:
 
 def test_what_rosbag2_makes_of_a_bag_gives_what_the_bag_gives(shared_processes: Processes, form: Path) -> None:
     theirs, ours = told(shared_processes, "info", form), told(shared_processes, "info", REFERENCE)
-    if form.name != "reindexed":
-        assert not theirs["attachments"]  # convert keeps none
-        for said in (theirs, ours):
-            del said["attachments"]
-    for said in (theirs, ours):
-        del said["path"], said["folder"]
+    lost = [] if form.name == "reindexed" else ["attachments", "custom_data"]
+    for name in lost:
+        assert ours[name] and not theirs[name]  # convert keeps neither
+    for name in ("path", "folder", *lost):
+        del theirs[name], ours[name]
     assert theirs == ours
     tables = {}
     for bag in (form, REFERENCE):
-        out = shared_processes.folder / f"{form.name}.npz"
+        out = shared_processes.folder / f"{form.name}_{len(tables)}.npz"
         done = shared_processes.run("hsv", "export", bag, "--npz", "--out", out)
         assert done.returncode == 0, done.stdout
         with np.load(out) as loaded:

@@ -1,0 +1,62 @@
+"""The manifests of the packages say what the packages import, and their changelogs are ones."""
+
+from __future__ import annotations
+
+import ast
+import sys
+from pathlib import Path
+
+import pytest
+from catkin_pkg.changelog import get_changelog_from_path
+from catkin_pkg.package import parse_package
+
+ROOT = Path(__file__).parents[2]
+MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/*/package.xml")])
+KEYS = {name: f"python3-{name}" for name in ("jinja2", "matplotlib", "numba", "numpy", "pydantic", "rich", "scipy")}
+KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
+"""By imported module: its key in rosdep."""
+
+WITHOUT_KEY = {"cvxpy", "dask", "distributed", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow", "rosbags"}
+WITHOUT_KEY |= {"tomli_w", "zstandard"}
+"""Modules for which rosdep has no key of a Debian package; docs/installation.md names them, pip installs them."""
+
+
+def imported(folder: Path) -> set[str]:
+    """Return the modules outside the standard library that a package imports, without its own."""
+    found = set()
+    for path in folder.rglob("*.py"):
+        if path.name == "setup.py":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                found.add(node.module.split(".")[0])
+    return found - sys.stdlib_module_names - {folder.name}
+
+
+@pytest.mark.parametrize("manifest", MANIFESTS, ids=lambda path: path.parent.name)
+def test_a_package_declares_what_it_imports_and_nothing_else(manifest: Path) -> None:
+    package = parse_package(str(manifest))
+    warnings: list[str] = []
+    package.validate(warnings=warnings)
+    assert not warnings
+    needed = {KEYS.get(module, module) for module in imported(manifest.parent) - WITHOUT_KEY}
+    declared = {dependency.name for dependency in package.exec_depends}
+    if not (manifest.parent / "CMakeLists.txt").exists():
+        assert declared == needed
+    assert package.build_depends == [] or package.get_build_type() == "ament_cmake"
+
+
+@pytest.mark.parametrize("manifest", MANIFESTS, ids=lambda path: path.parent.name)
+def test_a_package_has_a_changelog_of_its_name(manifest: Path) -> None:
+    text = (manifest.parent / "CHANGELOG.rst").read_text(encoding="utf-8")
+    assert f"Changelog for package {parse_package(str(manifest)).name}\n" in text
+    changelog = get_changelog_from_path(str(manifest.parent / "CHANGELOG.rst"))
+    versions = [version for version, _, _ in changelog.foreach_version()]
+    assert versions and all(changelog.get_content_of_version(version) for version in versions)
+
+
+def test_modules_without_a_key_are_named_in_the_documentation() -> None:
+    page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
+    assert all(f"`{module.replace('_', '-')}`" in page for module in WITHOUT_KEY)
