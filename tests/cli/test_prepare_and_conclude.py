@@ -59,6 +59,7 @@ def test_prepare_composed_names_one_process_and_a_command_for_people(hsv: Hsv, t
         (["nowhere"], "scenario 'nowhere'"),
         (["case1", "--real-time-factor", "nan"], "real-time-factor = nan: expected 0"),
         (["case1", "--step-timeout", "0"], "step-timeout = 0.0: expected at least 0.1"),
+        (["case1", "--namespace", "1st"], "namespace = '1st': expected names of letters"),
         (["case1", "--bag", "."], "bag = '.': exists already"),
         (["case1", "--folder", "/dev/null/folder"], "folder = '/dev/null/folder': cannot be written"),
     ],

@@ -39,4 +39,4 @@ def test_it_has_an_argument_for_every_option_of_hsv_run() -> None:
     options = set(inspect.signature(run).parameters) - of_the_terminal
     assert arguments() >= options
     assert set(inspect.signature(prepare).parameters) - {"folder", "json"} <= options
-    assert arguments() - options == {"log_level", "namespace"}
+    assert arguments() - options == {"log_level"}

@@ -37,7 +37,7 @@ ARGUMENTS = {
     "report": ("true", "true: write the report into the bag's folder; or false"),
     "units": ("si", "units of the summary and the report: si, or paper for ft, ft/s, deg"),
     "log_level": ("info", "what the nodes log: debug, info, warn, error or fatal"),
-    "namespace": ("", "namespace of all nodes, topics and services, e.g. /vehicle_1"),
+    "namespace": ("/", "namespace of all nodes and topics, such as /veh1: several graphs fly in one domain"),
 }
 """Default and description of each, by name; those of hsv run, as launch files spell them."""
 
@@ -73,7 +73,7 @@ class Flight:
             action = Node(
                 package=node["package"],
                 executable=node["executable"],
-                namespace=self._options["namespace"],
+                namespace=self._run["namespace"],
                 parameters=self._run["parameter_files"],
                 ros_arguments=["--log-level", self._options["log_level"]],
                 output="screen",
@@ -134,11 +134,12 @@ def prepare(context: LaunchContext) -> list[Action]:
         refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
     command += ["--real-time-factor", options["real_time_factor"], "--step-timeout", options["step_timeout"]]
+    command += ["--namespace", options["namespace"]]
     command += ["--bag", options["bag"]] if options["bag"] else []
     command += ["--composed"] if options["composed"] == "true" else []
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")))
+        refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")), done.returncode)
     run = json.loads(done.stdout)
     atexit.register(remove_if_empty, run["bag"])
     flight = Flight(hsv, run, options)
@@ -156,13 +157,13 @@ def refuse_unknown(names: Any) -> None:
             refuse(f"{name}: no such argument{hint}")
 
 
-def refuse(problem: str) -> None:
-    """End with one line and exit code 2 while nothing is running yet, otherwise as launch ends after an error."""
+def refuse(problem: str, code: int = 2) -> None:
+    """End with one line and exit code ``code`` while nothing runs yet, otherwise as launch does after an error."""
     print(f"sil.launch.py: error: {problem}", file=sys.stderr, flush=True)
     try:
         os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
     except ChildProcessError:
-        raise SystemExit(2) from None
+        raise SystemExit(code) from None
     # Included by a file that has started processes: launch ends them, and then with exit code 1.
     raise RuntimeError(problem)
 

@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import (
     JsonOption,
+    NamespaceOption,
     NewBagOption,
     RealTimeFactorOption,
     ScenarioArgument,
@@ -22,6 +23,7 @@ def prepare(
     real_time_factor: RealTimeFactorOption = 0.0,
     composed: Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")] = False,
     bag: NewBagOption = None,
+    namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = 10.0,
     folder: Annotated[
         Path | None, typer.Option(help="Folder for the parameter files; default: a new temporary one.")
@@ -39,11 +41,15 @@ def prepare(
     import tempfile
 
     from hsv.cli.targets import check_folder
-    from hsv.graph.description import COMPOSED, LANDED
+    from hsv.graph.description import COMPOSED, LANDED, ROOT, checked_namespace, graph
+    from hsv.graph.launcher import claim_graph
     from hsv.graph.preparation import prepare as prepare_run
 
     if folder:
         check_folder(folder, "folder")
+    namespace = checked_namespace(namespace)
+    # Not held on: each node claims what it publishes when it starts.
+    claim_graph(graph(), namespace).close()
     target = folder or Path(tempfile.mkdtemp(prefix="hsv_run_"))
     try:
         prepared = prepare_run(
@@ -60,6 +66,7 @@ def prepare(
                 "scenario": prepared.scenario.name,
                 "run_id": prepared.run_id,
                 "bag": str(prepared.bag),
+                "namespace": namespace,
                 "folder": str(target),
                 "parameter_files": [str(path) for path in prepared.parameter_files],
                 "nodes": [
@@ -76,7 +83,8 @@ def prepare(
             }
         )
         return
-    files = " ".join(f"--params-file {path}" for path in prepared.parameter_files)
+    words = " ".join(f"--params-file {path}" for path in prepared.parameter_files)
+    words += f" -r __ns:={namespace}" if namespace != ROOT else ""
     for node in nodes:
-        console.print(f"ros2 run {node.package} {node.executable} --ros-args {files}", soft_wrap=True)
+        console.print(f"ros2 run {node.package} {node.executable} --ros-args {words}", soft_wrap=True)
     console.print(f"bag {prepared.bag}", soft_wrap=True)

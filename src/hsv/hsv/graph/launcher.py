@@ -129,7 +129,7 @@ class Launcher:
 
     def __enter__(self) -> Launcher:
         paths = [executable(node) for node in self._nodes]
-        self._claim = self._claim_namespace()
+        self._claim = claim_graph(self._nodes, self._namespace)
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
@@ -137,26 +137,6 @@ class Launcher:
             self.__exit__()
             raise
         return self
-
-    def _claim_namespace(self) -> socket.socket:
-        """Return what keeps domain and namespace to this run, on this machine, for as long as it is open.
-
-        The nodes of two runs would take each other's messages, and both would be lost.
-        """
-        domain = ros_domain()
-        where = f"ROS_DOMAIN_ID={domain}{f' and namespace {self._namespace}' if self._namespace != ROOT else ''}"
-        held = claim_namespace(domain, self._namespace)
-        if held is None:
-            raise RunError(f"another run has {where}: expected a domain or a namespace of its own for every run")
-        nodes = graph() if COMPOSED in self._nodes else self._nodes
-        for node in nodes:
-            for topic in (resolved(name, self._namespace) for name in node.own_topics):
-                if is_published(domain, topic):
-                    held.close()
-                    raise RunError(
-                        f"a node with {where} publishes {topic} already: expected no other {node.name} there"
-                    )
-        return held
 
     def __exit__(self, *_: object) -> None:
         self.stop()
@@ -255,6 +235,27 @@ class Launcher:
         self._on_line(process.description.name, WARNING + reason)
         words = "".join(f"\n  {word}" for word in process.words)
         return RunError(f"{process.description.name} {reason}{'. Its last words:' if words else ''}{words}")
+
+
+def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:
+    """Return what keeps domain and namespace to a run of ``nodes``, on this machine, for as long as it is open.
+
+    The nodes of two runs would take each other's messages, and both would be lost.
+
+    Raises:
+        RunError: Another run has them, or a node that publishes what one of ``nodes`` does.
+    """
+    domain = ros_domain()
+    where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
+    held = claim_namespace(domain, namespace)
+    if held is None:
+        raise RunError(f"another run has {where}: expected a domain or a namespace of its own for every run")
+    for node in graph() if COMPOSED in nodes else nodes:
+        for topic in (resolved(name, namespace) for name in node.own_topics):
+            if is_published(domain, topic):
+                held.close()
+                raise RunError(f"a node with {where} publishes {topic} already: expected no other {node.name} there")
+    return held
 
 
 def _landed(process: _Process, code: int) -> bool:
