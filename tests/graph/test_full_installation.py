@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ import pytest
 import yaml
 from full_installation import Terminal, needs_full_installation
 from node_processes import Processes, children, recorded_steps, short_scenario
+from printed_commands import ROOT, the_printed
 from waiting import exit_code_of, output_of, wait_until
 
 from hsv.graph.description import RECORDER, graph
@@ -23,7 +25,8 @@ from hsv.recording.reader import Bag
 pytestmark = pytest.mark.full_ros
 
 LAUNCH = ("ros2", "launch", "hsv_bringup", "sil.launch.py")
-REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
+PAGE = "docs/installation.md"
+REFERENCE = ROOT / "bags" / "reference" / "case1"
 FORMS: dict[str, dict[str, Any]] = {
     "converted": {},
     "split": {"max_bagfile_size": 300_000},
@@ -50,11 +53,14 @@ def told(processes: Processes, *words: str | Path) -> Any:
 
 
 def test_launch_flies_case_1_with_the_published_fingerprint(shared_processes: Processes) -> None:
-    done = shared_processes.run(*LAUNCH, *arguments(bag="case1"))
+    done = shared_processes.run(
+        "bash", "-c", the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py scenario:=case1")
+    )
     assert done.returncode == 0, done.stdout
     assert ", as published" in done.stdout and "ERROR" not in done.stdout
-    assert told(shared_processes, "info", "case1")["as_published"] is True
-    assert (shared_processes.folder / "case1" / "report.html").is_file()
+    [bag] = (shared_processes.folder / "bags").glob("case1_*")
+    assert told(shared_processes, "info", bag)["as_published"] is True
+    assert (bag / "report.html").is_file()
 
 
 def test_launch_composed_gives_the_same_bytes(shared_processes: Processes) -> None:
@@ -119,7 +125,7 @@ def test_launch_names_a_wrong_argument_and_starts_nothing(processes: Processes, 
 
 
 def test_launch_describes_every_argument(processes: Processes) -> None:
-    done = processes.run(*LAUNCH, "-s")
+    done = processes.run("bash", "-c", the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py -s"))
     assert done.returncode == 0
     assert done.stdout.count("(default: ") == done.stdout.count("\n    '") == 9, done.stdout
 
@@ -174,33 +180,107 @@ def test_another_launch_file_includes_it(processes: Processes) -> None:
     assert refused.returncode == 1 and "bag = 'flown': exists already" in refused.stdout, refused.stdout
 
 
+def start_to_record(processes: Processes, command: str) -> subprocess.Popen[str]:
+    """Start a printed ros2 bag record and return it once it listens."""
+    log = processes.folder / "record.log"
+    with log.open("w") as output:
+        recorder = processes.start("bash", "-c", f"exec {command}", output=output)
+    wait_until(lambda: "Recording..." in log.read_text(), [recorder.pid])
+    return recorder
+
+
+def finish(process: subprocess.Popen[str]) -> None:
+    """End a process by Ctrl-C."""
+    process.send_signal(signal.SIGINT)
+    assert exit_code_of(process) == 0
+
+
 @pytest.fixture(scope="module")
 def recorded(shared_processes: Processes) -> tuple[Path, Path]:
-    """Return the bags of one flight at real-time pace: its own, and that of ros2 bag record."""
-    theirs, ours = shared_processes.folder / "theirs", shared_processes.folder / "ours"
-    with (shared_processes.folder / "record.log").open("w") as log:
-        recorder = shared_processes.start("ros2", "bag", "record", "-a", "-s", "mcap", "-o", theirs, output=log)
-    wait_until(lambda: "Recording..." in (shared_processes.folder / "record.log").read_text(), [recorder.pid])
-    scenario = short_scenario(shared_processes.folder, duration=12, fault=6)
-    words = arguments(scenario=scenario, real_time_factor=1, bag=ours, report="false")
-    done = shared_processes.run(*LAUNCH, *words)
+    """Return the bags of Case 1 at the pace of the clock: its own, and that of ros2 bag record."""
+    bags = shared_processes.folder / "bags"
+    bags.mkdir(exist_ok=True)
+    recorder = start_to_record(shared_processes, the_printed(PAGE, "ros2 bag record -a"))
+    launch = the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py real_time_factor:=1")
+    done = shared_processes.run("bash", "-c", launch)
     assert done.returncode == 0, done.stdout
-    recorder.send_signal(signal.SIGINT)
-    assert exit_code_of(recorder) == 0
-    return ours, theirs
+    finish(recorder)
+    return bags / "own", bags / "recorded"
 
 
 def test_a_bag_of_ros2_bag_record_gives_the_metrics_of_the_flights_own(
     shared_processes: Processes, recorded: tuple[Path, Path]
 ) -> None:
     ours, theirs = (told(shared_processes, "info", bag) for bag in recorded)
+    assert "Messages: " in shared_processes.run("bash", "-c", the_printed(PAGE, "ros2 bag info")).stdout
     assert theirs["complete"] and not theirs["shortcomings"], theirs["shortcomings"]
     assert theirs["metrics"].keys() == ours["metrics"].keys()
     for name, value in ours["metrics"].items():
         assert theirs["metrics"][name] == pytest.approx(value, rel=1e-9, abs=1e-9), name
-    simulated = told(shared_processes, "simulate", shared_processes.folder / "short.toml")
-    assert theirs["fingerprint"] == simulated["fingerprint"] and theirs["faults"] == ours["faults"]
+    assert theirs["fingerprint"] == ours["fingerprint"] and theirs["faults"] == ours["faults"]
+    assert ours["as_published"] is True
     assert shared_processes.run("hsv", "diff", *recorded).stdout.rstrip().endswith("identical")
+
+
+def test_a_recorded_bag_is_converted_and_indexed_anew(shared_processes: Processes, recorded: tuple[Path, Path]) -> None:
+    folder, expected = shared_processes.folder, told(shared_processes, "info", recorded[1])
+    options = {"uri": "bags/converted", "storage_id": "mcap", "all_topics": True, **FORMS["split"]}
+    (folder / "convert.yaml").write_text(yaml.safe_dump({"output_bags": [options]}))
+    for beginning, bag in (("ros2 bag convert -i", "converted"), ("ros2 bag reindex", "recorded")):
+        done = shared_processes.run("bash", "-c", the_printed(PAGE, beginning))
+        assert done.returncode == 0, done.stdout
+        found = told(shared_processes, "info", folder / "bags" / bag)
+        assert found["metrics"] == expected["metrics"] and found["fingerprint"] == expected["fingerprint"]
+
+
+def test_a_node_answers_to_a_played_bag_as_it_was_recorded(processes: Processes, recorded: tuple[Path, Path]) -> None:
+    (processes.folder / "bags").mkdir()
+    (processes.folder / "bags" / "own").symlink_to(recorded[0])
+    node = processes.start("bash", "-c", f"exec {the_printed(PAGE, 'ros2 run hsv_ctrl tube_mpc')}")
+    recorder = start_to_record(processes, the_printed(PAGE, "ros2 bag record -s mcap -o bags/answers"))
+    done = processes.run("bash", "-c", the_printed(PAGE, "ros2 bag play"))
+    assert done.returncode == 0, done.stdout
+    finish(recorder)
+    finish(node)
+    own, answers = Bag(recorded[0]), Bag(processes.folder / "bags" / "answers")
+    for topic in ("/hsv/command", "/hsv/tube_status"):
+        expected = [data for _, data in own.messages(topic)]
+        assert [data for _, data in answers.messages(topic)] == expected, topic
+
+
+def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
+    launch = the_printed(PAGE, "ros2 launch hsv_bringup sil.launch.py scenario:=case2")
+    flight = processes.start("bash", "-c", f"exec {launch}")
+    bags = processes.folder / "bags"
+    wait_until(lambda: any(recorded_steps(bag) > 50 for bag in bags.glob("*")) or flight.poll(), [flight.pid])
+    for beginning, said in (
+        ("ros2 service call /hsv/inject_fault", "accepted=True, message='loss_of_effectiveness 0.8 of elevator"),
+        ("ros2 service call /hsv/clear_fault", "accepted=True, message='no fault of elevator_deflection from step"),
+        ("ros2 param set", "Set parameter successful"),
+        ("ros2 param dump", "tau: [0.9]"),
+        ("ros2 topic echo", "tau:\n- 0.9\n"),
+    ):
+        done = processes.run("bash", "-c", the_printed(PAGE, beginning))
+        assert done.returncode == 0 and said in done.stdout.replace("tau:\n    - 0.9", "tau: [0.9]"), done.stdout
+    # It looks for half a second: in the busy moments of a flight it does not find everybody.
+    reports = [processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor")) for _ in range(5)]
+    assert all(report.returncode == 0 for report in reports)
+    assert any("hsv" not in report.stdout for report in reports), reports[-1].stdout
+    finish(flight)
+
+
+EXAMPLE = re.compile(r"```python\n(.*?)```", re.DOTALL)
+
+
+def test_two_vehicles_fly_in_one_domain_as_the_page_shows(processes: Processes) -> None:
+    [example] = EXAMPLE.findall((ROOT / PAGE).read_text(encoding="utf-8"))
+    (processes.folder / "two.launch.py").write_text(example)
+    done = processes.run("ros2", "launch", "./two.launch.py")
+    assert done.returncode == 0, done.stdout
+    assert done.stdout.count(", as published") == 2
+    for name, scenario in (("veh1", "case1"), ("veh2", "case1_derived")):
+        told_of_it = told(processes, "info", processes.folder / "bags" / name)
+        assert told_of_it["as_published"] is True and told_of_it["custom_data"]["scenario"] == scenario
 
 
 @pytest.fixture(scope="module", params=[*FORMS, "reindexed"])
@@ -248,13 +328,3 @@ def test_what_rosbag2_makes_of_a_bag_gives_what_the_bag_gives(shared_processes: 
         start = page.index('id="numbers">')
         pages.append(page[start : page.index("</script>", start)].replace(bag.name, ""))
     assert len(pages[0]) > 1000 and pages[0] == pages[1]
-
-
-def test_ros2_doctor_has_nothing_to_say_of_the_graph(processes: Processes) -> None:
-    bag = processes.folder / "flown"
-    flight = fly_for_a_while(processes, bag)
-    report = processes.run("ros2", "doctor", "--report-failed", "--exclude-packages")
-    flight.send_signal(signal.SIGINT)
-    output_of(flight)
-    assert report.returncode == 0, report.stdout
-    assert "hsv" not in report.stdout, report.stdout

@@ -17,7 +17,7 @@ KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 """By imported module: its key in rosdep."""
 
 WITHOUT_KEY = {"cvxpy", "dask", "distributed", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow", "rosbags"}
-WITHOUT_KEY |= {"tomli_w", "zstandard"}
+WITHOUT_KEY |= {"llvmlite", "tomli_w", "zstandard"}
 """Modules for which rosdep has no key of a Debian package; docs/installation.md names them, pip installs them."""
 
 

@@ -1,0 +1,173 @@
+"""Every command that the README and the page on ROS 2 installations print is run as printed, somewhere."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+from node_processes import Processes, recorded_steps
+from printed_commands import ROOT, printed
+from ros_domain import own_environment
+from waiting import exit_code_of, wait_until
+
+PAGES = ("README.md", "docs/installation.md")
+
+HERE = {
+    "hsv run case1 --bag bags/case1_readme",
+    "hsv plot bags/case1_readme --units paper --out docs/images/case1.png",
+    "hsv scenarios",
+    "hsv run case1 --bag bags/first",
+    "hsv run case1_derived --bag bags/second",
+    "hsv simulate case1",
+    "hsv info bags/first",
+    "hsv plot bags/first",
+    "hsv report bags/first bags/second --out comparison.html",
+    'hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper',
+    "hsv linearise --coupling derived",
+    "hsv design baseline",
+    "hsv verify offline_design/baseline.yaml",
+    "hsv run case1 --composed",
+    "hsv montecarlo case1 --samples 100 --seed 1",
+    "hsv figures --only 9",
+    "hsv claims",
+    "hsv study coupling",
+    "hsv run case1 --namespace /veh1",
+    "hsv replay bags/first",
+    "hsv replay bags/first --rerun",
+    "hsv play bags/first --rate 50",
+    "hsv diff bags/first bags/second",
+    "hsv export bags/first --csv",
+    "hsv recover bags/first",
+    "hsv run case1 --bag bags/case1",
+    "hsv montecarlo case1 --corners",
+    "ROS_DOMAIN_ID=7 hsv run case1",
+    "hsv prepare case1 --json",
+}
+"""Run by this file, in a folder like the checkout, one after the other."""
+
+TOGETHER = {
+    "ros2 run hsv_bringup recorder",
+    "ros2 run hsv_ctrl notch_filter",
+    "ros2 run hsv_ctrl nominal_trajectory",
+    "ros2 run hsv_ctrl tube_mpc",
+    "ros2 run hsv_plant fault_injector --ros-args -p fault.channels:=[elevator_deflection] "
+    "-p fault.types:=[loss_of_effectiveness] -p fault.values:=[0.9] -p fault.starts:=[100.0]",
+    "ros2 run hsv_plant plant --ros-args -p duration:=200.0",
+}
+"""Run by this file at the same time."""
+
+FULL = {
+    "ros2 launch hsv_bringup sil.launch.py scenario:=case1",
+    "ros2 launch hsv_bringup sil.launch.py -s",
+    "ros2 launch hsv_bringup sil.launch.py scenario:=case2 real_time_factor:=1",
+    "ros2 service call /hsv/inject_fault hsv_msgs/srv/InjectFault "
+    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, value: 0.8}}"',
+    'ros2 service call /hsv/clear_fault hsv_msgs/srv/ClearFault "{channel: elevator_deflection}"',
+    'ros2 param set /tube_mpc feedback.tau "[0.9]"',
+    "ros2 param dump /tube_mpc",
+    "ros2 topic echo --once /hsv/tube_status",
+    "ros2 doctor --report-failed",
+    "ros2 bag record -a -s mcap -o bags/recorded",
+    "ros2 launch hsv_bringup sil.launch.py real_time_factor:=1 bag:=bags/own",
+    "ros2 bag info bags/recorded",
+    "ros2 bag convert -i bags/recorded -o convert.yaml",
+    "ros2 bag reindex bags/recorded -s mcap",
+    "ros2 run hsv_ctrl tube_mpc --ros-args -p recorder:=false",
+    "ros2 bag record -s mcap -o bags/answers --topics /hsv/command /hsv/tube_status",
+    "ros2 bag play bags/own --topics /hsv/run /hsv/filtered_state /hsv/nominal --rate 5 --delay 3",
+    "ros2 bag info bags/first",
+    "ros2 bag play bags/first",
+}
+"""Run by tests/graph/test_full_installation.py, or the same with another bag."""
+
+ELSEWHERE = {
+    "sudo apt-get install git g++ make cmake python3 python3-venv python3-dev": "on a new machine",
+    "make run": "make",
+    "make test": "make",
+    "source env.sh": "tests/tools/test_env_sh.py",
+    "source /opt/ros/jazzy/setup.bash": "of the installation",
+    "hsv view bags/first": "tests/cli/test_report_and_view.py",
+    "plotjuggler -d bags/first/*.mcap -l src/hsv/hsv/recording/layouts/plotjuggler.xml": "test_layouts.py",
+    "hsv report bags/case1 bags/case1_no_notch bags/case1_derived --out comparison.html": "tests/cli",
+    "fastdds shm clean": "of ROS 2",
+    "ros2 run hsv_ctrl notch_filter --ros-args -r __ns:=/veh1 -r __node:=nf2": "tests/graph/test_names.py",
+    "ros2 run hsv_ctrl tube_mpc --ros-args -r hsv/command:=wish": "tests/graph/test_names.py",
+    'ros2 run hsv_bringup set_parameter tube_mpc feedback.tau "[0.8]"': "tests/graph/test_tau_in_flight.py",
+    "ros2 bag record -s mcap": "a form",
+    "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
+    "cd my_ws": "test_a_workspace_of_ones_own",
+    "python3 -m colcon build --symlink-install": "test_a_workspace_of_ones_own",
+    "source install/local_setup.bash": "test_a_workspace_of_ones_own",
+    "python3 -m colcon": "a form",
+}
+"""Where what cannot be run as printed by a test is tried, in some form."""
+
+DIFFERENT = {"hsv diff bags/first bags/second": 1}
+"""Exit codes other than 0."""
+
+
+def test_every_printed_command_is_run_and_every_command_that_is_run_is_printed() -> None:
+    tables = (HERE, TOGETHER, FULL, {*ELSEWHERE})
+    assert {command for page in PAGES for command in printed(page)} == set().union(*tables)
+    assert sum(map(len, tables)) == len(set().union(*tables))
+
+
+@pytest.fixture
+def checkout(tmp_path: Path) -> Path:
+    """Return a folder with what the commands read of the checkout, and room for what they write."""
+    for name in ("offline_design", "src"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / "docs" / "images").mkdir(parents=True)
+    return tmp_path
+
+
+@pytest.mark.long
+def test_commands_run_as_they_are_printed(checkout: Path) -> None:
+    commands = [command for page in PAGES for command in printed(page) if command in HERE]
+    assert len(commands) == len(HERE)
+    with own_environment() as environment:
+        processes = Processes(environment, checkout)
+        for command in commands:
+            done = processes.run("bash", "-c", command)
+            assert done.returncode == DIFFERENT.get(command, 0), f"{command}: {done.stdout}"
+        processes.stop()
+
+
+@pytest.mark.long
+def test_the_nodes_fly_in_terminals_of_their_own(checkout: Path) -> None:
+    commands = [command for command in printed("README.md") if command in TOGETHER]
+    assert len(commands) == len(TOGETHER)
+    with own_environment() as environment:
+        processes = Processes(environment, checkout)
+        started = {command: processes.start("bash", "-c", f"exec {command}") for command in commands}
+        plant = next(popen for command, popen in started.items() if " plant " in command)
+        assert exit_code_of(plant) == 0
+        [bag] = (checkout / "bags").iterdir()
+        wait_until(lambda: recorded_steps(bag) == 10_001, [popen.pid for popen in started.values()])
+        for popen in started.values():
+            if popen is not plant:
+                popen.send_signal(signal.SIGINT)
+                assert exit_code_of(popen) == 0
+        assert (bag / "metadata.yaml").is_file()
+
+
+@pytest.mark.long
+def test_a_workspace_of_ones_own(tmp_path: Path) -> None:
+    """An overlay of a package of the bench takes its place, as the page says."""
+    source = ROOT / "ros_ws" / "src" / "hsv_ctrl"
+    lines = [command for command in printed("docs/installation.md") if ELSEWHERE.get(command, "").startswith("test_a_")]
+    script = [
+        *lines[:2],
+        f"cp -r {source} src",
+        *lines[2:],
+        "ros2 pkg prefix hsv_ctrl",
+    ]
+    environment = os.environ | {"MAKEFLAGS": "-j1"}
+    command = ["bash", "-e", "-c", "\n".join(script)]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.splitlines()[-1] == str(tmp_path / "my_ws" / "install" / "hsv_ctrl")
+    assert (tmp_path / "my_ws" / "install" / "hsv_ctrl" / "lib" / "hsv_ctrl" / "tube_mpc").is_file()

@@ -1,0 +1,46 @@
+"""The commands that the documentation prints: lines of indented blocks, and spans of code that are whole commands."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PROGRAMS = ("cd", "fastdds", "hsv", "make", "mkdir", "plotjuggler", "python3", "ros2", "source", "sudo")
+_BLOCK = re.compile(r"^    (\S.*)$", re.MULTILINE)
+_SPAN = re.compile(r"`([^`\n]+)`")
+_PLACEHOLDER = re.compile(r"\b(?!UTC)[A-Z]{3,}\b|\.\.\.$")
+"""Of a form, not of a command."""
+
+
+def printed(page: str) -> list[str]:
+    """Return the commands of a page, in order, each once, without what is said about them behind ``#``."""
+    text = re.sub(r"^```.*?^```", "", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    found = [(match.start(), _without_remark(match.group(1))) for match in _BLOCK.finditer(text)]
+    # A name of a command, such as `hsv run`, is none with nothing to run it on.
+    spans = [match for match in _SPAN.finditer(text) if not _PLACEHOLDER.search(match.group(1))]
+    found += [(match.start(), match.group(1)) for match in spans if _whole(match.group(1).split())]
+    commands = [command for _, command in sorted(found) if _program(command) in PROGRAMS]
+    return list(dict.fromkeys(commands))
+
+
+def the_printed(page: str, beginning: str) -> str:
+    """Return the one command of ``page`` that begins so."""
+    [command] = [command for command in printed(page) if command.startswith(beginning)]
+    return command
+
+
+def _whole(words: list[str]) -> bool:
+    return len(words) > (3 if words[0] == "ros2" else 2) and not words[2].startswith("-")
+
+
+def _without_remark(line: str) -> str:
+    return re.sub(r"\s+#\s.*$", "", line)
+
+
+def _program(command: str) -> str:
+    words = shlex.split(command, comments=False) if command.count("'") % 2 == 0 else command.split()
+    while words and re.fullmatch(r"[A-Z_]+=\S*", words[0]):
+        words.pop(0)
+    return words[0] if words else ""
