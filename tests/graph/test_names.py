@@ -139,8 +139,9 @@ def test_dumped_parameters_fly_the_same(shared_processes: Processes) -> None:
     arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]
     arguments[RECORDER.name] += ["-p", f"bag.directory:={folder / 'again'}", "-p", "bag.attachments:=['']"]
     nodes = by_hand(shared_processes, graph(), arguments)
-    said = output_of(nodes["plant"])
-    assert nodes["plant"].returncode == 0, said
+    wait_until(lambda: any(popen.poll() is not None for popen in nodes.values()), [p.pid for p in nodes.values()])
+    for popen in nodes.values():
+        assert popen.poll() in (None, 0), output_of(popen)
     shared_processes.stop()
     scenario = load_scenario(str(short_scenario(folder, DURATION, 3)))
     expected = fly(assemble(flight_parameters(scenario))).fingerprint

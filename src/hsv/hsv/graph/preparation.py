@@ -95,7 +95,9 @@ def prepare(
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
-    certified = {"design.certificate": str(folder / "certificate.json")} if "certificate.json" in files else {}
+    # Where it stays, unlike the folder of this run: parameters that were dumped from the nodes can be loaded later.
+    certificate = design_file.with_suffix(".certificate.json").absolute()
+    certified = {"design.certificate": str(certificate)} if "certificate.json" in files else {}
     run = {
         **certified,
         "real_time_factor": float(real_time_factor),
