@@ -90,6 +90,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes
     (folder / "dumps").mkdir()
     dumped = processes.run(sys.executable, parameter_dump.__file__, folder / "dumps", *names)
     assert dumped.returncode == 0, dumped.stdout
+    assert not [file.name for file in (folder / "dumps").iterdir() if "null" in file.read_text()]
     steps = recorded_steps(prepared.bag)
     wait_until(lambda: recorded_steps(prepared.bag) > steps, pids, lambda: recorded_steps(prepared.bag))
     processes.stop()

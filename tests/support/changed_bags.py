@@ -13,6 +13,7 @@ Messages = list[tuple[int, bytes]]
 """Times in nanoseconds, and CDR."""
 
 NO_ATTACHMENTS: Mapping[str, bytes] = {}
+NO_CUSTOM_DATA: Mapping[str, str] = {}
 
 
 def changed_bag(
@@ -21,15 +22,16 @@ def changed_bag(
     topics: Callable[[Topic], Topic | None] = lambda topic: topic,
     messages: Callable[[str, Messages], Messages] = lambda topic, messages: messages,
     attachments: Mapping[str, bytes] = NO_ATTACHMENTS,
+    custom_data: Mapping[str, str] = NO_CUSTOM_DATA,
 ) -> Path:
-    """Write ``source`` again to ``target`` with other topics (None: left out), messages or attachments."""
+    """Write ``source`` again to ``target`` with other topics (None: left out), messages, attachments or custom data."""
     bag = Bag(source)
     recorded = [
         Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name)) for t in bag.topics.values()
     ]
     changed = [(topic.name, topics(topic)) for topic in recorded]
     kept = {name: topic for name, topic in changed if topic}
-    writer = BagWriter(target, list(kept.values()), bag.custom_data)
+    writer = BagWriter(target, list(kept.values()), bag.custom_data | dict(custom_data))
     for name, data in (bag.attachments | dict(attachments)).items():
         writer.attach(name, bag.media_types.get(name, "text/plain"), data)
     for name, topic in kept.items():

@@ -13,7 +13,15 @@ from hsv.parameters import Parameter
 _HEADER = """# Parameters of the nodes
 Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A
 value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2;
-floats need a decimal point. All are fixed once a node runs, unless the last column says otherwise.
+floats need a decimal point (`-p duration:=200.0`). So does a parameter that the node does not have, with the nearest
+one named; only the sections of a file for all nodes (`/**`) may hold what other nodes have. All are fixed once a node
+runs, unless the last column says otherwise.
+
+What `ros2 param dump` writes of a node can be given to it again with `--params-file` and flies the same; the recorder
+then needs another `bag.directory`, and `bag.attachments` that are still there.
+
+`use_sim_time` may be true for every node but the plant, which makes the clock; it changes no bit, as nodes answer to
+messages only. ROS takes the time from `/clock`: in a namespace it needs `-r /clock:=/veh1/clock` besides.
 """
 
 
