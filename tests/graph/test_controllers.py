@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ pytestmark = pytest.mark.graph
 def _shortened(processes: Processes, scenario: str, duration: float, fault: float, value: float = 0.9) -> Path:
     text = scenario_text(scenario).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
     path = processes.folder / f"{scenario}.toml"
-    path.write_text(text.replace("value = 0.9", f"value = {value}").partition("[limits]")[0])
+    text = re.sub(r"\[limits\]\n([^\[\n].*\n|\n)*", "", text)  # wherever it stands in the file
+    path.write_text(text.replace("value = 0.9", f"value = {value}"))
     return path
 
 
