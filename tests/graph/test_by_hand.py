@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
-import pytest
-from injected_fault import LONG, inject_and_land
-from node_processes import Processes
+import json
+import re
+import signal
+import subprocess
+import time
 
+import pytest
+from injected_fault import LONG, inject_and_land, last_line
+from node_processes import Processes
+from ros_domain import own_domain
+from waiting import exit_code_of, output_of, used, wait_until
+
+from hsv.control.design_file import find_design
 from hsv.graph.description import graph
+from hsv.recording.reader import Bag
+from hsv.replay.attached import flown_parameters
+from hsv.replay.engine import chosen, replay, rerun
 
 pytestmark = pytest.mark.graph
 
 
-def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> None:
-    bag = processes.folder / "by_hand"
-    extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": LONG}
-    nodes = {
+def start(processes: Processes, extra: dict[str, list[str]]) -> dict[str, subprocess.Popen[str]]:
+    """Start the nodes one by one, with these arguments."""
+    return {
         node.name: processes.start(
             "ros2",
             "run",
@@ -24,8 +35,122 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
         )
         for node in graph()
     }
+
+
+def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> None:
+    bag = processes.folder / "by_hand"
+    nodes = start(processes, {"recorder": ["-p", f"bag.directory:={bag}"], "plant": LONG})
     inject_and_land(processes, nodes["plant"], bag)
     assert [popen.returncode for name, popen in nodes.items() if name != "plant"] == [0] * (len(nodes) - 1)
+    said = {name: popen.communicate()[0] for name, popen in nodes.items()}
+    assert re.search(r"run \w{8} broken off at t = [\d.]+ s, step \d+: SIGINT", said["plant"])
+    for name in nodes.keys() - {"plant"}:
+        assert "broken off by the plant at t = " in said[name], said[name]
+
+
+def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> None:
+    bag = processes.folder / "by_hand"
+    # Nodes need not have the same parameters, and each is repeated with its own.
+    tube = ["--params-file", str(find_design("adjustable")), "-p", "feedback.tau:=[0.9]"]
+    extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": ["-p", "duration:=12.0"], "tube_mpc": tube}
+    nodes = start(processes, extra)
+    assert exit_code_of(nodes["plant"]) == 0
+    processes.stop()
+    said = {name: popen.communicate()[0] for name, popen in nodes.items()}
+    run_id = re.search(r"starts run (\w{8}): 601 steps, 12 s", said["plant"])[1]
+    for name in nodes.keys() - {"plant"}:
+        assert f"ready for run {run_id}: 601 steps, 12 s" in said[name]
+        assert f"run {run_id} finished at t = 12.00 s, step 600" in said[name], said[name]
+    assert said["recorder"].count(f" {bag}") == 2 and f"closed the bag {bag}: 601 steps" in said["recorder"]
+    assert "parameter design.hash differs: " in said["recorder"]
+
+    opened = Bag(bag)
+    assert sorted(opened.attachments) == ["certificate.json", "design.yaml", "scenario.yaml"]
+    assert opened.custom_data["run_id"].startswith(run_id) and opened.custom_data["design"] == "adjustable"
+    values = flown_parameters(opened)
+    assert values.of("tube_mpc")["feedback.tau"] == [0.9] and values.of("nominal_trajectory")["feedback.tau"] == [1.0]
+    assert [values.of(name)["design.name"] for name in ("tube_mpc", "nominal_trajectory")] == ["adjustable", "baseline"]
+    results = [replay(opened, process, values, lambda *_: None) for process in chosen("tube_mpc").values()]
+    results += rerun(opened, "tube_mpc", values, lambda *_: None)
+    assert len(results) == 10 and all(result.identical for result in results)
+    done = processes.run("hsv", "replay", bag, "--over-dds", "--rerun")
+    assert done.stdout.count("identical in every byte") == 5, done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "expected"),
+    [
+        (("fault", "list"), 1, "fault: error: no run in ROS_DOMAIN_ID="),
+        (("topic",), 1, "topic: error: no node of the graph in ROS_DOMAIN_ID="),
+        (("set", "tua", "0.8"), 2, "name = 'tua': expected a parameter that may change in flight, feedback.tau"),
+        (("set", "tau", "8"), 2, "feedback.tau[0] = 8.0: expected double array from 0 to 1"),
+        (("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
+        (("topic", "--every", "0"), 2, "--every"),
+        (("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_commands_refuse_in_one_line(processes: Processes, words: tuple[str, ...], code: int, expected: str) -> None:
+    done = processes.run("hsv", *words)
+    assert done.returncode == code and expected in last_line(done), done.stdout
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("after", [0.2, 2.0])
+def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int, after: float) -> None:
+    # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
+    popen = processes.start("hsv", "topic", "/hsv/state")
+    wait_until(lambda: used([popen.pid]) > min(after, 0.6), [popen.pid], pause=lambda _: time.sleep(0.02))
+    popen.send_signal(number)
+    output = output_of(popen)
+    assert popen.returncode == 130 and output.splitlines()[-1].endswith("error: interrupted"), output
+
+
+def test_topics_are_listed_and_printed_with_units(processes: Processes) -> None:
+    flight = processes.start("hsv", "run", "case1", "--real-time-factor", "0.5", "--no-report", "--bag", "flown")
+    listed = [json.loads(line) for line in _lines(processes.run("hsv", "topic", "--json"))]
+    rows = {row["topic"]: row for row in listed}
+    command = rows["/hsv/command"]
+    assert command["type"] == "hsv_msgs/msg/ControlInput" and command["publishers"] == ["/tube_mpc"]
+    assert command["subscribers"] == ["/fault_injector", "/recorder"]
+    state = json.loads(_lines(processes.run("hsv", "topic", "/hsv/state", "--once", "--json"))[-1])
+    assert state["altitude [m]"] == pytest.approx(26100, abs=300)
+    assert state["header.stamp [ns]"] == state["step"] * 20_000_000 and state["status"] == 0
+    printed = _lines(processes.run("hsv", "topic", "hsv/command", "--once"))
+    assert printed[0] == "/hsv/command" and printed[-1].split()[::2] == ["elevator_deflection", "rad"]
+    wrong = processes.run("hsv", "topic", "/hsv/stat")
+    assert wrong.returncode == 2 and last_line(wrong).endswith("no node publishes it, expected /hsv/state?")
+    flight.send_signal(signal.SIGINT)
+    assert exit_code_of(flight) == 130
+
+
+def _lines(done: subprocess.CompletedProcess[str]) -> list[str]:
+    assert done.returncode == 0, done.stdout
+    return [line for line in done.stdout.splitlines() if not line.startswith("waiting for ")]
+
+
+def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    import rclpy
+
+    from hsv_bringup import peer_parameters
+
+    monkeypatch.setattr(peer_parameters, "GIVE_UP_AFTER", 1.0)
+    with own_domain() as number:
+        rclpy.init(domain_id=number)
+        try:
+            asking, mute = rclpy.create_node("asking"), rclpy.create_node("mute")
+            peers = peer_parameters.PeerParameters(asking, {"nobodys_executable": "/mute"})
+
+            def gave_up() -> bool:
+                rclpy.spin_once(asking, timeout_sec=0.05)
+                assert peers.silent() == {"nobodys_executable": "/mute/list_parameters"}
+                return peers.gave_up
+
+            wait_until(gave_up)
+            assert peers.values() == {}
+            mute.destroy_node()
+        finally:
+            rclpy.shutdown()
 
 
 @pytest.mark.parametrize(

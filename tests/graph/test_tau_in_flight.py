@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import signal
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
+from injected_fault import last_line
 from node_processes import Processes, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
@@ -37,18 +39,15 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     # No change comes too late for this flight; it is interrupted once there is enough of it for a replay.
     words = ["--bag", bag_path, "--real-time-factor", "4.0", "--no-report"]
     flight = processes.start("hsv", "run", scenario(tmp_path), *words)
-    change = ("ros2", "run", "hsv_bringup", "set_parameter", "tube_mpc", "feedback.tau")
     _fly_until(flight, bag_path, 50)
-    refused = processes.run(*change, "[0.4, 0.4, 0.7, 0.7, 1.0]")
-    assert refused.returncode == 1
+    refused = processes.run("hsv", "set", "tau", "0.4, 0.4, 0.7, 0.7, 1")
+    assert refused.returncode == 2
     assert "feedback.tau[0] = 0.4: expected 0.5 to 1, the certified range" in refused.stdout
-    mistyped = processes.run(*change, "0.9")
-    assert mistyped.returncode == 1 and "feedback.tau = 0.9: Wrong parameter type" in mistyped.stdout
-    fixed = processes.run(*change[:-1], "feedback.tau_minimum", "[0.1]")
-    assert fixed.returncode == 1 and "feedback.tau_minimum" in fixed.stdout
     _fly_until(flight, bag_path, 150)
-    taken = processes.run(*change, "[0.8, 0.8, 0.9, 0.9, 1.0]")
+    taken = processes.run("hsv", "set", "feedback.tau", "[80 %, 0.8, 0.9, 0.9, 1]", "--json")
     assert taken.returncode == 0, taken.stdout
+    answer = json.loads(last_line(taken))
+    assert answer["value"] == [0.8, 0.8, 0.9, 0.9, 1.0]
     _fly_until(flight, bag_path, recorded_steps(bag_path) + 550)
     flight.send_signal(signal.SIGINT)
     output = output_of(flight)
@@ -56,7 +55,9 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
 
     bag = Bag(bag_path)
     [said] = [log.msg for _, log in bag.decode("/rosout") if "from step" in log.msg]
-    step = int(said.split()[-2])
+    step = answer["step"]
+    assert said == f"feedback.tau = [0.8, 0.8, 0.9, 0.9, 1.0] from step {step} on"
+    assert answer["time_s"] == pytest.approx(step * 0.02)
     flown = [list(status.tau) for _, status in bag.decode("/hsv/tube_status")]
     assert flown[:step] == [[1.0]] * 100 + [[0.9, 0.9, 0.95, 0.95, 1.0]] * (step - 100)
     assert flown[step:] == [[0.8, 0.8, 0.9, 0.9, 1.0]] * (len(flown) - step) and 100 < step < len(flown)

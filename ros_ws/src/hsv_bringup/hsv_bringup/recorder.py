@@ -94,7 +94,7 @@ class RecorderNode(PeerNode):
 
     def end_run(self, how: str) -> None:
         """Say how the run ended, and what is left to do by hand."""
-        self.get_logger().info(f"{how}; Ctrl-C closes the bag")
+        self.get_logger().info(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
 
     def missing(self) -> list[str]:
         """Wait for the links, then, of a run that nobody prepared, for the parameters of all nodes in it."""
