@@ -10,7 +10,7 @@ import time
 
 import pytest
 from injected_fault import LONG, inject_and_land, last_line
-from node_processes import Processes
+from node_processes import Processes, recorded_steps
 from ros_domain import own_domain
 from waiting import exit_code_of, output_of, used, wait_until
 
@@ -83,7 +83,6 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
         (("fault", "list"), 1, "fault: error: no run in ROS_DOMAIN_ID="),
         (("topic",), 1, "topic: error: no node of the graph in ROS_DOMAIN_ID="),
         (("set", "tua", "0.8"), 2, "name = 'tua': expected a parameter that may change in flight, feedback.tau"),
-        (("set", "tau", "8"), 2, "feedback.tau[0] = 8.0: expected double array from 0 to 1"),
         (("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
         (("topic", "--every", "0"), 2, "--every"),
         (("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
@@ -107,7 +106,9 @@ def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int,
 
 
 def test_topics_are_listed_and_printed_with_units(processes: Processes) -> None:
-    flight = processes.start("hsv", "run", "case1", "--real-time-factor", "0.5", "--no-report", "--bag", "flown")
+    bag = processes.folder / "flown"
+    flight = processes.start("hsv", "run", "case1", "--real-time-factor", "0.5", "--no-report", "--bag", bag)
+    wait_until(lambda: recorded_steps(bag), [flight.pid])
     listed = [json.loads(line) for line in _lines(processes.run("hsv", "topic", "--json"))]
     rows = {row["topic"]: row for row in listed}
     command = rows["/hsv/command"]
