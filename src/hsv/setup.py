@@ -6,6 +6,7 @@ setup(
     packages=find_packages(include=["hsv", "hsv.*"]),
     package_data={
         "hsv": [
+            "py.typed",
             "**/*.toml",
             "bench/*.c",
             "campaign/template/*",

@@ -23,7 +23,7 @@ from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
-from hsv.simulation.metrics import FlightData
+from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
@@ -227,6 +227,11 @@ class Flight:
         """The digest of all its bits, see :mod:`hsv.simulation.fingerprint`."""
         h = self.history
         return fingerprint(h.state, h.filtered_pitch_rate, h.deviation, h.nominal_input, h.command, h.actuator)
+
+    @cached_property
+    def metrics(self) -> dict[str, float]:
+        """The metrics that it defines, SI, by the names in :data:`hsv.simulation.metrics.METRICS`."""
+        return flight_metrics(self.data())
 
     def data(self) -> FlightData:
         """Return what the metrics are made of."""

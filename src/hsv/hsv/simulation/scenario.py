@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -213,13 +214,38 @@ def _table(text: str, name: str) -> dict[str, Any]:
         raise _refused(name, error) from error
 
 
-def load_scenario(name: str) -> Scenario:
-    """Return a shipped scenario (by name) or one from a file (by path).
+def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Scenario:
+    """Return a shipped scenario (by name) or one from a file (by path), with fields changed.
+
+    Args:
+        name: Name or path.
+        changes: Values as a file has them, with their units, by field, such as ``{"fault[0].value": 0.8}``.
 
     Raises:
         ScenarioError: Missing, or a field is wrong; the message names it, its value and what was expected.
     """
-    return parse_scenario(scenario_text(name), Path(name).stem)
+    text = scenario_text(name)
+    if changes:
+        table = _table(text, name)
+        for field, value in changes.items():
+            _set(table, field, value, name)
+        text = tomli_w.dumps(table)
+    return parse_scenario(text, Path(name).stem)
+
+
+def _set(table: dict[str, Any], field: str, value: object, name: str) -> None:
+    *path, key = (int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", field))
+    place: Any = table
+    for part in path:
+        if isinstance(place, dict) and isinstance(part, str):
+            place = place.setdefault(part, {})
+        elif isinstance(place, list) and isinstance(part, int) and part < len(place):
+            place = place[part]
+        else:
+            raise _refused(name, f"{field}: no such field, expected one such as fault[0].value")
+    if isinstance(place, dict) != isinstance(key, str) or (isinstance(key, int) and key >= len(place)):
+        raise _refused(name, f"{field}: no such field, expected one such as fault[0].value")
+    place[key] = value
 
 
 def parse_scenario(text: str, name: str) -> Scenario:

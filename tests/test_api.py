@@ -1,0 +1,60 @@
+"""The names of the package itself, as a notebook uses them."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import hsv
+from hsv.errors import ScenarioError
+
+SHORT = {"duration": "6 s", "fault[0].start": "3 s"}
+
+
+def test_a_changed_scenario_is_flown_measured_and_drawn(tmp_path):
+    flight = hsv.fly(hsv.load("case1", SHORT | {"vehicle.perturbation.mass": "+5 %", "fault[0].value": 0.8}))
+    assert flight.time[-1] == 6.0 and flight.fault_start == 3.0
+    np.testing.assert_array_equal(flight.history.actuator[150:, 1], 0.8 * flight.history.command[150:, 1])
+    assert flight.metrics["altitude_error_maximum"] == pytest.approx(182.88, rel=1e-3)
+    hsv.plot(flight, paper_units=True).savefig(tmp_path / "a.png")
+    assert (tmp_path / "a.png").stat().st_size > 20_000
+
+
+def test_a_shipped_scenario_flies_as_published():
+    assert hsv.fly("case2").fingerprint == hsv.fly(hsv.load("case2")).fingerprint
+    assert hsv.load("case2") == hsv.load("case2", {})
+
+
+def test_flights_are_compared_and_swept():
+    flights = hsv.sweep("case1", "fault[0].value", [1.0, 0.7], SHORT)
+    assert [*flights] == [1.0, 0.7]
+    table = hsv.compare({"whole": flights[1.0], "lost": flights[0.7]})
+    deviation = table["post_fault_attitude_deviation"]
+    assert 0.0 < deviation["whole"] < deviation["lost"]
+    assert "altitude_settling_time" not in table  # six seconds are too short to settle
+    assert len(hsv.plot({"whole": flights[1.0], "lost": flights[0.7]}).axes) == 8
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"fault[1].value": 0.8}, r"scenario 'case1': fault\[1\].value: no such field"),
+        ({"fault.value": 0.8}, r"scenario 'case1': fault.value: no such field"),
+        ({"duration.x": 0.8}, r"scenario 'case1': duration.x: no such field"),
+        ({"durations": "3 s"}, r"scenario 'case1': durations: unknown key"),
+        ({"vehicle.mass": "3 %"}, r"scenario 'case1': vehicle.mass: unknown key"),
+        ({"duration": "3 ft"}, r"scenario 'case1': duration = '3 ft': wrong unit"),
+    ],
+)
+def test_fields_that_are_not_there_are_named(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        hsv.load("case1", changes)
+
+
+def test_the_package_itself_imports_nothing_heavy():
+    program = "import sys, hsv; print([m for m in ('numpy', 'numba', 'hsv.api') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"
+    with pytest.raises(AttributeError, match="no attribute 'flies'"):
+        _ = hsv.flies
