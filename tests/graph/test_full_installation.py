@@ -249,10 +249,9 @@ def test_a_node_answers_to_a_played_bag_as_it_was_recorded(processes: Processes,
     os.kill(children(node.pid)["tube_mpc"], signal.SIGINT)
     assert exit_code_of(node) == 0
     own, answers = Bag(recorded[0]), Bag(processes.folder / "bags" / "answers")
-    for topic in ("/hsv/command", "/hsv/tube_status"):
-        # On a busy machine not every message comes through: nobody holds ros2 bag play back.
-        given, expected = answers.messages(topic), dict(own.messages(topic))
-        assert len(given) > len(expected) // 2 and all(expected[time] == data for time, data in given), topic
+    # On a busy machine not every message comes through: nobody holds ros2 bag play back.
+    given, expected = answers.messages("/hsv/command"), dict(own.messages("/hsv/command"))
+    assert len(given) > len(expected) // 2 and all(expected[time] == data for time, data in given)
 
 
 def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
