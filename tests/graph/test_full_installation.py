@@ -263,11 +263,11 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
         ("ros2 service call /hsv/inject_fault", "accepted=True, message='loss_of_effectiveness 0.8 of elevator"),
         ("ros2 service call /hsv/clear_fault", "accepted=True, message='no fault of elevator_deflection from step"),
         ("ros2 param set", "Set parameter successful"),
-        ("ros2 param dump", "tau: [0.9]"),
-        ("ros2 topic echo", "tau:\n- 0.9\n"),
+        ("ros2 param dump", "tau: - 0.9 "),
+        ("ros2 topic echo", "tau: - 0.9 "),
     ):
         done = processes.run("bash", "-c", the_printed(PAGE, beginning))
-        assert done.returncode == 0 and said in done.stdout.replace("tau:\n    - 0.9", "tau: [0.9]"), done.stdout
+        assert done.returncode == 0 and said in " ".join(done.stdout.split()), done.stdout
     # It looks for half a second: in the busy moments of a flight it does not find everybody.
     reports = [processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor")) for _ in range(5)]
     assert all(report.returncode == 0 for report in reports)
