@@ -101,7 +101,6 @@ ELSEWHERE = {
     "hsv set tau 0.9": "tests/graph/test_tau_in_flight.py",
     "hsv topic": "tests/graph/test_by_hand.py",
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
-    "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_lqr.py",
     "ros2 bag record -s mcap": "a form",
     "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_lqr.py",
     "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
