@@ -268,10 +268,11 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
     ):
         done = processes.run("bash", "-c", the_printed(PAGE, beginning))
         assert done.returncode == 0 and said in " ".join(done.stdout.split()), done.stdout
-    # It looks for half a second: in the busy moments of a flight it does not find everybody.
+    # It looks for half a second, in which it does not find everybody: what is wrong is found every time.
     reports = [processes.run("bash", "-c", the_printed(PAGE, "ros2 doctor")) for _ in range(5)]
     assert all(report.returncode == 0 for report in reports)
-    assert any("hsv" not in report.stdout for report in reports), reports[-1].stdout
+    alone = [set(re.findall(r"detected on (/hsv/\w+)", report.stdout)) for report in reports]
+    assert not set.intersection(*alone), reports[-1].stdout
     finish(flight)
 
 
