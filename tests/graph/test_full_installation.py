@@ -274,6 +274,8 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
     alone = [set(re.findall(r"detected on (/hsv/\w+)", report.stdout)) for report in reports]
     assert not set.intersection(*alone), reports[-1].stdout
     finish(flight)
+    # Commands on parameters and topics leave one that waits for more of them.
+    assert processes.run("ros2", "daemon", "stop").returncode == 0
 
 
 EXAMPLE = re.compile(r"```python\n(.*?)```", re.DOTALL)
