@@ -4,34 +4,20 @@ import numpy as np
 import pytest
 
 from hsv.control.design_file import find_design, read_design
-from hsv.control.notch_filter import discretise, series
 from hsv.design.region import corners
-from hsv.lpv.discretisation import zero_order_hold
-from hsv.vehicle.dynamics import jacobian
+from hsv.study.linear_loop import sampled_loop
 from hsv.vehicle.parameters import vehicle_parameters
-from hsv.vehicle.trim import trim
 
-FOOT = 0.3048
 WORST = 764
 """Index of the corner with the least moment of inertia, the largest mass and the strongest elevator."""
 
 
 def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
-    """Return the largest real part (1/s) of the elastic modes of the sampled loop at 86100 ft, 8150 ft/s."""
+    """Return the largest real part (1/s) of the elastic modes of the sampled loop where Case 1 ends."""
     design = read_design(find_design(name))
     vehicle = vehicle_parameters(coupling).perturbed(corner)
-    point = trim(vehicle, 86100.0 * FOOT, 8150.0 * FOOT)
-    A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), design.period)
-    B = B * [1.0, effectiveness]
-    A_s, B_s, C_s, D_s = series(discretise(design.notch, design.period))
-    F, n = design.feedback_gain.copy(), len(A_s)
-    rate = F[:, 4].copy()
-    F[:, 4] *= D_s
-    loop = np.zeros((9 + n, 9 + n))
-    loop[:9, :9], loop[:9, 9:] = A + B @ F, B @ np.outer(rate, C_s)
-    loop[9:, 4], loop[9:, 9:] = B_s, A_s
-    poles = np.log(np.linalg.eigvals(loop).astype(complex)) / design.period
-    return poles[np.abs(poles.imag) > 8.0].real.max()
+    loop = sampled_loop(vehicle, design.feedback_gain, design.notch, design.period, effectiveness=effectiveness)
+    return loop.poles[np.abs(loop.poles.imag) > 8.0].real.max()
 
 
 def test_the_baseline_s_notch_leaves_a_corner_of_the_derived_coupling_without_damping():

@@ -4,6 +4,11 @@ import re
 from importlib import import_module
 from pathlib import Path
 
+import pytest
+
+import hsv
+
+SOURCES = Path(hsv.__file__).parent
 TEXT = (Path(__file__).parents[2] / "docs" / "equations.md").read_text()
 
 
@@ -31,3 +36,21 @@ def test_every_numbered_equation_of_the_paper_is_on_the_page():
     rows = [line.split("|")[1] for line in TEXT.splitlines() if line.startswith("| (")]
     numbers = {int(number) for row in rows for number in re.findall(r"\((\d+)\)", row)}
     assert numbers == set(range(1, 55))
+
+
+@pytest.mark.parametrize("number", range(1, 55))
+def test_one_search_finds_every_equation_where_it_is_computed(number):
+    [*rows] = [line for line in TEXT.splitlines() if line.startswith("| (") and f"({number})" in line.split("|")[1]]
+    named = {name.rpartition(".")[0] for row in rows for name in re.findall(r"`(hsv\.[\w.]+)`", row)}
+    modules = {
+        name if Path(SOURCES, *name.split(".")[1:]).with_suffix(".py").is_file() else name.rpartition(".")[0]
+        for name in named
+    }
+    texts = [Path(SOURCES, *name.split(".")[1:]).with_suffix(".py").read_text(encoding="utf-8") for name in modules]
+    assert any(re.search(rf"eq\. {number}\b", text) for text in texts), sorted(modules)
+
+
+def test_no_equation_hides_in_a_range():
+    ranges = re.compile(r"eq\. \d+(-\d+|, \d)")
+    found = [str(path) for path in SOURCES.rglob("*.py") if ranges.search(path.read_text(encoding="utf-8"))]
+    assert found == []

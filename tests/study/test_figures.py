@@ -6,9 +6,9 @@ import matplotlib
 import numpy as np
 import pytest
 
+from hsv.control.notch_filter import notch_response
 from hsv.simulation.scenario import load_scenario, scenario_names
 from hsv.study.figures import case1
-from hsv.study.figures.bode import notch_response
 from hsv.study.figures.catalogue import FIGURES
 from hsv.study.figures.figure import Material
 from hsv.study.figures.page import page

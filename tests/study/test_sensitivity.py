@@ -18,7 +18,6 @@ from hsv.study.sensitivity.controllers import (
     coupling_limits,
     feedback,
     growth,
-    paper_like,
     said_corners,
 )
 from hsv.study.sensitivity.flights_strip import finding
@@ -27,7 +26,7 @@ from hsv.study.sensitivity.strip import strip
 from hsv.study.sensitivity.study import grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.variations import BOUNDS, ELEVATOR, WEIGHTS, baseline_variations
-from hsv.vehicle.parameters import uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.parameters import paper_like_scale, uncertainty_bounds, vehicle_parameters
 
 
 def quiet(what, done, total):
@@ -96,7 +95,7 @@ def test_labels_say_what_flies():
     ):
         assert bool(feedback(controller)[1]) is filtered
     assert [c.parameters()["vehicle.model"] for c in (*ALL, RMPC_DECOUPLED)] == ["CM"] * 5 + ["DM"]
-    assert paper_like() == pytest.approx(0.25)
+    assert paper_like_scale() == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.68), (WITH_NOTCH, 1.10)])

@@ -33,7 +33,7 @@ def linearise(
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
-    """Jacobians A, B and poles at a trim point (paper eq. 6-9; of the ECM, with the default notch filter, 40-43).
+    """Jacobians A, B and poles at a trim point (paper eq. 6 to eq. 9; of the ECM eq. 40 to eq. 43).
 
     Example: hsv linearise --coupling derived --model ECM
     """

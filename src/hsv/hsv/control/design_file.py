@@ -97,7 +97,7 @@ class ControlDesign:
     """Whether the parameters differ from those that were written (their digest does not match)."""
 
     def adjusted_gain(self, tau: np.ndarray) -> np.ndarray:
-        """Return F (2, 9) with the column of each rigid state multiplied by its factor ``tau`` (5)."""
+        """Return F (2, 9) with each rigid state's column times its factor ``tau`` (5) (paper eq. 48, eq. 54)."""
         gain = self.feedback_gain.copy()
         gain[:, :N_RIGID] *= tau
         return gain

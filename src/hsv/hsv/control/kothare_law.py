@@ -1,4 +1,4 @@
-"""The min-max LMI (paper eq. 32-35) solved in flight at a slow rate, with the same result whatever the load."""
+"""The min-max LMI (paper eq. 32 to eq. 35) solved in flight at a slow rate, with the same result whatever the load."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What chooses the nominal input u_n from the nominal state x_n: the interface, and the nested family (eq. 32-35)."""
+"""What chooses the nominal input u_n from the nominal state x_n: interface, and nested family (eq. 32 to eq. 35)."""
 
 from __future__ import annotations
 

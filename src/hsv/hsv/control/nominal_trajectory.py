@@ -1,4 +1,4 @@
-"""Reference equilibrium and nominal trajectory (paper eq. 20) under an exchangeable nominal law (eq. 32-35)."""
+"""Reference equilibrium and nominal trajectory (paper eq. 20) under an exchangeable nominal law (eq. 32 to eq. 35)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def nominal_advance(
     S: np.ndarray,
     new: np.ndarray,
 ) -> bool:
-    """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20), p the measured altitude and velocity.
+    """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20, eq. 46), p the measured h and V.
 
     ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``S`` (n (n + m)) and ``new``
     (n) are scratch. Returns whether p lay inside the envelope.

@@ -1,4 +1,4 @@
-"""Notch filter on the pitch-rate channel (paper eq. 38-39), discretised by the prewarped bilinear rule."""
+"""Notch filter on the pitch-rate channel (paper eq. 38, eq. 39), discretised by the prewarped bilinear rule."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hsv.elementary import tangent
 from hsv.elimination import solve
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import PITCH_RATE
 
 MAX_SECTIONS = 4
 
@@ -118,6 +119,39 @@ def _rest_of(A: np.ndarray) -> np.ndarray:
     The bilinear rule leaves it where it is.
     """
     return np.array([0.0, -1.0 / A[0, 1]])
+
+
+def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) -> np.ndarray:
+    """Return H(j omega) (f) of continuous sections in series (paper eq. 37, eq. 38), ``frequencies`` in rad/s."""
+    total = np.ones(len(frequencies), complex)
+    for n in sections:
+        zero, pole = 1j * frequencies / n.zero_frequency, 1j * frequencies / n.pole_frequency
+        total *= (zero * zero + 2.0 * n.zero_damping * zero + 1.0) / (pole * pole + 2.0 * n.pole_damping * pole + 1.0)
+    return total
+
+
+def with_notch(
+    A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: NotchData
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the sampled loop of a vehicle whose feedback takes the filtered pitch rate, still open.
+
+    Args:
+        A: (..., n, n) state matrices, discrete time, the pitch rate among the states.
+        B: (..., n, m) input matrices.
+        gain: (m, n) of u = gain x with the filtered pitch rate in x.
+        notch: The discrete filter, of s states.
+
+    Returns:
+        A (..., n + s, n + s), B (..., n + s, m) and gain (m, n + s) of vehicle and filter.
+    """
+    A_s, B_s, C_s, D_s = series(notch)
+    n, s = A.shape[-1], len(A_s)
+    whole, inputs = np.zeros((*A.shape[:-2], n + s, n + s)), np.zeros((*B.shape[:-2], n + s, B.shape[-1]))
+    whole[..., :n, :n], whole[..., n:, n:], whole[..., n:, PITCH_RATE] = A, A_s, B_s
+    inputs[..., :n, :] = B
+    full = np.hstack((gain, np.outer(gain[:, PITCH_RATE], C_s)))
+    full[:, PITCH_RATE] *= D_s
+    return whole, inputs, full
 
 
 def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:

@@ -1,4 +1,4 @@
-"""Tube-MPC law (paper eq. 36, 48, 54): u = F diag(tau) (x - x_r - x_n) + u_n + u_r within the limits.
+"""Tube-MPC law (paper eq. 36, eq. 48, eq. 54): u = F diag(tau) (x - x_r - x_n) + u_n + u_r within the limits.
 
 The pitch rate in x is the filtered one; that of x_r + x_n is too where the design says so (eq. 48). Integral action on
 the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the offset that a
@@ -121,7 +121,7 @@ def tube_step(
     u_total: np.ndarray,
     u: np.ndarray,
 ) -> int:
-    """Write the feedback part, the sum of the three parts and the limited input, (2) each; return the gain's index.
+    """Write feedback, sum of all parts and limited input, (2) each (paper eq. 21, eq. 36); return the gain's index.
 
     The filter of the plan's pitch rate q'_n (eq. 48) starts from the state ``s`` of the one in the loop, which is exact
     where x = x_r + x_n; it is stepped where the law needs it or is ``monitored``, and where there is one in the loop.

@@ -1,4 +1,4 @@
-"""Disturbance sets of the error system (paper eq. 13-19): boxes, and the structured set with the one-sided fault.
+"""Disturbance sets of the error system (paper eq. 13 to eq. 19): boxes, and the structured set with one-sided fault.
 
 Delta(k) = x(k+1) - phi_T(x_r(k), u_r(k)) - A(p) (x(k) - x_r(k)) - B(p) (u(k) - u_r(k)), u the commanded input, is what
 the polytopic model does not explain; the nominal vehicle takes the reference to phi_T = x_r(k+1) + d_r(k), which is x_r
@@ -101,7 +101,7 @@ class ChannelModel:
     filtered: bool = False
 
     def signals(self, record: Record) -> Signals:
-        """Return the disturbances that acted in a flight."""
+        """Return the disturbances f, w and Delta that acted in a flight (paper eq. 13, eq. 16, eq. 18)."""
         n = len(record.state) - 1
         signals = Signals(np.empty((n, len(CHANNELS))), np.empty((n, N_STATES)), np.empty((n, N_STATES)))
         rows = list(_ACCELERATED)
@@ -188,7 +188,7 @@ class Membership:
 
 @dataclass(frozen=True)
 class DisturbanceSet:
-    """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI.
+    """The structured set: each of :data:`CHANNELS` between ``lower`` and ``upper`` (7), SI (paper eq. 19).
 
     It bounds what it was computed on and nothing else: check :meth:`membership` in every later flight.
     """

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hsv.control.notch_filter import NotchData, filter_step, rest, series
+from hsv.control.notch_filter import NotchData, filter_step, rest, with_notch
 from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
@@ -34,7 +34,7 @@ class ErrorSystem:
 
 
 def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, channels: np.ndarray) -> ErrorSystem:
-    """Return the error system of the rigid states and the notch filter.
+    """Return the error system of the rigid states and the notch filter (paper eq. 23, with the filter in it).
 
     The flexible states of the decoupled model follow the rigid ones and are not fed back, so they stay outside.
 
@@ -47,26 +47,17 @@ def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, 
     """
     r = len(A)
     A_x, B_x, F_x = A[:, :N_RIGID, :N_RIGID], B[:, :N_RIGID], F[:, :N_RIGID]
-    A_s, B_s, C_s, D_s = series(notch)
-    n = N_RIGID + len(A_s)
-    gain = np.zeros((2, n))
-    gain[:, :N_RIGID] = F_x
-    gain[:, PITCH_RATE] *= D_s
-    gain[:, N_RIGID:] = np.outer(F_x[:, PITCH_RATE], C_s)
-    closed = np.zeros((r, n, n))
-    closed[:, :N_RIGID, :N_RIGID] = A_x
-    closed[:, :N_RIGID] += B_x @ gain
-    closed[:, N_RIGID:, N_RIGID:] = A_s
-    closed[:, N_RIGID:, PITCH_RATE] += B_s
+    whole, inputs, gain = with_notch(A_x, B_x, F_x, notch)
+    n = whole.shape[1]
     columns = np.zeros((r, n, 7))
     columns[:, :N_RIGID, :3] = channels
     columns[:, :N_RIGID, 3] = B_x[:, :, 1]
     columns[:, :N_RIGID, 4] = B_x @ F_x[:, PITCH_RATE]
     columns[:, 0, 5] = columns[:, 3, 6] = 1.0
-    names = STATE_NAMES[:N_RIGID] + tuple(f"filter_{i + 1}" for i in range(len(A_s)))
+    names = STATE_NAMES[:N_RIGID] + tuple(f"filter_{i + 1}" for i in range(n - N_RIGID))
     feedthrough = np.zeros((2, columns.shape[2]))
     feedthrough[:, 4] = F_x[:, PITCH_RATE]
-    return ErrorSystem(closed, columns, gain, feedthrough, names)
+    return ErrorSystem(whole + inputs @ gain, columns, gain, feedthrough, names)
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:

@@ -1,4 +1,4 @@
-"""The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22-24)."""
+"""The tube's feedback gain F by linear matrix inequalities over all vertices (paper eq. 22 to eq. 24)."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def feedback_gain(
     input_scale: np.ndarray,
     method: str = "guaranteed_cost",
 ) -> FeedbackGain:
-    """Return F such that A_i + B_i F share one Lyapunov function, verified after solving.
+    """Return F such that A_i + B_i F share one Lyapunov function (paper eq. 24), verified after solving.
 
     ``"guaranteed_cost"`` minimises a bound, common to all vertices, of the quadratic cost of the responses to the
     disturbance columns. ``"feasibility"`` is (24) as printed, which leaves F to the solver's taste; it is for study.

@@ -129,7 +129,7 @@ class TensorProductInputs(_Table):
 
 
 class ModelInputs(_Table):
-    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 10-12), or with its filter (44-45)."""
+    """The polytopic model over the envelope: of the decoupled vehicle (paper eq. 12), or with its filter (eq. 45)."""
 
     system: Literal["DM", "ECM"] = "DM"
     period: Duration = Positive
@@ -158,7 +158,7 @@ class FeedbackInputs(_Table):
 
 
 class NominalInputs(_Table):
-    """The nominal gains K (paper eq. 32-35): one for each of ``scales`` times the step from ``start`` to ``target``."""
+    """The nominal gains K (paper eq. 32 to eq. 35): one for each of ``scales`` times ``start`` to ``target``."""
 
     start: FlightPoint
     target: FlightPoint
@@ -193,7 +193,7 @@ class RampInputs(_Table):
 
 
 class DisturbanceInputs(_Table):
-    """The declared region over which disturbances are measured (paper eq. 13-19): the nominal step, every corner."""
+    """The region over which disturbances are measured (paper eq. 13 to eq. 19): the nominal step, every corner."""
 
     coupling: Literal["paper_like", "derived"]
     duration: Duration = Positive
@@ -208,7 +208,7 @@ class DisturbanceInputs(_Table):
 
 
 class InvariantSetInputs(_Table):
-    """The invariant set (paper eq. 25-28) and what it is to keep small."""
+    """The invariant set (paper eq. 25 to eq. 28) and what it is to keep small."""
 
     method: Literal["ellipsoid", "zonotope", "modal", "box"]
     contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)

@@ -68,7 +68,7 @@ def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarra
 
 
 def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection] = ()) -> DesignModel:
-    """Return the polytopic model of ``vehicle``, decoupled, over the envelope, in the representation asked for.
+    """Return the polytopic model of ``vehicle``, decoupled, over the envelope, as asked for (paper eq. 12, eq. 45).
 
     Args:
         inputs: What is asked for.

@@ -1,4 +1,4 @@
-"""Nominal gains by the min-max LMI with input bounds (paper eq. 31-35), one gain or a nested family.
+"""Nominal gains by the min-max LMI with input bounds (paper eq. 31 to eq. 35), one gain or a nested family.
 
 The problem is Kothare, Balakrishnan and Morari's (Automatica 32, 1996); the look-up over nested ellipsoids is Wan and
 Kothare's (Automatica 39, 2003): the smallest ellipsoid that holds the state names the gain, and because each ellipsoid
@@ -65,6 +65,8 @@ class NominalGain:
 
 def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
     """Return the gain whose worst cost from ``state`` is least, verified after solving.
+
+    Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
 
     Args:
         problem: Vertices, weights and input bounds.

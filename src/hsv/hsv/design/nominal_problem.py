@@ -1,4 +1,4 @@
-"""The data of the nominal problem (paper eq. 31-35), and the cost that a gain is certified for."""
+"""The data of the nominal problem (paper eq. 31 to eq. 35), and the cost that a gain is certified for."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def step_deviation(vehicle: VehicleParameters, start: tuple[float, float], targe
 
 
 def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: str) -> tuple[float, np.ndarray]:
-    """Return the cost that no state of the ellipsoid exceeds under K, and the residuals (r) of (34) with it.
+    """Return the cost (paper eq. 31) that no state of the ellipsoid exceeds under K; residuals (r) of eq. 34 with it.
 
     The least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex: (34) for the given matrices.
 

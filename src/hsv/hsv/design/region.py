@@ -84,7 +84,7 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
 
 
 class Region:
-    """The flights of a design over ``share`` of its declared region: of the fault, and of the parameter bounds."""
+    """The flights of a design over ``share`` of its declared region: of fault and parameter bounds (paper eq. 47)."""
 
     def __init__(self, design: ControlDesign, inputs: DesignInputs, share: float) -> None:
         self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share)})
@@ -149,7 +149,7 @@ class RegionResult:
 def measure(
     region: Region, model: ChannelModel, over: Sequence[Corner], progress: Callable[[int], None] = lambda done: None
 ) -> RegionResult:
-    """Fly ``over`` and return the extremes of every disturbance."""
+    """Fly ``over`` and return the extremes of every disturbance (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
         s: Signals = model.signals(record(flight))

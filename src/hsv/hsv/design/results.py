@@ -74,7 +74,7 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
     "adjustable factor; share of fault and parameter bounds in W (eq. 47)": lambda c: (
         f"{c['adjustable']['tau'][0]:g}; {c['adjustable']['share']:g}" if "adjustable" in c else "1; 1"
     ),
-    "largest nominal input from trim: fuel; elevator deg (eq. 35, 52)": lambda c: _each(
+    "largest nominal input from trim: fuel; elevator deg (eq. 35, eq. 52)": lambda c: _each(
         c, c["adjustable"]["input_bound"] if "adjustable" in c else list(c["inputs"]["nominal"]["input_bound"].values())
     ),
     "nominal gains; certified cost of the outermost, s (eq. 32)": lambda c: (

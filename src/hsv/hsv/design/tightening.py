@@ -37,7 +37,7 @@ class TightenedInputs:
 
 
 def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> TightenedInputs:
-    """Return U minus F Z for U between ``minimum`` and ``maximum`` (2).
+    """Return U minus F Z (paper eq. 30, eq. 53) for U between ``minimum`` and ``maximum`` (2).
 
     Raises:
         DesignError: Nothing is left of an input.

@@ -78,7 +78,7 @@ class FaultSchedule(NamedTuple):
 
 @njit(cache=True)
 def apply_faults(schedule: Any, step: int, command: np.ndarray, actuator: np.ndarray) -> None:
-    """Write into ``actuator`` (2) what becomes of ``command`` (2) in this step."""
+    """Write into ``actuator`` (2) what becomes of ``command`` (2) in this step (paper eq. 14, eq. 15)."""
     for i in range(len(command)):
         actuator[i] = command[i]
     for row in range(len(schedule.start)):

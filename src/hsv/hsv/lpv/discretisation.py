@@ -7,7 +7,7 @@ from scipy.linalg import expm
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the discrete (A, B) of dx/dt = A x + B u with u held over ``period`` (s).
+    """Return the discrete (A, B) of dx/dt = A x + B u with u held over ``period`` (s) (paper eq. 12).
 
     Args:
         A: (n, n) continuous-time state matrix, SI per second.

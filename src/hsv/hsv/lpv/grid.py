@@ -18,7 +18,7 @@ Linearised = Callable[[float, float], tuple[np.ndarray, np.ndarray]]
 
 
 def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return continuous-time A (9, 9) and B (9, 2) of the decoupled model at trim (paper eq. 4-9), SI.
+    """Return continuous-time A (9, 9) and B (9, 2) of the decoupled model at trim (paper eq. 6 to eq. 9), SI.
 
     Args:
         vehicle: Parameters; their inertial coupling is left out.
@@ -49,7 +49,7 @@ def linearise_extended(
 def sample(
     model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return zero-order-hold A (n_h, n_v, n, n) and B (n_h, n_v, n, m) of ``model`` on a grid.
+    """Return zero-order-hold A (n_h, n_v, n, n) and B (n_h, n_v, n, m) of ``model`` on a grid (paper eq. 10).
 
     Args:
         model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).

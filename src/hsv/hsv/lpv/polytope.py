@@ -1,4 +1,4 @@
-"""Polytopic linear parameter-varying model (paper eq. 11-12): vertices and their weights over altitude and velocity."""
+"""Polytopic linear parameter-varying model (paper eq. 11, eq. 12): vertices, weights over altitude and velocity."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class PolytopeData(NamedTuple):
 
 @dataclass(frozen=True)
 class Polytope:
-    """A discrete-time polytopic model.
+    """A discrete-time polytopic model (paper eq. 12).
 
     ``A`` (r, n, n), ``B`` (r, n, m), altitude-major: vertex i * r_velocity + j. Scheduling variables are altitude (m)
     and velocity (m/s); outside the breakpoints they are clamped.

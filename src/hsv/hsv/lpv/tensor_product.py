@@ -1,4 +1,4 @@
-"""Tensor-product model transformation (paper eq. 10-12; Baranyi): few vertices, weights one variable at a time."""
+"""Tensor-product model transformation (paper eq. 10 to eq. 12; Baranyi): few vertices, weights variable by variable."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def tensor_product(
     tolerance: float,
     functions: str = "singular",
 ) -> TensorProduct:
-    """Return the polytopic model of discrete-time samples on a grid, with a tight hull.
+    """Return the polytopic model of discrete-time samples on a grid (paper eq. 11), with a tight hull.
 
     The higher-order singular value decomposition is taken of [A - I, B] over the scales: the identity is the same
     everywhere and would make the ranks depend on the sampling period.

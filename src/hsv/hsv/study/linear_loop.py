@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import brentq
 
-from hsv.control.notch_filter import NotchSection, discretise, series
+from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.envelope import FOOT
@@ -23,7 +23,7 @@ TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
 EFFECTIVENESS = (1.0, 0.9)
 """Of the elevator, before and after the fault."""
 
-PITCH_RATE, ELEVATOR = 4, 1
+ELEVATOR = 1
 
 COUPLING_SCALES = tuple(0.05 * step for step in range(26))
 """kappa, times the derived coupling, between which the limit of stability is looked for."""
@@ -83,16 +83,9 @@ def sampled_loop(
     Raises:
         TrimError: No equilibrium there.
     """
-    A, B = _held(vehicle, point, period)
-    A_s, B_s, C_s, D_s = series(discretise(notch, period))
-    n, s = len(A), len(A_s)
-    whole, inputs = np.zeros((n + s, n + s)), np.zeros((n + s, B.shape[1]))
-    whole[:n, :n], whole[n:, n:], whole[n:, PITCH_RATE] = A, A_s, B_s
-    inputs[:n] = B
-    inputs[:, ELEVATOR] *= effectiveness
-    gain = np.hstack((feedback, np.outer(feedback[:, PITCH_RATE], C_s)))
-    gain[:, PITCH_RATE] *= D_s
-    return SampledLoop(whole, inputs, gain, period)
+    A, B, gain = with_notch(*_held(vehicle, point, period), feedback, discretise(notch, period))
+    B[:, ELEVATOR] *= effectiveness
+    return SampledLoop(A, B, gain, period)
 
 
 @lru_cache(maxsize=8192)

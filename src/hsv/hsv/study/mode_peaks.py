@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from hsv.control.notch_filter import NotchSection
+from hsv.control.notch_filter import NotchSection, notch_response
 from hsv.lpv.frequency import bode
-from hsv.study.figures.bode import notch_response, pitch_rate_response
+from hsv.study.figures.bode import pitch_rate_response
 from hsv.study.linear_loop import START
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import Mode, modes

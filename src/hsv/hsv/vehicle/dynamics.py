@@ -1,4 +1,4 @@
-"""Equations of motion of the vehicle (paper eq. 1-4), compiled; one function serves the coupled and decoupled model.
+"""Equations of motion of the vehicle (paper eq. 1 to eq. 4), compiled; one function for coupled and decoupled model.
 
 State x (9): altitude m, velocity m/s, angle of attack rad, pitch angle rad, pitch rate rad/s, elastic coordinate 1
 (kg^0.5 m) and its rate, elastic coordinate 2 and its rate. Input u (2): fuel equivalence ratio, elevator rad.
@@ -39,7 +39,7 @@ PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
 @njit(cache=True, error_model="numpy")
 def forces(x: Any, u: Any, p: Any) -> Any:
-    """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa (paper eq. 2-3).
+    """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa (paper eq. 2, eq. 3).
 
     The thrust term of the moment is z_T T and the density exponent -(h - h_0) / h_s; the paper prints both otherwise.
     """
@@ -115,9 +115,9 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
 
 @njit(cache=True, error_model="numpy")
 def jacobian(x: np.ndarray, u: np.ndarray, p: VehicleParameters) -> tuple[np.ndarray, np.ndarray]:
-    """Return A = df/dx (9, 9) and B = df/du (9, 2), exact to rounding, by the complex step (paper eq. 6-9).
+    """Return A = df/dx (9, 9) and B = df/du (9, 2), by the complex step (paper eq. 6, eq. 7, eq. 8, eq. 9).
 
-    The step is so small that its square vanishes; there is no subtraction and so no truncation or cancellation error.
+    Exact to rounding: the step is so small that its square vanishes; nothing is subtracted, truncated or cancelled.
     """
     step = 1e-40
     A = np.empty((N_STATES, N_STATES))

@@ -18,7 +18,7 @@ VELOCITY_RANGE = (2346.96, 2529.84)
 
 INPUT_MINIMUM = np.array([0.0, -math.radians(30.0)])
 INPUT_MAXIMUM = np.array([1.5, math.radians(30.0)])
-"""Fuel equivalence ratio and elevator deflection (rad); the paper's U."""
+"""Fuel equivalence ratio and elevator deflection (rad); the paper's U (eq. 29)."""
 
 ANGLE_LIMIT = math.radians(30.0)
 """|angle of attack| and |pitch angle| (rad) beyond which the curve fits mean nothing: the flight has diverged."""

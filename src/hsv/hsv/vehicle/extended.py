@@ -1,4 +1,4 @@
-"""Extended states coupling model (ECM, paper eq. 39-43): the vehicle with a linear filter on its pitch rate, compiled.
+"""Extended states coupling model (ECM, paper eq. 39 to eq. 43): the vehicle with a linear filter on its pitch rate.
 
 State x' (9 + k): that of the vehicle with the filtered pitch rate q' in place of q, then the k states s of the filter.
 q' = C s + D q, so that q = (q' - C s) / D; the vehicle's own equations are those of :mod:`hsv.vehicle.dynamics`.
@@ -54,7 +54,7 @@ def extended_derivative(x: Any, u: Any, p: Any, notch: Any, printed: bool, out: 
 def extended_jacobian(
     x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Any, printed: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A' (9 + k, 9 + k) and B' (9 + k, 2) (paper eq. 42-43), exact to rounding, by the complex step."""
+    """Return A' (9 + k, 9 + k) and B' (9 + k, 2) (paper eq. 42, eq. 43), by the complex step."""
     step = 1e-40
     n = len(x)
     A, B = np.empty((n, n)), np.empty((n, N_INPUTS))

@@ -126,6 +126,11 @@ def vehicle_parameters(coupling: str = "paper_like") -> VehicleParameters:
     return VehicleParameters(**{name: in_base_units(row["value"]) for name, row in _rows(coupling).items()})
 
 
+def paper_like_scale() -> float:
+    """Return kappa of the paper-like set: its inertial coupling as a share of the derived."""
+    return vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
+
+
 def uncertain_parameters() -> list[str]:
     """Return the names of the paper's ten uncertain parameters (section 5.1)."""
     return [name for name, row in _rows("derived").items() if "uncertainty" in row]

@@ -99,7 +99,7 @@ def trim(
     acceleration: float = 0.0,
     where: str = "",
 ) -> Trim:
-    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s), to machine precision.
+    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s) (paper eq. 5), to machine precision.
 
     Level and unaccelerated, or with V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2);
     angle of attack and pitch rate do not change, the vehicle does not pitch, and its elastic modes rest.

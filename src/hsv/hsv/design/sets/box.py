@@ -1,4 +1,4 @@
-"""The paper's box set (eq. 25-28): the linear programme it is, and why it has no solution here.
+"""The paper's box set (eq. 25 to eq. 28): the linear programme it is, and why it has no solution here.
 
 For Z = {|e| <= z} and a box of disturbances, condition (27) asks of every row a of every A_i + B_i F that the largest
 of a'e + d over Z and W is at most z_j. By the Farkas lemma (the paper's Lemma 2) this holds if and only if there are
@@ -70,7 +70,7 @@ class Infeasibility:
 
 
 def box(problem: TubeProblem) -> BoxSet:
-    """Return the least invariant box.
+    """Return the least invariant box (paper eq. 25, eq. 26, eq. 27, eq. 28).
 
     Raises:
         DesignError: There is none; the message gives the spectral radius.

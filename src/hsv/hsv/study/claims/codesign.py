@@ -17,8 +17,8 @@ from hsv.study.claims.claim import Claim, Finding, Reading, shown
 from hsv.study.claims.evidence import Evidence
 from hsv.study.extended_model import codesigned_model, extended_model
 from hsv.study.figures.figure_08 import FREQUENCIES, POINT
-from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.study.linear_loop import ELEVATOR
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 from hsv.vehicle.envelope import FOOT
 
 DESIGN = "adjustable"

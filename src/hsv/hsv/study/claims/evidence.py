@@ -109,9 +109,3 @@ def worst(table: Table, measure: str) -> float:
     """Return the largest magnitude over all vehicles; infinite where one diverged or does not define it."""
     values = np.abs(table[measure])
     return float(np.inf) if np.any(np.isnan(values)) else float(values.max())
-
-
-def paper_like_share() -> float:
-    """Return the paper-like coupling as a share of the derived one."""
-    one, whole = (vehicle_parameters(name).inertial_coupling_1 for name in ("paper_like", "derived"))
-    return one / whole

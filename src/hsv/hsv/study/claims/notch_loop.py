@@ -12,10 +12,10 @@ from hsv.design.region import fraction
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.claims.claim import Finding, Reading
-from hsv.study.claims.evidence import Evidence, nominal, paper_like_share, worst
+from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.disturbances import largest_disturbances
 from hsv.study.linear_loop import TARGET, Margin, critical_coupling, phase_margins, sampled_loop, worst_growth
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters, paper_like_scale, vehicle_parameters
 
 WITH, WITHOUT, UNCERTAIN = "case1", "case1_no_notch", "case1_uncertain_no_notch"
 DERIVED = "case1_derived"
@@ -34,7 +34,7 @@ def without_notch(evidence: Evidence) -> Finding:
     """Judge stability without the notch, and by how much coupling it is there."""
     growth, derived = evidence.growth("paper_like", ()), evidence.growth("derived", ())
     flown = evidence.design("baseline").flown
-    share = paper_like_share()
+    share = paper_like_scale()
     critical = critical_coupling(flown.feedback_gain, (), flown.period)
     margin = float("inf") if critical is None else critical / share
     uncertain = assemble(flight_parameters(load_scenario(UNCERTAIN))).plant.vehicle

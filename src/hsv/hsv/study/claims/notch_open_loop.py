@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchSection, discretise, flown_sections
+from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
 from hsv.lpv.frequency import bode, frequency_response
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
@@ -15,11 +15,10 @@ from hsv.study.claims.claim import Finding, Reading
 from hsv.study.claims.evidence import Evidence
 from hsv.study.claims.modelling import RAISED
 from hsv.study.claims.notch_loop import margins
-from hsv.study.figures.bode import notch_response
 from hsv.study.figures.figure_03 import POLE_DAMPINGS, POLE_FREQUENCIES
-from hsv.study.linear_loop import ELEVATOR, PITCH_RATE, START
+from hsv.study.linear_loop import ELEVATOR, START
 from hsv.study.mode_peaks import FREQUENCIES, peak_falls
-from hsv.vehicle.dynamics import N_RIGID, jacobian
+from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE, jacobian
 from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
 from hsv.vehicle.trim import trim
 

@@ -2,30 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
-from hsv.control.notch_filter import NotchSection
 from hsv.lpv.frequency import bode, frequency_response
-from hsv.study.linear_loop import ELEVATOR, PITCH_RATE, START
-from hsv.vehicle.dynamics import jacobian
+from hsv.study.linear_loop import ELEVATOR, START
+from hsv.vehicle.dynamics import PITCH_RATE, jacobian
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
-
-
-def notch_response(sections: Iterable[NotchSection], frequencies: np.ndarray) -> np.ndarray:
-    """Return H(j omega) (f) of sections in series (paper eq. 38), ``frequencies`` in rad/s."""
-    s = 1j * np.asarray(frequencies, float)
-    total = np.ones_like(s)
-    for n in sections:
-        zeros = (s / n.zero_frequency) ** 2 + 2.0 * n.zero_damping / n.zero_frequency * s + 1.0
-        poles = (s / n.pole_frequency) ** 2 + 2.0 * n.pole_damping / n.pole_frequency * s + 1.0
-        total = total * zeros / poles
-    return total
 
 
 def pitch_rate_response(vehicle: VehicleParameters, frequencies: np.ndarray) -> np.ndarray:

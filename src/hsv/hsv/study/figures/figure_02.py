@@ -10,7 +10,8 @@ from hsv.lpv.grid import linearise
 from hsv.study.figures.bode import bode_lines, label_bode
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, RED, letter, new_figure
-from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
+from hsv.study.linear_loop import ELEVATOR
+from hsv.vehicle.dynamics import PITCH_RATE
 from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.parameters import vehicle_parameters
 

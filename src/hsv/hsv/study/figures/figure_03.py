@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hsv.control.notch_filter import NotchSection
-from hsv.study.figures.bode import bode_lines, label_bode, notch_response, pitch_rate_response
+from hsv.control.notch_filter import NotchSection, notch_response
+from hsv.study.figures.bode import bode_lines, label_bode, pitch_rate_response
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import peak_in_words
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED, letter, new_figure

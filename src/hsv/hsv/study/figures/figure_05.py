@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hsv.control.notch_filter import notch_response
 from hsv.lpv.frequency import bode
-from hsv.study.figures.bode import bode_lines, label_bode, notch_response, pitch_rate_response
+from hsv.study.figures.bode import bode_lines, label_bode, pitch_rate_response
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import peak_in_words
 from hsv.study.figures.style import BLUE, GREY, RED, new_figure

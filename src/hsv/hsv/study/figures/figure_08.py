@@ -10,8 +10,9 @@ from hsv.study.extended_model import codesigned_model, extended_model
 from hsv.study.figures.bode import bode_lines, label_bode
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure
-from hsv.study.linear_loop import ELEVATOR, PITCH_RATE
+from hsv.study.linear_loop import ELEVATOR
 from hsv.study.mode_peaks import elastic_modes
+from hsv.vehicle.dynamics import PITCH_RATE
 from hsv.vehicle.envelope import FOOT
 
 POINT = (85817.0, 8037.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hsv.control.notch_filter import notch_response
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.scenario import load_scenario
-from hsv.study.figures.bode import notch_response
 from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import measured
 from hsv.study.figures.style import BLUE, GREEN

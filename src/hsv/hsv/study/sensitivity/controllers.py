@@ -16,7 +16,7 @@ from hsv.design.region import Corner
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv.study.linear_loop import COUPLING_SCALES, critical_coupling, worst_growth
-from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds
 
 PURPLE = "#7d3c98"
 
@@ -73,12 +73,6 @@ def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
 def said_corners(over: Sequence[Corner]) -> str:
     """Return how many corners ``over`` holds beside the nominal vehicle, and of how many."""
     return f"{len(over) - 1} of the {2 ** len(uncertainty_bounds())} corners"
-
-
-@cache
-def paper_like() -> float:
-    """Return kappa of the paper-like set: its coupling as a share of the derived."""
-    return vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
 
 
 @cache

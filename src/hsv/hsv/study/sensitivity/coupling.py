@@ -19,13 +19,12 @@ from hsv.study.sensitivity.controllers import (
     coupling_limits,
     feedback,
     growth,
-    paper_like,
     said_corners,
 )
 from hsv.study.sensitivity.flights_strip import draw_metric, legend, lost_where, widths
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.parameters import paper_like_scale, vehicle_parameters
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
@@ -56,9 +55,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     plain_log(axes[2])
     axes[2].set_xlabel(r"coupling $\kappa$ (0: decoupled, 1: derived from a beam model)")
     for axis in axes:
-        for kappa in (paper_like(), 1.0):
+        for kappa in (paper_like_scale(), 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[0].text(paper_like() + 0.005, 1.32, "paper-like", color=GREY, fontsize=8)
+    axes[0].text(paper_like_scale() + 0.005, 1.32, "paper-like", color=GREY, fontsize=8)
     axes[0].text(0.995, 1.32, "derived", color=GREY, fontsize=8, ha="right")
     letter(axes)
     legend(figure, shares=False)
@@ -88,11 +87,11 @@ def growth_over(controller: Controller, kappa: float, over: list[Corner]) -> lis
 
 def _margin(limits: CouplingLimits) -> str:
     """Return in words how far the paper-like coupling is from the limit of the loop without notch."""
-    unstable = np.array(growth_over(WITHOUT_NOTCH, paper_like(), list(limits.over))) >= 0.0
-    said = f"the paper-like coupling, κ = {paper_like():.2f},"
+    unstable = np.array(growth_over(WITHOUT_NOTCH, paper_like_scale(), list(limits.over))) >= 0.0
+    said = f"the paper-like coupling, κ = {paper_like_scale():.2f},"
     if limits.nominal is None:
         return f"{said} is below any limit of the {WITHOUT_NOTCH.label}"
-    share = paper_like() / limits.nominal - 1.0
+    share = paper_like_scale() / limits.nominal - 1.0
     side = "below" if share < 0.0 else "above"
     return (
         f"{said} lies {abs(100.0 * share):.1f} % {side} the limit of the {WITHOUT_NOTCH.label}, κ = "

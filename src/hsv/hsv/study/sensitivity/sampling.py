@@ -12,13 +12,13 @@ from hsv.design.inputs import find_inputs, read_inputs
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import COUPLING_SCALES, worst_growth
-from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_limits, paper_like, said_corners
+from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_limits, said_corners
 from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, package_digest
 from hsv.units import to_paper
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.parameters import paper_like_scale, vehicle_parameters
 
 PERIODS = {
     period: Controller(f"T = {period:g} s", "case1", color)
@@ -57,9 +57,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         axis.axhline(0.0, color="black", linewidth=0.6)
         axis.set_ylabel("largest real part (1/s)")
         axis.set_title(name, loc="right")
-        for kappa in (paper_like(), 1.0):
+        for kappa in (paper_like_scale(), 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[1].set_xlabel(rf"coupling $\kappa$ ({paper_like():g}: paper-like, 1: derived)")
+    axes[1].set_xlabel(rf"coupling $\kappa$ ({paper_like_scale():g}: paper-like, 1: derived)")
     axes[0].legend(loc="upper left")
     letter(axes)
     return Outcome(
