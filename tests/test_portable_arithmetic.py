@@ -26,6 +26,7 @@ PYTHON = ("NRT_", "Py", "_Py", "numba_gil_", "numba_unpickle", "numba_do_raise",
 ON_THE_PATH = (
     "elementary.py",
     "elimination.py",
+    "inheritance.py",
     "units.py",
     "vehicle/dynamics.py",
     "vehicle/envelope.py",

@@ -49,11 +49,5 @@ setup(
     maintainer_email="maintainers@hsv-bench.invalid",
     description="Model, design, control and recording of a flexible air-breathing hypersonic vehicle.",
     license="Apache-2.0",
-    entry_points={
-        "console_scripts": ["hsv = hsv.cli.main:main"],
-        "hsv.controllers": [
-            "tube_mpc = hsv.control.tube_law:TubeLaw",
-            "robust_mpc = hsv.control.robust_mpc:RobustMpc",
-        ],
-    },
+    entry_points={"console_scripts": ["hsv = hsv.cli.main:main"]},
 )

@@ -29,7 +29,7 @@ def test_a_wrong_value_names_its_file(hsv, wrong, words):
     assert ran.code == 2
     assert (
         ran.error.removeprefix("scenario 'mine': ")
-        == "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s"
+        == "wrong.yaml: parameter period = 1: expected double from 0.0001 to 1 s (write 1.0)"
     )
 
 

@@ -1,10 +1,11 @@
 """The controllers that can close the loop: registered by packages under a name, or named by their class.
 
-A package registers its controllers as entry points of the group ``hsv.controllers``, as this one does::
+A package registers its controllers as entry points of the group ``hsv.controllers``; in ``pyproject.toml``::
 
-    entry_points={"hsv.controllers": ["tube_mpc = hsv.control.tube_law:TubeLaw"]}
+    [project.entry-points."hsv.controllers"]
+    lqr = "hsv_lqr:Lqr"
 
-A scenario then says ``controller = "tube_mpc"``; where nothing is registered, ``controller = "package.module:Class"``.
+A scenario then says ``controller = "lqr"``; where nothing is registered, ``controller = "package.module:Class"``.
 What such a class must have is in :mod:`hsv.control.controller`.
 """
 
@@ -28,17 +29,19 @@ if TYPE_CHECKING:
 GROUP = "hsv.controllers"
 """The entry points of controllers."""
 
-SHIPPED_CONTROLLERS = ("tube_mpc", "robust_mpc")
-"""Those of this library; the first flies where none is named."""
+SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
+"""The classes of this library's by name, which a source tree knows as well; others are entry points."""
+
+_DEFAULT = "tube_mpc"
 
 CONTROLLER_PARAMETERS = (
-    Parameter("controller", SHIPPED_CONTROLLERS[0], "what closes the loop: a registered name, or package.module:Class"),
+    Parameter("controller", _DEFAULT, "what closes the loop: a registered name, or package.module:Class"),
 )
 
 
 def controller_names() -> list[str]:
     """Return the names of all registered controllers."""
-    return sorted({entry.name for entry in entry_points(group=GROUP)})
+    return sorted({*SHIPPED_CONTROLLERS, *(entry.name for entry in entry_points(group=GROUP))})
 
 
 def controller_class(name: str) -> ControllerClass:
@@ -47,16 +50,17 @@ def controller_class(name: str) -> ControllerClass:
     Raises:
         ParameterError: There is none of that name, or it cannot be loaded.
     """
-    module, colon, attribute = name.partition(":")
-    if not colon:
-        registered = [entry for entry in entry_points(group=GROUP) if entry.name == name]
+    place = SHIPPED_CONTROLLERS.get(name, name)
+    if ":" not in place:
+        registered = [entry.value for entry in entry_points(group=GROUP) if entry.name == name]
         if not registered:
             near = difflib.get_close_matches(name, controller_names(), 1)
             hint = f" (did you mean {near[0]!r}?)" if near else ""
             raise ParameterError(
                 f"controller = {name!r}: expected one of {', '.join(controller_names())} or package.module:Class{hint}"
             )
-        module, _, attribute = registered[0].value.partition(":")
+        place = registered[0]
+    module, _, attribute = place.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute)
     # Foreign code may fail in any way while it is imported.

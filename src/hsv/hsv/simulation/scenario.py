@@ -274,7 +274,7 @@ def _shipped() -> Any:
 
 def _own_tables(table: dict[str, Any]) -> dict[str, Any]:
     """Return the tables of a controller of one's own."""
-    if table.get("controller", SHIPPED_CONTROLLERS[0]) in SHIPPED_CONTROLLERS:
+    if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
         return {}
     return {key: value for key, value in table.items() if isinstance(value, dict) and key not in Scenario.model_fields}
 
