@@ -149,7 +149,7 @@ def with_notch(
     whole, inputs = np.zeros((*A.shape[:-2], n + s, n + s)), np.zeros((*B.shape[:-2], n + s, B.shape[-1]))
     whole[..., :n, :n], whole[..., n:, n:], whole[..., n:, PITCH_RATE] = A, A_s, B_s
     inputs[..., :n, :] = B
-    full = np.hstack((gain, np.outer(gain[:, PITCH_RATE], C_s)))
+    full = np.concatenate((gain, np.outer(gain[:, PITCH_RATE], C_s)), axis=1)
     full[:, PITCH_RATE] *= D_s
     return whole, inputs, full
 
