@@ -102,7 +102,7 @@ ELSEWHERE = {
     "hsv topic": "tests/graph/test_by_hand.py",
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
     "ros2 bag record -s mcap": "a form",
-    "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_lqr.py",
+    "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_own_controllers.py",
     "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
     "cd my_ws": "test_a_workspace_of_ones_own",
     "python3 -m colcon build --symlink-install": "test_a_workspace_of_ones_own",
