@@ -12,6 +12,7 @@ from node_processes import Processes
 from ros_domain import own_domain
 from waiting import wait_until
 
+from hsv.graph.exclusive import claim_topic
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Topic
 
@@ -74,3 +75,27 @@ def test_a_message_type_that_is_not_installed_is_named(processes: Processes, bag
     done = processes.run("hsv", "play", made)
     assert done.returncode == 2
     assert "topic /other: message type other_msgs/msg/Other is not installed" in done.stdout.splitlines()[-1]
+
+
+def test_topics_of_a_graph_that_is_there_are_not_played(processes: Processes, bag: Path) -> None:
+    domain = int(processes.environment["ROS_DOMAIN_ID"])
+    held = claim_topic(domain, "/hsv/state")
+    assert held is not None
+    with held:
+        done = processes.run("hsv", "play", bag)
+        assert done.returncode == 2
+        refused = f"player: error: another node publishes /hsv/state in ROS domain {domain}"
+        assert done.stdout.splitlines()[-1].startswith(refused)
+    assert processes.run("hsv", "play", bag, "--rate", "100").returncode == 0
+
+
+def test_a_plant_that_waits_does_not_fly_on_what_is_played(processes: Processes, bag: Path) -> None:
+    log = processes.folder / "plant.log"
+    with log.open("w") as output:
+        plant = processes.start("ros2", "run", "hsv_plant", "plant", output=output)
+        wait_until(lambda: "waiting for" in log.read_text(), [plant.pid])
+        words = ["--topic", "/hsv/actuator", "--no-clock", "--delay", "2"]
+        done = processes.run("hsv", "play", bag, *words)
+        assert done.returncode == 0, done.stdout
+        wait_until(lambda: "ignored" in log.read_text(), [plant.pid])
+    assert "starts run" not in log.read_text()

@@ -6,9 +6,11 @@ from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeSta
 
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
+from hsv.errors import ParameterError
 from hsv.graph.description import COMMAND, FILTERED_STATE, NOMINAL, TUBE_STATUS, NodeDescription
 from hsv.graph.exchange import control, fill_tube_status
 from hsv_node.lockstep import PeerNode
+from hsv_node.parameters import given
 
 
 class ControllerNode(PeerNode):
@@ -21,6 +23,10 @@ class ControllerNode(PeerNode):
 
     def __init__(self, role: NodeDescription) -> None:
         super().__init__(role, "tube")
+        if given(self, "controller") and self.controller != role.name:
+            raise ParameterError(
+                f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
+            )
         self._state: FilteredState | None = None
         self._nominal: NominalState | None = None
         self._outside = False

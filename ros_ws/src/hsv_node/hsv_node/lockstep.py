@@ -15,7 +15,7 @@ from rclpy.node import NodeNameNonExistentError
 from hsv.errors import RunError
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
-from hsv.graph.exclusive import claim_topic
+from hsv.graph.exclusive import claim_node, claim_topic
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
@@ -54,6 +54,7 @@ class LockstepNode(ProcessNode):
         super().__init__(role.name)
         self.role, self._task = role, task
         self._claims: list[socket.socket] = []
+        self._claim_name()
         for topic in role.own_topics:
             self.claim(topic)
         if role.known_by:
@@ -78,6 +79,22 @@ class LockstepNode(ProcessNode):
         super().destroy_node()
         for held in self._claims:
             held.close()
+
+    def _claim_name(self) -> None:
+        """Keep the node's full name to it: peers could not tell two of one name apart.
+
+        Raises:
+            RunError: Another node of this machine has it.
+        """
+        name, domain = self.get_fully_qualified_name(), self.context.get_domain_id()
+        held = claim_node(domain, name)
+        if held is None:
+            self.destroy_node()
+            raise RunError(
+                f"another node is called {name} in ROS domain {domain}: expected one {self.role.name} a domain and "
+                "namespace (ROS_DOMAIN_ID, -r __ns:=), and another name for every other node (-r __node:=)"
+            )
+        self._claims.append(held)
 
     def claim(self, topic: str) -> None:
         """Keep a topic to this node.

@@ -88,7 +88,7 @@ class PlantNode(LockstepNode):
         self._continue()
 
     def _on_actuator(self, message: ControlInput) -> None:
-        if message.step != self._result.step:
+        if not self._started or message.step != self._result.step:
             self.say_foreign(ACTUATOR, message.step, self._result.step)
             return
         self._messages += 1

@@ -54,6 +54,10 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     from hsv.simulation.scenario import parse_scenario
 
     recorded = Bag(bag)
+    if "scenario.toml" not in recorded.attachments:
+        raise RecordingError(
+            f"{bag}: holds no scenario, as of a graph flown by hand: hsv info and hsv report tell of it"
+        )
     data = flight_data(recorded)
     extra = {"bag": str(bag)}
     unwritten = None

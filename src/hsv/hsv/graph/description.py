@@ -83,14 +83,27 @@ class NodeDescription:
     Empty for what is not a node of the graph.
     """
 
+    announces: tuple[str, ...] = ()
+    """Further topics that only this role publishes, not in every step."""
+
     @property
     def own_topics(self) -> tuple[str, ...]:
         """Topics that no other node of the same graph may publish."""
-        return self.publishes or ((RECORDER_PROGRESS,) if self.known_by else ())
+        return self.publishes + self.announces
 
 
-RECORDER = NodeDescription("recorder", "hsv_bringup", "recorder", (), tuple(TOPICS), "hsv_msgs/msg/RecorderProgress")
-PLANT = NodeDescription("plant", "hsv_plant", "plant", (CLOCK, STATE, FORCES), (ACTUATOR,), TOPICS[STATE])
+RECORDER = NodeDescription(
+    "recorder",
+    "hsv_bringup",
+    "recorder",
+    (),
+    tuple(TOPICS),
+    "hsv_msgs/msg/RecorderProgress",
+    (RECORDER_PROGRESS,),
+)
+PLANT = NodeDescription(
+    "plant", "hsv_plant", "plant", (CLOCK, STATE, FORCES), (ACTUATOR,), TOPICS[STATE], (RUN, LAST_STATE)
+)
 NOTCH_FILTER = NodeDescription(
     "notch_filter", "hsv_ctrl", "notch_filter", (FILTERED_STATE,), (STATE,), TOPICS[FILTERED_STATE]
 )

@@ -33,30 +33,41 @@ def ros_domain() -> int:
 def claim_namespace(domain: int, namespace: str) -> socket.socket | None:
     """Return what keeps a namespace of ``domain`` to one run while it is open; None if another run has it."""
     # The root namespace is the domain itself.
-    return _bound(f"hsv_domain_{domain}", namespace.rstrip("/"))
+    return _bound("hsv_domain", domain, namespace.rstrip("/"))
 
 
 def claim_topic(domain: int, topic: str) -> socket.socket | None:
     """Return what keeps ``topic`` (its full name) to one publisher while it is open; None if another node has it."""
-    return _bound(f"hsv_topic_{domain}", topic)
+    return _bound("hsv_topic", domain, topic)
+
+
+def claim_node(domain: int, name: str) -> socket.socket | None:
+    """Return what keeps the full ``name`` of a node to one process while it is open; None if another node has it."""
+    return _bound("hsv_node", domain, name)
 
 
 def is_published(domain: int, topic: str) -> bool:
     """Tell whether a node of this machine has claimed ``topic``."""
-    held = claim_topic(domain, topic)
-    if held is None:
-        return True
-    held.close()
-    return False
+    # To bind it would refuse a node that claims it in the same instant.
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
+        try:
+            asking.connect(_address("hsv_topic", domain, topic))
+        except ConnectionRefusedError:
+            return False
+    return True
 
 
-def _bound(kind: str, name: str) -> socket.socket | None:
-    text = kind + name
+def _address(kind: str, domain: int, name: str) -> str:
+    text = f"{kind}_{domain}{name}"
     if len(text) > _LONGEST_NAME:
-        text = f"{kind}_{hashlib.sha256(name.encode()).hexdigest()}"
+        text = f"{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
+    return f"\0{text}"
+
+
+def _bound(kind: str, domain: int, name: str) -> socket.socket | None:
     held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        held.bind(f"\0{text}")
+        held.bind(_address(kind, domain, name))
     except OSError:
         held.close()
         return None

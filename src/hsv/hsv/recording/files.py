@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import fcntl
 import re
 from pathlib import Path
+from typing import IO
 
 import lz4.frame
 import zstandard
@@ -20,6 +22,26 @@ _MOST_FILES = 100_000
 """Number from which on that of a file is none of a sequence."""
 _PART = 4096
 """Bytes that are decompressed at a time: what lies before a damage is not lost with it."""
+
+
+def locked(stream: IO[bytes], *, shared: bool = False) -> bool:
+    """Lock an open file until it is closed; tell whether that was possible, which it is not while it is recorded.
+
+    A file system without locks gives one to everybody. ``shared``: others may have such a lock at the same time.
+    """
+    try:
+        fcntl.flock(stream, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        pass
+    return True
+
+
+def being_recorded(path: Path) -> bool:
+    """Tell whether a recorder is writing the file."""
+    with path.open("rb") as stream:
+        return not locked(stream, shared=True)
 
 
 def find_files(path: Path) -> tuple[list[Path], list[str]]:

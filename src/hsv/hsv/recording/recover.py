@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -15,7 +14,7 @@ from mcap.records import Attachment, Channel, Metadata, Schema
 from mcap.writer import Writer
 
 from hsv.errors import RecordingError
-from hsv.recording.files import find_files, read_file, read_message
+from hsv.recording.files import find_files, locked, read_file, read_message
 from hsv.recording.metadata import (
     CUSTOM_DATA,
     FILE_NAME,
@@ -144,12 +143,8 @@ def _nobody_writing(files: list[Path]) -> Iterator[None]:
                 stream = stack.enter_context(file.open("rb"))
             except OSError as error:
                 raise RecordingError(f"{file}: cannot be read: {error.strerror}") from None
-            try:
-                fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise RecordingError(f"{file}: is being recorded, expected a bag whose recorder has ended") from None
-            except OSError:
-                pass  # a file system without locks
+            if not locked(stream):
+                raise RecordingError(f"{file}: is being recorded, expected a bag whose recorder has ended")
         yield
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hsv.errors import RecordingError
 from hsv.graph.description import TOPICS
+from hsv.recording.files import being_recorded
 from hsv.recording.reader import Bag, Loss
 from hsv.recording.steps import complete_stamps, expected_stamps, irregularities
 
@@ -14,7 +15,9 @@ _NAMED = 3
 def shortcomings(bag: Bag) -> list[str]:
     """Say that a bag is damaged or cut off, which topics of the steps it lacks, and which steps of a topic."""
     words = loss_in_words(bag.loss)
-    if not bag.complete and not bag.loss.files:
+    if any(map(being_recorded, bag.files)):
+        words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
+    elif not bag.complete and not bag.loss.files:
         words.append(f"cut off after {bag.span[1] * 1e-9:.2f} s, hsv recover mends it")
     elif bag.loss:
         words.append("hsv recover makes a whole bag of the rest")

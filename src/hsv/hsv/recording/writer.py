@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
 from hsv.errors import RecordingError
+from hsv.recording.files import locked
 from hsv.recording.metadata import (
     CUSTOM_DATA,
     ROSBAG2,
@@ -68,8 +68,7 @@ class BagWriter:
             raise RecordingError(f"bag directory {directory}: exists already, expected a new one") from None
         except OSError as error:
             raise RecordingError(f"bag directory {directory}: cannot be made: {error.strerror}") from None
-        with suppress(OSError):  # a file system without locks
-            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        locked(self._stream)
         # Chunks are ended by flush() here, because the writer's own limit leaves them in the buffer of the stream.
         self._writer = Writer(self._stream, chunk_size=2**31, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2")

@@ -101,12 +101,16 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
     values = designed.overlaid(scenario)
     with expecting_fields(bag.path):
         try:
-            changed = _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)) | _tau_as_flown(bag, values)
+            # Of these nodes alone: others may have another design, which is not certified for the same factors.
+            changed = {
+                FAULT_INJECTOR.name: _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)),
+                TUBE_MPC.name: _tau_as_flown(bag, values),
+            }
         except (DesignError, ParameterError) as error:
             raise RecordingError(f"{bag.path}: attached {error}") from error
     if design is not None:
         values = ParameterSections(read_design_parameters(design)).overlaid(scenario)
-    return values.updated(changed)
+    return values.overlaid(ParameterSections({}, changed))
 
 
 def controller_of(values: ParameterSections) -> str:

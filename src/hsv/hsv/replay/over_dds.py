@@ -52,11 +52,11 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     """
     require(bag, TOPICS)
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
-        again = Path(folder, "again")
+        repeated = Path(folder, "rerun")
         steps = len(bag.messages(STATE))
-        run = {"recorder": True, "bag.directory": str(again)}
+        run = {"recorder": True, "bag.directory": str(repeated)}
         _run(graph(controller), values.updated(run), Path(folder), PLANT.name, steps, progress)
-        made = Bag(again)
+        made = Bag(repeated)
         for process in chosen(controller).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
