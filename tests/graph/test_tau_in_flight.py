@@ -66,6 +66,9 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     assert changed == [[0.8, 0.8, 0.9, 0.9, 1.0]]
 
     values = flown_parameters(bag)
+    # Other nodes keep what they had: their design need not be certified for what the controller flew with.
+    assert values.of("nominal_trajectory")["tau_change.starts"] == [2.0]
+    assert values.of("tube_mpc")["tau_change.starts"] == pytest.approx([2.0, step * 0.02])
     results = [replay(bag, chosen("tube_mpc")["tube_mpc"], values, lambda *_: None)]
     # The graph repeats scheduled changes as the loop in process does: tests/graph/test_lockstep.py.
     values.shared["duration"] = complete_steps(bag) * values.shared["period"]

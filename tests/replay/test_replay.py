@@ -91,7 +91,7 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
     }
     bag = Bag(flown_bag(tmp_path / "flown", in_flight=in_flight))
     values = flown_parameters(bag)
-    assert sorted(values.shared["fault.stops"]) != []
+    assert sorted(values.of("fault_injector")["fault.stops"]) != []
     assert all(result.identical for result in replay_all(bag).values())
     assert all(result.identical for result in rerun(bag, CONTROLLER, values, quiet))
 
@@ -154,10 +154,10 @@ def test_tau_changed_in_flight_is_repeated_from_what_was_recorded(tmp_path: Path
     tracks = fly(types(), CONTROLLER, ParameterSections(design | scenario | {"feedback.tau": [0.9]} | changes), quiet)
     bag = Bag(write_bag(tmp_path / "changed", tracks, design, scenario))
     values = flown_parameters(bag)
-    assert values.shared["feedback.tau"] == [0.9] * 5
-    assert values.shared["tau_change.starts"] == pytest.approx([3.0, 7.02])
+    assert values.of("tube_mpc")["feedback.tau"] == [0.9] * 5
+    assert values.of("tube_mpc")["tau_change.starts"] == pytest.approx([3.0, 7.02])
     results = [replay(bag, process, values, quiet) for process in chosen(CONTROLLER).values()]
     assert all(result.identical for result in [*results, *rerun(bag, CONTROLLER, values, quiet)])
     # What was scheduled is no change in flight.
     again = Bag(write_bag(tmp_path / "scheduled", tracks, design, scenario | {"feedback.tau": [0.9]} | changes))
-    assert flown_parameters(again).shared["feedback.tau"] == [0.9]
+    assert flown_parameters(again).of("tube_mpc")["feedback.tau"] == [0.9]
