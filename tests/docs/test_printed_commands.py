@@ -59,6 +59,15 @@ TOGETHER = {
 }
 """Run by this file at the same time."""
 
+IN_FLIGHT = {
+    "hsv fault inject elevator_deflection loss_of_effectiveness 0.8",
+    "hsv fault list",
+    "hsv fault clear elevator_deflection",
+    "hsv set tau 0.9",
+    "hsv topic",
+}
+"""Run by this file on the flight that is printed before them."""
+
 FULL = {
     "ros2 launch hsv_bringup sil.launch.py scenario:=case1",
     "ros2 launch hsv_bringup sil.launch.py -s",
@@ -95,11 +104,7 @@ ELSEWHERE = {
     "fastdds shm clean": "of ROS 2",
     "ros2 run hsv_ctrl notch_filter --ros-args -r __ns:=/veh1 -r __node:=nf2": "tests/graph/test_names.py",
     "ros2 run hsv_ctrl tube_mpc --ros-args -r hsv/command:=wish": "tests/graph/test_names.py",
-    "hsv fault inject elevator_deflection loss_of_effectiveness 0.8": "tests/graph/test_by_hand.py",
-    "hsv fault list": "tests/graph/test_by_hand.py",
-    "hsv fault clear elevator_deflection": "tests/graph/test_by_hand.py",
-    "hsv set tau 0.9": "tests/graph/test_tau_in_flight.py",
-    "hsv topic": "tests/graph/test_by_hand.py",
+    "hsv run case2 --real-time-factor 1": "the flight of IN_FLIGHT",
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
     "ros2 bag record -s mcap": "a form",
     "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_own_controllers.py",
@@ -116,7 +121,7 @@ DIFFERENT = {"hsv diff bags/first bags/second": 1}
 
 
 def test_every_printed_command_is_run_and_every_command_that_is_run_is_printed() -> None:
-    tables = (HERE, TOGETHER, FULL, {*ELSEWHERE})
+    tables = (HERE, TOGETHER, IN_FLIGHT, FULL, {*ELSEWHERE})
     assert {command for page in PAGES for command in printed(page)} == set().union(*tables)
     assert sum(map(len, tables)) == len(set().union(*tables))
 
@@ -158,6 +163,20 @@ def test_the_nodes_fly_in_terminals_of_their_own(checkout: Path) -> None:
                 popen.send_signal(signal.SIGINT)
                 assert exit_code_of(popen) == 0
         assert (bag / "metadata.yaml").is_file()
+
+
+@pytest.mark.long
+def test_a_flight_answers_as_it_is_printed(checkout: Path) -> None:
+    [flight] = [command for command, where in ELSEWHERE.items() if "IN_FLIGHT" in where]
+    with own_environment() as environment:
+        processes = Processes(environment, checkout)
+        popen = processes.start("bash", "-c", f"exec {flight} --bag bags/answering --no-report")
+        wait_until(lambda: recorded_steps(checkout / "bags" / "answering") > 50, [popen.pid])
+        for command in [command for command in printed("README.md") if command in IN_FLIGHT]:
+            done = processes.run("bash", "-c", command)
+            assert done.returncode == 0, f"{command}: {done.stdout}"
+        assert popen.poll() is None
+        processes.stop()
 
 
 @pytest.mark.long
