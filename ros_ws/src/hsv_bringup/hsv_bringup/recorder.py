@@ -14,7 +14,7 @@ from hsv_msgs.msg import RecorderProgress, Run, VehicleState
 from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
-from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS, peers
+from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS
 from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
@@ -86,6 +86,7 @@ class RecorderNode(PeerNode):
                 "and a ROS_DOMAIN_ID or a namespace of its own for each that flies at the same time"
             )
             self.finish(1)
+            return
         if self._peers:
             self._peers.close()
         self._peers = None
@@ -102,11 +103,8 @@ class RecorderNode(PeerNode):
         if missing or self._run is None or not self._asks:
             return missing
         if self._peers is None:
-            roles = peers(RECORDER, self.controller, recorded=True)
-            names = {role.name: name for role in roles if (name := self.node_in_role(role))}
-            if unknown := [role.name for role in roles if role.name not in names]:
-                return unknown
-            self._peers = PeerParameters(self, names)
+            # The recorder takes something of every node: all of them are linked to it.
+            self._peers = PeerParameters(self, self.linked)
         silent = self._peers.silent()
         if silent and not self._peers.gave_up:
             return [f"{role} ({service})" for role, service in silent.items()]

@@ -10,7 +10,6 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run, VehicleState
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
-from rclpy.node import NodeNameNonExistentError
 
 from hsv.errors import RunError
 from hsv.graph import description
@@ -21,6 +20,7 @@ from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
 from hsv_node.qos import LATCHED, STEP
+from hsv_node.roles import full_name, node_in_role, published_types
 
 FIRST_SAID_AFTER = 2.0
 """Seconds of waiting for peers before this is said."""
@@ -70,6 +70,8 @@ class LockstepNode(ProcessNode):
         self._foreign = 0
         self._foreign_said = -SAID_EVERY
         self._links: dict[str, list[NodeDescription]] = {}
+        self.linked: dict[str, str] = {}
+        """Full names of the nodes at the other ends of the links, by role, as :meth:`missing_links` last saw them."""
         if role.known_by:
             for topic, peer in description.links(role, self.controller, self.recorded):
                 self._links.setdefault(topic, []).append(peer)
@@ -129,29 +131,31 @@ class LockstepNode(ProcessNode):
     def missing_links(self) -> list[str]:
         """Return what this node still waits for, e.g. ``"tube_mpc (/hsv/nominal)"``; empty when all is matched."""
         missing = []
-        roles_of: dict[tuple[str, str], set[str]] = {}
+        types_of: dict[tuple[str, str], set[str]] = {}
+        self.linked = {}
         for topic, roles in self._links.items():
             if topic in self._outputs:
                 seen, name = self.get_subscriptions_info_by_topic(topic), self._outputs[topic].topic_name
             else:
                 seen, name = self.get_publishers_info_by_topic(topic), self._inputs[topic].topic_name
-            there: set[str] = set()
+            there: dict[str, str] = {}
             for node in {(endpoint.node_name, endpoint.node_namespace) for endpoint in seen}:
-                if node not in roles_of:
-                    roles_of[node] = self._published_types(*node)
-                there |= roles_of[node]
-            absent = [role for role in roles if role.known_by not in there]
+                if node not in types_of:
+                    types_of[node] = published_types(self, *node)
+                there |= {role.name: full_name(*node) for role in roles if role.known_by in types_of[node]}
+            self.linked |= there
+            absent = [role for role in roles if role.name not in there]
             # Types say who is there, counts that the link itself stands: both are needed before the first message.
             absent = absent or roles[self._matched(topic) :]
             missing += [f"{role.name} ({name})" for role in absent]
         return missing
 
     def node_in_role(self, role: NodeDescription) -> str | None:
-        """Return the full name of the node of this namespace that plays ``role``, None if there is none."""
-        for name, namespace in self.get_node_names_and_namespaces():
-            if namespace == self.get_namespace() and role.known_by in self._published_types(name, namespace):
-                return f"{namespace.rstrip('/')}/{name}"
-        return None
+        """Return the full name of the node that plays ``role`` in this graph, None if there is none."""
+        if role.name in self.linked:
+            return self.linked[role.name]
+        found = node_in_role(self, role)
+        return full_name(*found) if found else None
 
     def say_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
         """Log now and then for whom this node waits; in the end as a warning if its waiting ``decides`` the start."""
@@ -173,7 +177,7 @@ class LockstepNode(ProcessNode):
             return
         self._foreign_said = now
         publishers = sorted(
-            f"{endpoint.node_namespace.rstrip('/')}/{endpoint.node_name}"
+            full_name(endpoint.node_name, endpoint.node_namespace)
             for endpoint in self.get_publishers_info_by_topic(topic)
         )
         self.get_logger().error(
@@ -201,15 +205,6 @@ class LockstepNode(ProcessNode):
         if topic in self._outputs:
             return int(self._outputs[topic].get_subscription_count())
         return int(self._inputs[topic].get_publisher_count())
-
-    def _published_types(self, name: str, namespace: str) -> set[str]:
-        if not namespace.startswith("/"):
-            return set()  # an endpoint whose node is not known yet
-        try:
-            published = self.get_publisher_names_and_types_by_node(name, namespace)
-        except NodeNameNonExistentError:
-            return set()  # it is just leaving
-        return {kind for _, kinds in published for kind in kinds}
 
 
 class PeerNode(LockstepNode):

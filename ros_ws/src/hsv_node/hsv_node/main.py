@@ -69,7 +69,8 @@ def run_nodes(
         gc.freeze()
         while not stop:
             for node in nodes:
-                node.poll()
+                if node.exit_code is None:
+                    node.poll()
             codes = [node.exit_code for node in nodes if node.exit_code is not None]
             if codes:
                 code = max(codes)

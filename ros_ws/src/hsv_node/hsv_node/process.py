@@ -23,7 +23,7 @@ class ProcessNode(Node):
         self.exit_code = code
 
     def poll(self) -> None:
-        """Called between messages, at least four times a second; overridden where something must be watched."""
+        """Called between messages, at least four times a second until it ends; overridden to watch something."""
 
     def stopped(self, signal_number: int) -> int:
         """Return the exit code after a signal; overridden by nodes whose end is that of the run, which it cut short."""

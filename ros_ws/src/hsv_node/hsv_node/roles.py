@@ -1,0 +1,53 @@
+"""Who plays which role of the graph: a node is known by what it publishes, whatever it and its topics are called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+
+from rclpy.node import Node, NodeNameNonExistentError
+
+from hsv.graph.description import NodeDescription
+
+
+def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
+    """Return name and namespace of the node that plays ``role`` in the graph of ``asking``, None if there is none.
+
+    It is in the same namespace, or else it publishes under the names that the topics of the role have there.
+    """
+    here = (node for node in asking.get_node_names_and_namespaces() if node[1] == asking.get_namespace())
+    publishers = (
+        (endpoint.node_name, endpoint.node_namespace)
+        for topic in role.own_topics
+        for endpoint in asking.get_publishers_info_by_topic(topic)
+    )
+    return next((node for node in chain(here, publishers) if role.known_by in published_types(asking, *node)), None)
+
+
+def full_name(name: str, namespace: str) -> str:
+    """Return name and namespace of a node in one."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
+def published_types(asking: Node, name: str, namespace: str) -> set[str]:
+    """Return the types of all that a node publishes."""
+    return {kind for kinds in published(asking, name, namespace).values() for kind in kinds}
+
+
+def published(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
+    """Return the types of the topics that a node publishes, by full name; none of a node that is not known."""
+    return _known(asking.get_publisher_names_and_types_by_node, name, namespace)
+
+
+def services(asking: Node, name: str, namespace: str) -> dict[str, list[str]]:
+    """Return the types of the services that a node offers, by full name; none of a node that is not known."""
+    return _known(asking.get_service_names_and_types_by_node, name, namespace)
+
+
+def _known(look: Callable[[str, str], list[tuple[str, list[str]]]], name: str, namespace: str) -> dict[str, list[str]]:
+    if not namespace.startswith("/"):
+        return {}  # an endpoint whose node is not known yet
+    try:
+        return dict(look(name, namespace))
+    except NodeNameNonExistentError:
+        return {}  # it is just leaving
