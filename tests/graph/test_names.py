@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 import parameter_dump
 import pytest
+from injected_fault import FUEL, last_line
 from node_processes import Processes, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
@@ -30,8 +31,19 @@ pytestmark = pytest.mark.graph
 DURATION = 11.0
 """Seconds; a replay wants ten in which the controller does something."""
 
-REMAPPED = ["-r", "hsv/state:=truth", "-r", "hsv/command:=/wish/command", "-r", "clock:=tick"]
-"""Of all topics some: given to every node, as they are only remapped where they are used."""
+REMAPPED = [
+    word
+    for rule in (
+        "hsv/state:=truth",
+        "hsv/command:=/wish/command",
+        "clock:=tick",
+        "hsv/run:=announced",
+        "hsv/fault_status:=/faults/now",
+        "hsv/inject_fault:=/faults/inject",
+    )
+    for word in ("-r", rule)
+]
+"""Of all topics and services some: given to every node, as they are only remapped where they are used."""
 
 
 def by_hand(
@@ -86,6 +98,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes
     pids = [popen.pid for popen in nodes.values()]
     wait_until(lambda: recorded_steps(prepared.bag) > 10, pids)
     _refuse_duplicates(processes, files)
+    _ask(processes)
     names = ["/nf2" if node is NOTCH_FILTER else f"/{node.name}" for node in graph()]
     (folder / "dumps").mkdir()
     dumped = processes.run(sys.executable, parameter_dump.__file__, folder / "dumps", *names)
@@ -96,6 +109,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes
     processes.stop()
     bag = Bag(prepared.bag)
     roles = {"hsv/state": "/truth", "hsv/command": "/wish/command", "clock": "/tick", "hsv/nominal": "/hsv/nominal"}
+    roles |= {"hsv/run": "/announced", "hsv/fault_status": "/faults/now"}
     assert {role: bag.name_of(role) for role in roles} == roles
     scenario = load_scenario(str(short_scenario(folder, 0.02 * (complete_steps(bag) + 1), 3)))
     flown = fly(assemble(flight_parameters(scenario))).history.state
@@ -104,6 +118,17 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes
     # Quiet: said once, then every ten seconds.
     stamps = [float(found[1]) for found in re.finditer(r"\[(\d+\.\d+)\].*waiting for", output_of(alone))]
     assert stamps and all(later - earlier > 9.0 for earlier, later in pairwise(stamps))
+
+
+def _ask(processes: Processes) -> None:
+    """Find the nodes by their roles; what is changed is as it was before."""
+    injected = processes.run("hsv", "fault", "inject", FUEL, "loss_of_effectiveness", "1")
+    assert injected.returncode == 0 and f"1 of {FUEL} from step " in last_line(injected), injected.stdout
+    changed = processes.run("hsv", "set", "tau", "1")
+    assert changed.returncode == 0 and "feedback.tau = [1.0] from step " in last_line(changed), changed.stdout
+    listed = processes.run("hsv", "fault", "list", "--json")
+    assert listed.returncode == 0, listed.stdout
+    assert FUEL in [fault["channel"] for fault in json.loads(last_line(listed))["active"]]
 
 
 def _refuse_duplicates(processes: Processes, files: Sequence[str]) -> None:

@@ -18,10 +18,12 @@ from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
 from hsv.errors import HsvError, RunError
-from hsv.graph.description import RUN, STATE
+from hsv.graph.description import PLANT, NodeDescription
 from hsv.graph.exclusive import is_published
 from hsv.graph.progress import Standstill
+from hsv_node import roles
 from hsv_node.main import take_signals
+from hsv_node.messages import type_name
 from hsv_node.qos import LATCHED
 
 ABSENT_AFTER = 3.0
@@ -49,8 +51,6 @@ class GraphClient(Node):
 
     def __init__(self, name: str) -> None:
         super().__init__(f"hsv_{name}", enable_rosout=False, start_parameter_services=False)
-        self._runs: list[Run] = []
-        self._announcement = self.create_subscription(Run, RUN, self._runs.append, LATCHED)
 
     def find_run(self) -> Run:
         """Return the run of the plant that is there.
@@ -58,9 +58,21 @@ class GraphClient(Node):
         Raises:
             RunError: There is none.
         """
-        if not self.wait_for(lambda: self._runs, f"the plant ({self._announcement.topic_name})", (STATE,)):
+        runs: list[Run] = []
+        name = self._name_of(PLANT, roles.published, Run)
+        if name:
+            self.create_subscription(Run, name, runs.append, LATCHED)
+        if not name or not self.wait_for(lambda: runs, f"a run ({name})"):
             raise RunError(f"no run in {self.where}: expected hsv run, or the nodes by hand, in this place")
-        return self._runs[-1]
+        return runs[-1]
+
+    def topic_of(self, role: NodeDescription, kind: type) -> str:
+        """Return the full name of the topic of a type that the node of the graph in ``role`` publishes.
+
+        Raises:
+            RunError: There is no such node.
+        """
+        return self._name_of(role, roles.published, kind) or self._refuse_absent(role)
 
     @property
     def where(self) -> str:
@@ -68,12 +80,13 @@ class GraphClient(Node):
         namespace = self.get_namespace()
         return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
-    def call(self, kind: Any, service: str, request: Any) -> Any:
-        """Return what a service of the graph answers.
+    def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
+        """Return what the service of a type answers that the node of the graph in ``role`` offers.
 
         Raises:
-            RunError: It does not.
+            RunError: There is no such node, or it does not answer.
         """
+        service = self._name_of(role, roles.services, kind) or self._refuse_absent(role)
         client = self.create_client(kind, service)
         if self.wait_for(client.service_is_ready, service):
             future = client.call_async(request)
@@ -123,10 +136,27 @@ class GraphClient(Node):
                 print(f"waiting for {what}", file=sys.stderr, flush=True)
         return True
 
+    def _name_of(
+        self, role: NodeDescription, offers: Callable[[Node, str, str], Mapping[str, Sequence[str]]], kind: type
+    ) -> str | None:
+        """Return what the node in ``role`` calls that of its ``offers`` which is of a type, None without a node."""
+        names: list[str] = []
+
+        def found() -> bool:
+            node = roles.node_in_role(self, role)
+            offered = offers(self, *node) if node else {}
+            names[:] = [name for name, kinds in offered.items() if type_name(kind) in kinds]
+            return bool(names)
+
+        return names[0] if self.wait_for(found, f"{role.name} in {self.where}", role.own_topics) else None
+
+    def _refuse_absent(self, role: NodeDescription) -> NoReturn:
+        raise RunError(f"no {role.name} in {self.where}: expected a node that publishes {role.known_by}")
+
     def _others(self, endpoints: Sequence[Any]) -> list[str]:
         # An endpoint is known sooner than its node.
         known = [e for e in endpoints if e.node_name not in (_UNKNOWN_NODE, self.get_name())]
-        return sorted({f"{e.node_namespace.rstrip('/')}/{e.node_name}" for e in known})
+        return sorted({roles.full_name(e.node_name, e.node_namespace) for e in known})
 
 
 class OneLineParser(argparse.ArgumentParser):

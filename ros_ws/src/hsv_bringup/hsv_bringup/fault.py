@@ -9,23 +9,23 @@ from hsv_msgs.msg import Fault, FaultStatus
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError, RunError
-from hsv.graph.description import CLEAR_FAULT, FAULT_STATUS, INJECT_FAULT
+from hsv.graph.description import FAULT_INJECTOR
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 from hsv_node.qos import STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
     fault = Fault(channel=options.channel, type=options.type, value=options.value)
-    _change(client, options, InjectFault, INJECT_FAULT, InjectFault.Request(fault=fault))
+    _change(client, options, InjectFault, InjectFault.Request(fault=fault))
 
 
 def _clear(client: GraphClient, options: argparse.Namespace) -> None:
-    _change(client, options, ClearFault, CLEAR_FAULT, ClearFault.Request(channel=options.channel))
+    _change(client, options, ClearFault, ClearFault.Request(channel=options.channel))
 
 
-def _change(client: GraphClient, options: argparse.Namespace, kind: type, service: str, request: object) -> None:
+def _change(client: GraphClient, options: argparse.Namespace, kind: type, request: object) -> None:
     run = client.find_run()
-    response = client.call(kind, service, request)
+    response = client.call(FAULT_INJECTOR, kind, request)
     if not response.accepted:
         raise ParameterError(response.message)
     time, values = acting_from(run, response.step)
@@ -35,7 +35,8 @@ def _change(client: GraphClient, options: argparse.Namespace, kind: type, servic
 def _list(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     statuses: list[FaultStatus] = []
-    name = client.create_subscription(FaultStatus, FAULT_STATUS, statuses.append, STEP).topic_name
+    name = client.topic_of(FAULT_INJECTOR, FaultStatus)
+    client.create_subscription(FaultStatus, name, statuses.append, STEP)
     if not client.wait_for(lambda: statuses, f"a step ({name})"):
         raise RunError(f"no step is flown: no message on {name}")
     status = statuses[-1]

@@ -10,7 +10,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter as RosParameter
 
-from hsv.errors import ParameterError, RunError
+from hsv.errors import ParameterError
 from hsv.graph.description import NodeDescription, graph
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.parameters import Parameter
@@ -56,7 +56,7 @@ def _set(client: GraphClient, options: argparse.Namespace) -> None:
     value = parse(options.value, parameter)
     run = client.find_run()
     request = SetParameters.Request(parameters=[RosParameter(parameter.name, value=value).to_parameter_msg()])
-    response = client.call(SetParameters, f"{_full_name(client, node)}/set_parameters", request)
+    response = client.call(node, SetParameters, request)
     result: SetParametersResult = response.results[0]
     if not result.successful:
         raise ParameterError(result.reason)
@@ -65,20 +65,6 @@ def _set(client: GraphClient, options: argparse.Namespace) -> None:
     time, values = acting_from(run, int(step[1]))
     named = {"node": node.name, "parameter": parameter.name, "value": value}
     answer(f"{result.reason}, {time}", named | values, options.json)
-
-
-def _full_name(client: GraphClient, node: NodeDescription) -> str:
-    """Return the name of the node that plays the part of ``node``, which is whoever publishes its topics."""
-    topic = node.publishes[0]
-    names: list[str] = []
-
-    def found() -> bool:
-        names[:] = client.publishers_of(topic)
-        return bool(names)
-
-    if not client.wait_for(found, f"{node.name} ({topic})"):
-        raise RunError(f"no node publishes {topic}: expected {node.name}")
-    return names[0]
 
 
 def main(args: Sequence[str] | None = None) -> int:
