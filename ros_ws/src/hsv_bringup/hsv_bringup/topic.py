@@ -7,6 +7,7 @@ import difflib
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 
 from hsv.errors import ParameterError, RecordingError, RunError
@@ -18,6 +19,7 @@ from hsv.recording.typestore import message_types
 from hsv.recording.units import units_of
 from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
 from hsv_node.messages import message_class
+from hsv_node.roles import node_in_role
 
 DEPTH = 1000
 """Messages that wait while this process prints."""
@@ -79,7 +81,11 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
     """
 
     def found() -> bool:
-        return bool(wanted and client.count_publishers(wanted)) or any(map(client.publishers_of, TOPICS))
+        return (
+            bool(wanted and client.count_publishers(wanted))
+            or any(map(client.publishers_of, TOPICS))
+            or any(node_in_role(client, role) for role in graph())
+        )
 
     def whole() -> bool:
         return bool(wanted and client.count_publishers(wanted)) or all(
@@ -93,11 +99,14 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
 
 
 def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
-    name = client.resolve_topic_name(options.name)
+    name = _resolved(client, options.name)
     topics = _topics(client, name)
     if not client.count_publishers(name):
-        close = difflib.get_close_matches(name, topics, n=1)
-        meant = f"{close[0]}?" if close else f"one of {', '.join(topics)}"
+        if name in topics:
+            raise RunError(f"topic {name}: nobody publishes it, or nobody any more")
+        published = [topic for topic in topics if client.publishers_of(topic)]
+        close = difflib.get_close_matches(name, published, n=1)
+        meant = f"{close[0]}?" if close else f"one of {', '.join(published)}"
         raise ParameterError(f"topic {name}: no node publishes it, expected {meant}")
     offered = client.get_publishers_info_by_topic(name)[0]
     try:
@@ -116,6 +125,20 @@ def _print_messages(client: GraphClient, options: argparse.Namespace) -> None:
             answer("\n".join(_lines(name, fields)), fields, options.json)
             if options.once:
                 return
+
+
+def _resolved(client: GraphClient, name: str) -> str:
+    """Return the full name that a topic has for this node.
+
+    Raises:
+        ParameterError: It is none by the rules of ROS 2.
+    """
+    try:
+        return str(client.resolve_topic_name(name))
+    except rclpy_implementation.RCLError as error:
+        # Between what failed and where in its sources rcl says why.
+        why = str(error).partition(": ")[2].partition(", at /")[0]
+        raise ParameterError(f"name = {name!r}: expected the name of a topic, such as /hsv/state ({why})") from None
 
 
 def _messages(client: GraphClient, name: str, received: list[bytes]) -> Iterator[bytes]:
