@@ -167,6 +167,13 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
+class _Prog(argparse.Action):
+    """What the command is called by who has started it, ``hsv set``: it stands before what is refused."""
+
+    def __call__(self, parser: argparse.ArgumentParser, _options: argparse.Namespace, values: Any, *_: object) -> None:
+        parser.prog = values
+
+
 def run_client(
     parser: argparse.ArgumentParser,
     act: Callable[[GraphClient, argparse.Namespace], None],
@@ -174,11 +181,13 @@ def run_client(
 ) -> int:
     """Run a command and return its exit code: 1 without a run, 2 for what is refused, in one line each."""
     given = list(sys.argv if args is None else args)
+    name = parser.prog
+    parser.add_argument("--prog", action=_Prog, help=argparse.SUPPRESS)
     options = parser.parse_args(remove_ros_args(given)[1:])
     try:
         take_signals(signal.default_int_handler)
         rclpy.init(args=given, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        act(GraphClient(parser.prog), options)
+        act(GraphClient(name), options)
         sys.stdout.flush()
         return 0
     except KeyboardInterrupt:

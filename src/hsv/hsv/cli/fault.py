@@ -61,4 +61,5 @@ def _ask(*words: str, namespace: str, json: bool) -> None:
 
     # Behind the dashes stand words, also those that begin with one, as a value below zero.
     command, *values = words
-    become(FAULT, [*(["--json"] if json else []), command, *(["--", *values] if values else [])], namespace)
+    flags = ["--prog", "hsv fault", *(["--json"] if json else [])]
+    become(FAULT, [*flags, command, *(["--", *values] if values else [])], namespace)

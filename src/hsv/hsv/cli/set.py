@@ -22,4 +22,4 @@ def set(
     from hsv.graph.description import SET_PARAMETER
     from hsv.graph.launcher import become
 
-    become(SET_PARAMETER, [*(["--json"] if json else []), "--", name, value], namespace)
+    become(SET_PARAMETER, ["--prog", "hsv set", *(["--json"] if json else []), "--", name, value], namespace)

@@ -26,4 +26,4 @@ def topic(
     from hsv.graph.launcher import become
 
     flags = [f"--{flag}" for flag, given in (("once", once), ("json", json)) if given]
-    become(TOPIC, [*flags, "--every", str(every), *(["--", name] if name else [])], namespace)
+    become(TOPIC, ["--prog", "hsv topic", *flags, "--every", str(every), *(["--", name] if name else [])], namespace)
