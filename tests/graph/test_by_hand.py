@@ -16,6 +16,7 @@ from waiting import exit_code_of, output_of, used, wait_until
 
 from hsv.control.design_file import find_design
 from hsv.graph.description import graph
+from hsv.graph.exclusive import is_published
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
 from hsv.replay.engine import chosen, replay, rerun
@@ -53,10 +54,19 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     # Nodes need not have the same parameters, and each is repeated with its own.
     tube = ["--params-file", str(find_design("adjustable")), "-p", "feedback.tau:=[0.9]"]
     extra = {"recorder": ["-p", f"bag.directory:={bag}"], "plant": ["-p", "duration:=12.0"], "tube_mpc": tube}
-    nodes = start(processes, extra)
+    # Nor need they be in one namespace, where the topics are in one.
+    topics = ("state", "filtered_state", "run", "ready", "last_state")
+    back = [word for topic in topics for word in ("-r", f"hsv/{topic}:=/hsv/{topic}")]
+    nodes = start(processes, extra | {"notch_filter": ["-r", "__ns:=/elsewhere", *back]})
     assert exit_code_of(nodes["plant"]) == 0
+    over = processes.run("hsv", "topic", "/hsv/state")
+    assert over.returncode == 1 and "error: topic /hsv/state: nobody publishes it" in last_line(over)
+    processes.start("ros2", "run", "hsv_plant", "plant")
+    assert exit_code_of(nodes["recorder"]) == 1
     processes.stop()
     said = {name: popen.communicate()[0] for name, popen in nodes.items()}
+    refused = said["recorder"].partition("a new run was announced: expected a recorder of its own")[2]
+    assert "closed the bag" in refused and "waiting for" not in refused, said["recorder"]
     run_id = re.search(r"starts run (\w{8}): 601 steps, 12 s", said["plant"])[1]
     for name in nodes.keys() - {"plant"}:
         assert f"ready for run {run_id}: 601 steps, 12 s" in said[name]
@@ -80,11 +90,18 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
 @pytest.mark.parametrize(
     ("words", "code", "expected"),
     [
-        (("fault", "list"), 1, "fault: error: no run in ROS_DOMAIN_ID="),
-        (("topic",), 1, "topic: error: no node of the graph in ROS_DOMAIN_ID="),
-        (("set", "tua", "0.8"), 2, "name = 'tua': expected a parameter that may change in flight, feedback.tau"),
+        (("fault", "list"), 1, "hsv fault: error: no run in ROS_DOMAIN_ID="),
+        (("topic",), 1, "hsv topic: error: no node of the graph in ROS_DOMAIN_ID="),
+        (
+            ("set", "tua", "0.8"),
+            2,
+            "hsv set: error: name = 'tua': expected a parameter that may change in flight, feedback.tau",
+        ),
         (("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
         (("topic", "--every", "0"), 2, "--every"),
+        (("topic", "bad name"), 2, "hsv topic: error: name = 'bad name': expected the name of a topic"),
+        (("topic", "/hsv//state"), 2, "(topic name must not contain repeated '/')"),
+        (("topic", "hsv/9x"), 2, "(topic name token must not start with a number)"),
         (("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
@@ -98,7 +115,11 @@ def test_commands_refuse_in_one_line(processes: Processes, words: tuple[str, ...
 @pytest.mark.parametrize("after", [0.2, 2.0])
 def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int, after: float) -> None:
     # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
-    popen = processes.start("hsv", "topic", "/hsv/state")
+    # Somebody is there and silent, or the command might end by itself before it has used so much.
+    silent = processes.start("ros2", "run", "hsv_ctrl", "notch_filter")
+    domain = int(processes.environment["ROS_DOMAIN_ID"])
+    wait_until(lambda: is_published(domain, "/hsv/filtered_state"), [silent.pid])
+    popen = processes.start("hsv", "topic", "/hsv/filtered_state")
     wait_until(lambda: used([popen.pid]) > min(after, 0.6), [popen.pid], pause=lambda _: time.sleep(0.02))
     popen.send_signal(number)
     output = output_of(popen)
