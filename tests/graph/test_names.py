@@ -86,8 +86,8 @@ def test_two_graphs_in_one_domain_fly_as_published(processes: Processes) -> None
         assert found["as_published"] is True
 
 
-def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes: Processes) -> None:
-    processes, folder = shared_processes, shared_processes.folder
+def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Processes) -> None:
+    folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
     # Nothing that is done to this flight comes too late; it is interrupted.
     prepared = prepare(str(short_scenario(folder, 3600, 3)), bag=folder / "remapped", real_time_factor=4.0)
@@ -118,6 +118,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(shared_processes
     # Quiet: said once, then every ten seconds.
     stamps = [float(found[1]) for found in re.finditer(r"\[(\d+\.\d+)\].*waiting for", output_of(alone))]
     assert stamps and all(later - earlier > 9.0 for earlier, later in pairwise(stamps))
+    _fly_dumped(processes)
 
 
 def _ask(processes: Processes) -> None:
@@ -153,9 +154,9 @@ def _refuse_duplicates(processes: Processes, files: Sequence[str]) -> None:
     assert not (processes.folder / "other").exists()
 
 
-def test_dumped_parameters_fly_the_same(shared_processes: Processes) -> None:
-    """Those that the test before has dumped; with simulated time for all who do not make it, which changes no bit."""
-    folder = shared_processes.folder
+def _fly_dumped(processes: Processes) -> None:
+    """Fly with the dumped parameters, and simulated time for all who do not make it, which changes no bit."""
+    folder = processes.folder
     arguments = {
         node.name: ["--params-file", str(folder / "dumps" / f"{'nf2' if node is NOTCH_FILTER else node.name}.yaml")]
         for node in graph()
@@ -165,11 +166,11 @@ def test_dumped_parameters_fly_the_same(shared_processes: Processes) -> None:
         arguments[name] += shortened if name == PLANT.name else ["-p", "use_sim_time:=true"]
     arguments[NOTCH_FILTER.name] += ["-r", "__node:=nf2"]
     arguments[RECORDER.name] += ["-p", f"bag.directory:={folder / 'again'}", "-p", "bag.attachments:=['']"]
-    nodes = by_hand(shared_processes, graph(), arguments)
+    nodes = by_hand(processes, graph(), arguments)
     wait_until(lambda: any(popen.poll() is not None for popen in nodes.values()), [p.pid for p in nodes.values()])
     for popen in nodes.values():
         assert popen.poll() in (None, 0), output_of(popen)
-    shared_processes.stop()
+    processes.stop()
     scenario = load_scenario(str(short_scenario(folder, DURATION, 3)))
     expected = fly(assemble(flight_parameters(scenario))).fingerprint
     assert flight_fingerprint(Bag(folder / "again")) == expected
