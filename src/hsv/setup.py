@@ -49,5 +49,5 @@ setup(
     maintainer_email="maintainers@hsv-bench.invalid",
     description="Model, design, control and recording of a flexible air-breathing hypersonic vehicle.",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["hsv = hsv.cli.main:main"]},
+    entry_points={"console_scripts": ["hsv = hsv.cli.entry:main"]},
 )

@@ -86,6 +86,7 @@ def test_two_graphs_in_one_domain_fly_as_published(processes: Processes) -> None
         assert found["as_published"] is True
 
 
+@pytest.mark.long
 def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Processes) -> None:
     folder = processes.folder
     alone = processes.start("ros2", "run", "hsv_ctrl", "notch_filter", "--ros-args", "-r", "__ns:=/alone")
