@@ -73,9 +73,11 @@ class Leaky:
 @cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
 def leaky_step(k, given, wanted, state, parameters):
     x, x_r, u_r = carray(given, 9), carray(given, 19)[10:], carray(given, 21)[19:]
-    gain, time, limit = parameters[0], parameters[1], parameters[2]
-    if k == int(limit):
+    gain, time = parameters[0], parameters[1]
+    if k == int(parameters[2]):
         return 7
+    if k == int(parameters[3]):
+        return 0
     for i in range(2):
         total = 0.0
         for j in range(5):
@@ -90,14 +92,13 @@ def leaky_step(k, given, wanted, state, parameters):
 class CompiledLeaky(Leaky):
     """The same, compiled."""
 
-    fails_at = -1
+    fails_at = silent_at = -1
 
     @property
     def kernel(self):
         own = self.own
-        return StepKernel(
-            leaky_step.address, np.zeros(1), np.array([own["leaky.gain"], own["leaky.time"], self.fails_at])
-        )
+        settings = [own["leaky.gain"], own["leaky.time"], self.fails_at, self.silent_at]
+        return StepKernel(leaky_step.address, np.zeros(1), np.array(settings))
 
 
 class Late(Leaky):
@@ -156,7 +157,7 @@ def test_settings_reach_the_controller_in_si_units():
 @pytest.mark.parametrize(
     ("controller", "answer", "message"),
     [
-        ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected a finite number for fuel"),
+        ("Late", (np.nan, 0.0), r"Late, step 20: returned an error or answered \[nan, 0.0\], expected a finite"),
         ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected a finite number for fuel"),
         ("Late", None, r"Late, step 20: answered None"),
         ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain"),
@@ -172,6 +173,12 @@ def test_a_controller_that_fails_is_named_with_its_step(controller, answer, mess
 def test_a_compiled_controller_that_fails_is_named_with_its_step(monkeypatch):
     monkeypatch.setattr(CompiledLeaky, "fails_at", 33)
     with pytest.raises(RunError, match="CompiledLeaky, step 33"):
+        fly(flight("CompiledLeaky"))
+
+
+def test_a_compiled_controller_that_leaves_a_step_out_is_named(monkeypatch):
+    monkeypatch.setattr(CompiledLeaky, "silent_at", 5)
+    with pytest.raises(RunError, match=r"CompiledLeaky, step 5: returned an error or answered \[nan, nan\]"):
         fly(flight("CompiledLeaky"))
 
 

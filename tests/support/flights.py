@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.controller import ControllerInput
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import Components
+from hsv.simulation.closed_loop import Components, controller_input
 from hsv.simulation.scenario import load_scenario
 from hsv.vehicle.plant import FlightStatus
 
@@ -28,18 +27,7 @@ def step_by_step(parts: Components) -> dict[str, np.ndarray]:
     while True:
         filtered = parts.notch_filter.step(float(plant.state[4]))
         nominal = parts.nominal_trajectory.step(plant.state)
-        tube = parts.controller.step(
-            ControllerInput(
-                plant.step,
-                plant.state,
-                filtered.filtered_pitch_rate,
-                filtered.filter_state,
-                nominal.reference,
-                nominal.reference_input,
-                nominal.deviation,
-                nominal.input,
-            )
-        )
+        tube = parts.controller.step(controller_input(plant.step, plant.state, filtered, nominal))
         fault = parts.fault_injector.step(plant.step, tube.input)
         rows.append(
             {

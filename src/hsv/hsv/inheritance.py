@@ -14,7 +14,7 @@ EXTENDS = "extends"
 Tables = dict[str, Any]
 
 
-def whole(
+def follow_extends(
     name: str,
     read: Callable[[str], Tables],
     refuse: Callable[[str, str], HsvError],

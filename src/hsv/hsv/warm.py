@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.control.controller import ControllerInput
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
+from hsv.simulation.closed_loop import controller_input, fly
 from hsv.simulation.scenario import load_scenario
 
 
@@ -17,18 +16,7 @@ def warm() -> None:
     state = components.plant.reset()
     filtered = components.notch_filter.step(float(state.state[4]))
     nominal = components.nominal_trajectory.step(state.state)
-    answer = components.controller.step(
-        ControllerInput(
-            0,
-            state.state,
-            filtered.filtered_pitch_rate,
-            filtered.filter_state,
-            nominal.reference,
-            nominal.reference_input,
-            nominal.deviation,
-            nominal.input,
-        )
-    )
+    answer = components.controller.step(controller_input(0, state.state, filtered, nominal))
     actuator = components.fault_injector.step(0, answer.input).actuator
     components.plant.step(np.asarray(actuator))
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import os
 import signal
 import sys
@@ -21,6 +19,7 @@ from hsv.errors import HsvError, RunError
 from hsv.graph.description import PLANT, NodeDescription
 from hsv.graph.exclusive import is_published
 from hsv.graph.progress import Standstill
+from hsv.json_text import json_text
 from hsv_node import roles
 from hsv_node.main import take_signals
 from hsv_node.messages import type_name
@@ -205,7 +204,7 @@ def run_client(
 
 def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:
     """Print an answer: ``text`` for people, ``values`` as a JSON object on one line for programs."""
-    print(json.dumps(finite(values), allow_nan=False) if as_json else text, flush=True)
+    print(json_text(values) if as_json else text, flush=True)
 
 
 def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
@@ -218,15 +217,6 @@ def acting_from(run: Run, step: int) -> tuple[str, dict[str, Any]]:
         raise RunError(f"the run ends with step {run.last_step}: what begins at step {step} does not act any more")
     time = step * run.period
     return f"t = {time:.2f} s", {"step": step, "time_s": round(time, 9)}
-
-
-def finite(value: Any) -> Any:
-    """Return plain data with null, for JSON, in place of numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {key: finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _refuse(name: str, problem: object, code: int) -> int:

@@ -67,7 +67,7 @@ class PeerEmulatorNode(LockstepNode):
         )
         self._peers[peer.name] = node
         for topic in peer.publishes:
-            self.claim(topic)
+            self.claim(topic, f"no {peer.name} beside its emulator")
             yield topic, node.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
         for topic in me.publishes:
             if topic in peer.subscribes:

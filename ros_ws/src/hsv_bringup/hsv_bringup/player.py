@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import socket
 import sys
 import time
 from collections.abc import Sequence
@@ -16,9 +15,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
-from hsv.errors import ParameterError, RecordingError, RunError
+from hsv.errors import ParameterError, RecordingError
 from hsv.graph.description import CLOCK, PLANT, RECORDER, TOPICS
-from hsv.graph.exclusive import claim_topic
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos
 from hsv_node.lockstep import SAID_EVERY
@@ -51,10 +49,12 @@ class PlayerNode(ProcessNode):
             refuse_sim_time(self)
         self._rate = rate
         self._paused = paused
-        self._claims: list[socket.socket] = []
         for topic in topics:
             if any(bag.roles.get(role) == topic for role in EXCLUSIVE):
-                self._claim(_relative(bag, topic))
+                # A graph that flies would take the messages for its own.
+                self.claim(
+                    _relative(bag, topic), "others to play, or a place of their own (ROS_DOMAIN_ID, --namespace)"
+                )
         self._outputs = {
             topic: self.create_publisher(_message_class(bag, topic), _relative(bag, topic), _profile(bag.qos(topic)))
             for topic in topics
@@ -69,28 +69,6 @@ class PlayerNode(ProcessNode):
         self.create_service(Trigger, "~/pause", self._pause)
         self.create_service(Trigger, "~/resume", self._resume)
         self.create_service(Trigger, "~/step", self._step)
-
-    def destroy_node(self) -> None:
-        """Leave the topics to others."""
-        super().destroy_node()
-        for held in self._claims:
-            held.close()
-
-    def _claim(self, topic: str) -> None:
-        """Keep a topic of the graph to this player: a graph that flies would take its messages for its own.
-
-        Raises:
-            RunError: A node of this machine publishes it.
-        """
-        name, domain = self.resolve_topic_name(topic), self.context.get_domain_id()
-        held = claim_topic(domain, name)
-        if held is None:
-            self.destroy_node()
-            raise RunError(
-                f"another node publishes {name} in ROS domain {domain}: expected other topics to play, or a domain or "
-                "namespace of their own (ROS_DOMAIN_ID, --namespace)"
-            )
-        self._claims.append(held)
 
     def poll(self) -> None:
         """Publish what is due; end after the last message."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socket
 import time
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -11,10 +10,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run, VehicleState
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 
-from hsv.errors import RunError
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
-from hsv.graph.exclusive import claim_node, claim_topic
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
@@ -53,10 +50,10 @@ class LockstepNode(ProcessNode):
         """
         super().__init__(role.name)
         self.role, self._task = role, task
-        self._claims: list[socket.socket] = []
-        self._claim_name()
+        place = f"one {role.name} a domain and namespace (ROS_DOMAIN_ID, -r __ns:=)"
+        self.claim_name(f"{place}, and another name for every other node (-r __node:=)")
         for topic in role.own_topics:
-            self.claim(topic)
+            self.claim(topic, place)
         if role.known_by:
             refuse_unknown(self, role.name, self.of_others)
         values = declare(self, LOCKSTEP_PARAMETERS)
@@ -75,44 +72,6 @@ class LockstepNode(ProcessNode):
         if role.known_by:
             for topic, peer in description.links(role, self.controller, self.recorded):
                 self._links.setdefault(topic, []).append(peer)
-
-    def destroy_node(self) -> None:
-        """Leave the graph, and its topics to another."""
-        super().destroy_node()
-        for held in self._claims:
-            held.close()
-
-    def _claim_name(self) -> None:
-        """Keep the node's full name to it: peers could not tell two of one name apart.
-
-        Raises:
-            RunError: Another node of this machine has it.
-        """
-        name, domain = self.get_fully_qualified_name(), self.context.get_domain_id()
-        held = claim_node(domain, name)
-        if held is None:
-            self.destroy_node()
-            raise RunError(
-                f"another node is called {name} in ROS domain {domain}: expected one {self.role.name} a domain and "
-                "namespace (ROS_DOMAIN_ID, -r __ns:=), and another name for every other node (-r __node:=)"
-            )
-        self._claims.append(held)
-
-    def claim(self, topic: str) -> None:
-        """Keep a topic to this node.
-
-        Raises:
-            RunError: Another node of this machine has it. Nothing was published yet that could disturb that one.
-        """
-        name, domain = self.resolve_topic_name(topic), self.context.get_domain_id()
-        held = claim_topic(domain, name)
-        if held is None:
-            self.destroy_node()
-            raise RunError(
-                f"another node publishes {name} in ROS domain {domain}: expected one {self.role.name} a domain and "
-                "namespace (ROS_DOMAIN_ID, -r __ns:=)"
-            )
-        self._claims.append(held)
 
     def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe a step topic of the graph description."""

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import socket
 from typing import ClassVar
 
 from rclpy.node import Node
+
+from hsv.errors import RunError
+from hsv.graph.exclusive import claim_node, claim_topic
 
 
 class ProcessNode(Node):
@@ -17,6 +21,38 @@ class ProcessNode(Node):
         super().__init__(name, namespace=namespace)
         self.exit_code: int | None = None
         """Set when the node wants to end, to the exit code of the process."""
+        self._claims: list[socket.socket] = []
+
+    def claim_name(self, expected: str) -> None:
+        """Keep the node's full name to it: others could not tell two of one name apart.
+
+        Raises:
+            RunError: Another node of this machine has it; ``expected`` says what is due.
+        """
+        name = self.get_fully_qualified_name()
+        self._keep(claim_node(self.context.get_domain_id(), name), f"another node is called {name}", expected)
+
+    def claim(self, topic: str, expected: str) -> None:
+        """Keep a topic to this node, before anything is published on it that could disturb another.
+
+        Raises:
+            RunError: Another node of this machine has it; ``expected`` says what is due.
+        """
+        name = self.resolve_topic_name(topic)
+        self._keep(claim_topic(self.context.get_domain_id(), name), f"another node publishes {name}", expected)
+
+    def _keep(self, held: socket.socket | None, taken: str, expected: str) -> None:
+        if held is None:
+            domain = self.context.get_domain_id()
+            self.destroy_node()
+            raise RunError(f"{taken} in ROS domain {domain}: expected {expected}")
+        self._claims.append(held)
+
+    def destroy_node(self) -> None:
+        """Leave name and topics to others."""
+        super().destroy_node()
+        for held in self._claims:
+            held.close()
 
     def finish(self, code: int) -> None:
         """End the process with ``code`` once the current callback has returned."""

@@ -21,6 +21,7 @@ ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenari
 RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
 StepTimeoutOption = Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")]
 NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
+ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]
 NamespaceOption = Annotated[
     str, typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain.")
 ]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
@@ -14,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from hsv.json_text import json_text
 from hsv.units import to_paper
 
 # Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
@@ -98,15 +97,7 @@ def print_written(paths: Sequence[Path], as_json: bool) -> None:
 
 def print_json(values: Mapping[str, Any]) -> None:
     """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
-    sys.stdout.write(json.dumps(_finite(values), indent=2, allow_nan=False) + "\n")
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(entry) for entry in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    sys.stdout.write(json_text(values, indent=2) + "\n")
 
 
 def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:

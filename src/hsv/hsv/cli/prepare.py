@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import (
+    ComposedOption,
     JsonOption,
     NamespaceOption,
     NewBagOption,
@@ -21,7 +22,7 @@ from hsv.cli.output import console, print_json
 def prepare(
     scenario: ScenarioArgument = "case1",
     real_time_factor: RealTimeFactorOption = 0.0,
-    composed: Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")] = False,
+    composed: ComposedOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = 10.0,

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import (
+    ComposedOption,
     JsonOption,
     NamespaceOption,
     NewBagOption,
@@ -22,7 +23,7 @@ from hsv.cli.output import Units, report_line
 def run(
     scenario: ScenarioArgument = "case1",
     real_time_factor: RealTimeFactorOption = 0.0,
-    composed: Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")] = False,
+    composed: ComposedOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = 10.0,

@@ -21,6 +21,7 @@ A controller of one's own is a class with four names, here the whole of one that
 from __future__ import annotations
 
 import ctypes
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
@@ -85,19 +86,20 @@ class StepKernel(NamedTuple):
     parameters: np.ndarray
 
 
-class Controller:
+class Controller(ABC):
     """A controller as the loop steps it: from measured, reference and nominal state to the input of a step."""
 
     kernel: Any = None
     """What the compiled loop flies: a :class:`hsv.control.tube_law.TubeData`, a :class:`StepKernel`, or ``None``, and
     :meth:`step` is called."""
 
+    @abstractmethod
     def reset(self) -> None:
         """Start a new run."""
 
+    @abstractmethod
     def step(self, inputs: ControllerInput) -> ControllerResult:
         """Return the input of this step; called once a step, in order."""
-        raise NotImplementedError
 
 
 class ControllerClass(Protocol):
@@ -163,7 +165,7 @@ class ForeignController(Controller):
         return ControllerResult(np.minimum(np.maximum(wanted, INPUT_MINIMUM), INPUT_MAXIMUM), wanted)
 
     def failure(self, step: int, what: str) -> RunError:
-        """Return the error of an answer that cannot be flown."""
+        """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
         return RunError(f"{self._name}, step {step}: {what}, expected a finite number for {' and '.join(INPUT_NAMES)}")
 
     def _called(self, inputs: ControllerInput) -> np.ndarray:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 
 from hsv.control.design_file import find_file
 from hsv.errors import DesignError
-from hsv.inheritance import is_path, whole
+from hsv.inheritance import follow_extends, is_path
 from hsv.units import parse_quantity
 from hsv.vehicle.dynamics import N_RIGID
 
@@ -295,7 +295,7 @@ def read_inputs(path: Path) -> DesignInputs:
     Raises:
         DesignError: The file is missing or is not TOML, or a field is wrong.
     """
-    table = whole(str(path), _read, lambda name, why: DesignError(f"{name}: {why}"))
+    table = follow_extends(str(path), _read, lambda name, why: DesignError(f"{name}: {why}"))
     try:
         return parse_inputs(table)
     except DesignError as error:

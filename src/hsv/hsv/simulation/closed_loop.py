@@ -16,8 +16,8 @@ from numba import njit
 
 from hsv.control.controller import Controller, ControllerInput, ForeignController
 from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
-from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
-from hsv.control.notch_filter import NotchFilter, filter_step, rest
+from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory, nominal_advance
+from hsv.control.notch_filter import NotchFilter, NotchResult, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
 from hsv.faults.actuator import FaultInjector, apply_faults
@@ -45,6 +45,20 @@ class Components:
         plant = self.plant
         vehicle = plant.vehicle.perturbed(perturbation)
         return replace(self, plant=Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps))
+
+
+def controller_input(step: int, state: np.ndarray, filtered: NotchResult, planned: NominalResult) -> ControllerInput:
+    """Return what the controller is given in ``step``: the measured ``state`` (9), and what the blocks before said."""
+    return ControllerInput(
+        step,
+        state,
+        filtered.filtered_pitch_rate,
+        filtered.filter_state,
+        planned.reference,
+        planned.reference_input,
+        planned.deviation,
+        planned.input,
+    )
 
 
 class History(NamedTuple):
@@ -166,6 +180,8 @@ def _fly(
             history.nominal_input[k, i] = u_n[i]
         if controller_call.function != NOTHING:
             _, inputs, outputs, state, parameters = controller_call
+            for i in range(m):
+                wanted[i] = math.nan  # what is not answered is no answer, not the one before
             if call_step(controller_call.function, k, inputs, outputs, state, parameters) != 0:
                 return -1 - k
             for i in range(m):
@@ -299,7 +315,7 @@ def fly(components: Components) -> Flight:
             raise callback.error
     if rows < 0:
         assert isinstance(controller, ForeignController)
-        raise controller.failure(-1 - rows, f"answered {arrays.wanted.tolist()}")
+        raise controller.failure(-1 - rows, f"returned an error or answered {arrays.wanted.tolist()}")
     return _flight(components, History(*(column[:rows] for column in history)))
 
 

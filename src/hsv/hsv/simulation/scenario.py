@@ -17,7 +17,7 @@ from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
-from hsv.inheritance import EXTENDS, is_path, whole
+from hsv.inheritance import EXTENDS, follow_extends, is_path
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
 from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
 from hsv.simulation.metrics import METRICS
@@ -188,7 +188,7 @@ def scenario_text(name: str) -> str:
     text = _own_text(name)
     if EXTENDS not in _table(text, name):
         return text
-    return tomli_w.dumps(whole(name, lambda other: _table(_own_text(other), other), _refused, REPLACED))
+    return tomli_w.dumps(follow_extends(name, lambda other: _table(_own_text(other), other), _refused, REPLACED))
 
 
 def _refused(name: str, why: object) -> ScenarioError:
