@@ -19,7 +19,8 @@ from hsv.graph.description import graph
 from hsv.graph.exclusive import is_published
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
-from hsv.replay.engine import chosen, replay, rerun
+from hsv.replay.engine import replay, rerun
+from hsv.replay.processes import processes
 
 pytestmark = pytest.mark.graph
 
@@ -80,7 +81,7 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     values = flown_parameters(opened)
     assert values.of("tube_mpc")["feedback.tau"] == [0.9] and values.of("nominal_trajectory")["feedback.tau"] == [1.0]
     assert [values.of(name)["design.name"] for name in ("tube_mpc", "nominal_trajectory")] == ["adjustable", "baseline"]
-    results = [replay(opened, process, values, lambda *_: None) for process in chosen("tube_mpc").values()]
+    results = [replay(opened, process, values, lambda *_: None) for process in processes("tube_mpc").values()]
     results += rerun(opened, "tube_mpc", values, lambda *_: None)
     assert len(results) == 10 and all(result.identical for result in results)
     done = processes.run("hsv", "replay", bag, "--over-dds", "--rerun")

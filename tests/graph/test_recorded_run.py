@@ -18,7 +18,8 @@ from hsv.control.design_file import find_design, read_parameters
 from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
-from hsv.replay.engine import chosen, replay, rerun
+from hsv.replay.engine import replay, rerun
+from hsv.replay.processes import processes
 
 pytestmark = pytest.mark.graph
 
@@ -37,7 +38,7 @@ def bag(shared_processes: Processes) -> Path:
 def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
     opened = Bag(bag)
     values = flown_parameters(opened)
-    results = [replay(opened, process, values, lambda *_: None) for process in chosen("tube_mpc").values()]
+    results = [replay(opened, process, values, lambda *_: None) for process in processes("tube_mpc").values()]
     results += rerun(opened, "tube_mpc", values, lambda *_: None)
     assert len(results) == 10 and all(result.identical for result in results)
 

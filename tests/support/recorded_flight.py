@@ -15,7 +15,7 @@ from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
-from hsv.replay.engine import chosen
+from hsv.replay.processes import processes
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import parse_scenario, scenario_text
 
@@ -73,7 +73,7 @@ def record_flight(
 
 
 def _fly(writer: BagWriter, types: Typestore, values: dict[str, Any]) -> None:
-    processes = chosen("tube_mpc")
+    processes = processes("tube_mpc")
     components = {name: process.build(values) for name, process in processes.items()}
     messages = {topic: blank(types, kind) for topic, kind in TOPICS.items()}
     first = True

@@ -15,6 +15,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "controller = hsv_ctrl.controller:main",
             "notch_filter = hsv_ctrl.notch_filter:main",
             "nominal_trajectory = hsv_ctrl.nominal_trajectory:main",
             "robust_mpc = hsv_ctrl.robust_mpc:main",

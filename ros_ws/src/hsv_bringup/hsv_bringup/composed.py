@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from hsv.graph.description import controller_node
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_bringup.recorder import RecorderNode
+from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.nominal_trajectory import NominalTrajectoryNode
 from hsv_ctrl.notch_filter import NotchFilterNode
 from hsv_ctrl.robust_mpc import RobustMpcNode
@@ -27,7 +29,8 @@ def nodes() -> Iterator[ProcessNode]:
     yield plant
     yield NotchFilterNode()
     yield NominalTrajectoryNode()
-    yield CONTROLLER_NODES[plant.controller]()
+    if not controller_node(plant.controller).foreign:
+        yield CONTROLLER_NODES.get(plant.controller, ControllerNode)()
     yield FaultInjectorNode()
     if plant.recorded:
         yield RecorderNode()

@@ -5,18 +5,27 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from hsv_msgs.msg import Fault, FaultStatus
+from hsv_msgs.msg import Actuator, Fault
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError, RunError
+from hsv.faults.actuator import FAULT_TYPES
 from hsv.graph.description import FAULT_INJECTOR
+from hsv.graph.exchange import fault_in
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 from hsv_node.qos import STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
-    fault = Fault(channel=options.channel, type=options.type, value=options.value)
-    _change(client, options, InjectFault, InjectFault.Request(fault=fault))
+    known = FAULT_TYPES.get(options.type)
+    names = [known.parameter] if known else []
+    fault = Fault(
+        channel=options.channel,
+        type=options.type,
+        parameter_names=names,
+        parameter_values=[options.value] * len(names),
+    )
+    _change(client, options, InjectFault, InjectFault.Request(fault=fault, duration=options.duration))
 
 
 def _clear(client: GraphClient, options: argparse.Namespace) -> None:
@@ -34,16 +43,17 @@ def _change(client: GraphClient, options: argparse.Namespace, kind: type, reques
 
 def _list(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
-    statuses: list[FaultStatus] = []
-    name = client.topic_of(FAULT_INJECTOR, FaultStatus)
-    client.create_subscription(FaultStatus, name, statuses.append, STEP)
+    statuses: list[Actuator] = []
+    name = client.topic_of(FAULT_INJECTOR, Actuator)
+    client.create_subscription(Actuator, name, statuses.append, STEP)
     if not client.wait_for(lambda: statuses, f"a step ({name})"):
         raise RunError(f"no step is flown: no message on {name}")
     status = statuses[-1]
-    active = [{"channel": f.channel, "type": f.type, "value": f.value} for f in status.active]
+    active = [fault_in(message) for message in status.active]
     time, values = acting_from(run, status.step)
-    words = "; ".join(f"{f.type} {f.value:g} of {f.channel}" for f in status.active) or "no fault"
-    answer(f"step {status.step}, {time}: {words}", {**values, "active": active}, options.json)
+    words = "; ".join(map(str, active)) or "no fault"
+    described = [{"channel": f.channel, "type": f.type, "parameters": f.parameters} for f in active]
+    answer(f"step {status.step}, {time}: {words}", {**values, "active": described}, options.json)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -55,6 +65,7 @@ def main(args: Sequence[str] | None = None) -> int:
     inject.add_argument("channel", help="e.g. elevator_deflection")
     inject.add_argument("type", help="e.g. loss_of_effectiveness")
     inject.add_argument("value", type=float, help="parameter of the type, e.g. 0.8")
+    inject.add_argument("--duration", type=float, default=0.0, help="simulated seconds; 0: until it is cleared")
     inject.set_defaults(act=_inject)
     clear = commands.add_parser("clear", help="end faults with the next step")
     clear.add_argument("channel", nargs="?", default="", help="default: all channels")

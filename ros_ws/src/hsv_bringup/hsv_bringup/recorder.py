@@ -14,7 +14,18 @@ from hsv_msgs.msg import RecorderProgress, Run, VehicleState
 from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
-from hsv.graph.description import LATCHED_TOPICS, OTHER_TOPICS, RECORDER, RECORDER_PROGRESS, STATE, TOPICS
+from hsv.graph.description import (
+    LATCHED_TOPICS,
+    NOMINAL_TRAJECTORY,
+    OTHER_TOPICS,
+    RECORDER,
+    RECORDER_PROGRESS,
+    STATE,
+    TOPICS,
+    controller_node,
+    graph,
+    step_topics,
+)
 from hsv.graph.part_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
@@ -53,22 +64,23 @@ class RecorderNode(PeerNode):
             if not path.is_file():
                 raise ParameterError(f"parameter bag.attachments = {str(path)!r}: expected an existing file")
         custom_data = dict(pair.split("=", 1) for pair in values["bag.custom_data"] if "=" in pair)
-        self._names = {topic: self.resolve_topic_name(topic) for topic in (TOPICS | OTHER_TOPICS)}
+        recorded = {topic: TOPICS[topic] for topic in step_topics(self.controller)}
+        self._names = {topic: self.resolve_topic_name(topic) for topic in (recorded | OTHER_TOPICS)}
         self.bag = BagWriter(directory, custom_data=custom_data | naming(self._names, self.get_namespace()))
         for path in attachments:
             self._attach(path.name, path.read_bytes())
         self._asks = not {"design.yaml", "scenario.yaml"} <= {path.name for path in attachments}
         """Whether the nodes are to be asked for their parameters: nobody else has attached them."""
         self._peers: PeerParameters | None = None
-        for topic, kind in (TOPICS | OTHER_TOPICS).items():
+        for topic, kind in (recorded | OTHER_TOPICS).items():
             latched = topic in LATCHED_TOPICS
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
             self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
-        self._order = tuple(self._names[topic] for topic in TOPICS)
+        self._order = tuple(self._names[topic] for topic in recorded)
         self._state_name = self._names[STATE]
         self._status_at: dict[bytes, int] = {}
         """Where the state carries its status, by the length of its frame_id."""
-        for topic, name in zip(TOPICS, self._order, strict=True):
+        for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name), raw=True)
         for topic, kind in OTHER_TOPICS.items():
             profile = LATCHED if topic in LATCHED_TOPICS else STEP
@@ -104,7 +116,8 @@ class RecorderNode(PeerNode):
             return missing
         if self._peers is None:
             # The recorder takes something of every node: all of them are linked to it.
-            self._peers = PeerParameters(self, self.linked)
+            asked = [node.name for node in graph(self.controller) if not node.foreign]
+            self._peers = PeerParameters(self, {role: name for role, name in self.linked.items() if role in asked})
         silent = self._peers.silent()
         if silent and not self._peers.gave_up:
             return [f"{role} ({service})" for role, service in silent.items()]
@@ -125,10 +138,13 @@ class RecorderNode(PeerNode):
 
         for words in disagreements(values):
             self.get_logger().warning(words)
-        for name, text in recorded_files(values, self.controller).items():
+        flown = controller_node(self.controller)
+        design = values[(NOMINAL_TRAJECTORY if flown.foreign else flown).name]
+        for name, text in recorded_files(values, design).items():
             self._attach(name, text.encode())
-        design = values[self.controller]
-        self.bag.add_custom_data({"run_id": run.run_id, **provenance(design.get("design.name", ""), design)})
+        self.bag.add_custom_data(
+            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), design)}
+        )
 
     def _attach(self, name: str, data: bytes) -> None:
         self.bag.attach(name, mimetypes.guess_type(name)[0] or "text/plain", data)

@@ -1,76 +1,46 @@
-"""Base of the controller nodes: joins filtered and nominal state of a step to the command."""
+"""The node for controllers without a node of their own: any registered one, any class."""
 
 from __future__ import annotations
 
-from hsv_msgs.msg import ControlInput, FilteredState, NominalState, Run, TubeStatus
+from collections.abc import Sequence
 
-from hsv.control.robust_mpc import RobustMpc
-from hsv.control.tube_law import TubeLaw, TubeStatusCode
+from hsv.control.controllers import NODE, build_controller, controller_class
 from hsv.errors import ParameterError
-from hsv.graph.description import COMMAND, FILTERED_STATE, NOMINAL, TUBE_STATUS, NodeDescription
-from hsv.graph.exchange import control, fill_tube_status
-from hsv_node.lockstep import PeerNode
+from hsv.graph.description import CONTROLLER, CONTROLLERS
+from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.simulation.blocks import Signals
+from hsv_ctrl.design import declare_design
+from hsv_node.block import BlockNode
+from hsv_node.main import run_node
 from hsv_node.parameters import given
 
 
-class ControllerNode(PeerNode):
-    """Turns filtered and nominal state into the command and the status of the tube."""
+class ControllerNode(BlockNode):
+    """Flies the controller that the parameter ``controller`` names: a registered one, or a class.
 
-    law: TubeLaw | RobustMpc
-    """Set by the node."""
-    follows_nominal = True
-    """Whether the nominal input is a part of the command."""
+    Raises:
+        ParameterError: It names none, or one with a node of its own; or a parameter is wrong, named.
+    """
 
-    def __init__(self, role: NodeDescription) -> None:
-        super().__init__(role, "tube")
-        if given(self, "controller") and self.controller != role.name:
+    def __init__(self) -> None:
+        super().__init__(CONTROLLER, "controller")
+        name = self.controller
+        if name in CONTROLLERS or name.startswith(NODE):
+            node = f"node {name}" if name in CONTROLLERS else "node that it names"
             raise ParameterError(
-                f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
+                f"parameter controller = {name!r}: expected a controller without a node of its own, the {node} flies it"
             )
-        self._state: FilteredState | None = None
-        self._nominal: NominalState | None = None
-        self._outside = False
-        self._command_message, self._status_message = ControlInput(), TubeStatus()
-        self._command = self.create_step_publisher(COMMAND)
-        self._status = self.create_step_publisher(TUBE_STATUS)
-        self.create_step_subscription(FILTERED_STATE, self._on_state)
-        self.create_step_subscription(NOMINAL, self._on_nominal)
+        # It may look at whatever else is known of the flight: as far as this node is told, it has it, too.
+        flight = {p.name: p for table in NODE_PARAMETERS.values() for p in table if given(self, p.name)}
+        own = {p.name: p for p in controller_class(name).PARAMETERS}
+        values, design = declare_design(self, tuple((flight | own).values()))
+        self.component = build_controller(values | {"controller": name}, design)
 
-    def start_run(self, run: Run) -> None:
-        """Forget the last messages of the run before."""
-        self._state = self._nominal = None
-        self._outside = False
-        self.law.reset()
+    def stepped(self, signals: Signals) -> None:
+        """Tell whether its command is limited."""
+        self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.answer.saturated.any()))
 
-    def _on_state(self, state: FilteredState) -> None:
-        self._state = state
-        self._join()
 
-    def _on_nominal(self, nominal: NominalState) -> None:
-        self._nominal = nominal
-        self._join()
-
-    def _join(self) -> None:
-        state, nominal = self._state, self._nominal
-        if state is None or nominal is None or state.step != nominal.step:
-            return
-        result = control(self.law, state, nominal, self._command_message)
-        # The command first: the other nodes work on it while the rest is published.
-        self._command.publish(self._command_message)
-        fill_tube_status(result, state, nominal, self.follows_nominal, self._status_message)
-        self._status.publish(self._status_message)
-        outside = result.status is TubeStatusCode.OUTSIDE
-        left, self._outside = outside and not self._outside, outside
-        stamp = state.header.stamp
-        if left:
-            time = stamp.sec + 1e-9 * stamp.nanosec
-            self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
-        self.diagnose(
-            stamp,
-            result.status.name,
-            warning=left,
-            step=state.step,
-            saturated=bool(result.saturated.any()),
-            level=result.level,
-            component=result.component,
-        )
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node of a controller of one's own."""
+    return run_node(ControllerNode, CONTROLLER.name, args)

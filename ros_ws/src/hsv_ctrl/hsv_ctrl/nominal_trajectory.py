@@ -4,46 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hsv_msgs.msg import NominalState, Run, VehicleState
+from hsv_msgs.msg import Run
 
 from hsv.control.nominal_law import NominalStatus
-from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS, NominalTrajectory
-from hsv.graph.description import NOMINAL, NOMINAL_TRAJECTORY, STATE
-from hsv.graph.exchange import plan_nominal
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.graph.description import NOMINAL_TRAJECTORY
+from hsv.simulation.blocks import Signals
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.step_times import StepTimes
-from hsv_node.lockstep import PeerNode
+from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 
 
-class NominalTrajectoryNode(PeerNode):
-    """Turns the state into reference and nominal state."""
+class NominalTrajectoryNode(BlockNode):
+    """Turns the measurement into reference and nominal state."""
 
     def __init__(self) -> None:
         super().__init__(NOMINAL_TRAJECTORY, "trajectory")
-        self.trajectory = NominalTrajectory.from_parameters(*declare_design(self, NOMINAL_PARAMETERS))
+        self.component = NominalTrajectory.from_parameters(*declare_design(self, NominalTrajectory.PARAMETERS))
         self._times, self._failed = StepTimes(), False
-        self._message = NominalState()
-        self._nominal = self.create_step_publisher(NOMINAL)
-        self.create_step_subscription(STATE, self._on_state)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""
-        self.trajectory.reset()
+        super().start_run(run)
         self._times, self._failed = StepTimes(), False
 
-    def _on_state(self, state: VehicleState) -> None:
+    def advance(self, signals: Signals) -> None:
+        """Step the trajectory and note how long it takes: some laws solve a problem in flight."""
         with self._times:
-            result = plan_nominal(self.trajectory, state, self._message)
-        self._nominal.publish(self._message)
-        failed = NominalStatus.SOLVER_FAILED in result.status
+            super().advance(signals)
+
+    def stepped(self, signals: Signals) -> None:
+        """Tell how the law fares; a solver that begins to fail is a warning."""
+        status = NominalStatus(signals.nominal_status)
+        failed = NominalStatus.SOLVER_FAILED in status
         fails, self._failed = failed and not self._failed, failed
         self.diagnose(
-            state.header.stamp,
-            "running" if result.status is NominalStatus.OK else str(result.status.name),
+            signals.header.stamp,
+            "running" if status is NominalStatus.OK else str(status.name),
             warning=fails,
-            step=state.step,
-            gain_index=result.gain_index,
+            step=signals.step,
+            gain_index=signals.gain_index,
             step_time_p99_ms=self._times,
         )
 

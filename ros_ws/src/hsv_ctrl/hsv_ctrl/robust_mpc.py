@@ -6,19 +6,17 @@ from collections.abc import Sequence
 
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
 from hsv.graph.description import ROBUST_MPC
-from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
+from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node
 
 
-class RobustMpcNode(ControllerNode):
+class RobustMpcNode(TubeNode):
     """One gain about the reference; of the nominal trajectory node it takes the reference alone."""
-
-    follows_nominal = False
 
     def __init__(self) -> None:
         super().__init__(ROBUST_MPC)
-        self.law = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
+        self.component = RobustMpc.from_parameters(*declare_design(self, ROBUST_MPC_PARAMETERS))
 
 
 def main(args: Sequence[str] | None = None) -> int:

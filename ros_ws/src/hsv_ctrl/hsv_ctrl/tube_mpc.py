@@ -11,19 +11,21 @@ from hsv.control.adjustable import TAU
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
-from hsv.errors import ParameterError
+from hsv.errors import DesignError, ParameterError
 from hsv.graph.description import TUBE_MPC
-from hsv_ctrl.controller import ControllerNode
 from hsv_ctrl.design import declare_design
+from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node
 
 
-class TubeMpcNode(ControllerNode):
+class TubeMpcNode(TubeNode):
     """Feedback about the nominal trajectory (paper eq. 36); refuses a design that fails its quick claims."""
 
     def __init__(self) -> None:
         super().__init__(TUBE_MPC)
         values, design = declare_design(self, (*TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
+        if design is None:
+            raise DesignError("parameter design.name = 'none': expected a design with a tube")
         if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)
         certified, flown = design.coupling, values["vehicle.coupling"]
@@ -31,7 +33,7 @@ class TubeMpcNode(ControllerNode):
             self.get_logger().warning(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
-        self.law = self._tube_law = TubeLaw.from_parameters(values, design)
+        self.component = self._law = TubeLaw.from_parameters(values, design)
         self._changed = ""
         """Which change is being made, and from which step on it acts."""
         self.add_on_set_parameters_callback(self._on_change)
@@ -50,7 +52,7 @@ class TubeMpcNode(ControllerNode):
             if parameter.name == TAU.name:
                 values = list(parameter.value)
                 try:
-                    step = self._tube_law.change_tau(values)
+                    step = self._law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
                 self._changed = f"{TAU.name} = {values} from step {step} on"

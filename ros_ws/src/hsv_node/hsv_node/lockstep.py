@@ -93,20 +93,33 @@ class LockstepNode(ProcessNode):
         types_of: dict[tuple[str, str], set[str]] = {}
         self.linked = {}
         for topic, roles in self._links.items():
-            if topic in self._outputs:
-                seen, name = self.get_subscriptions_info_by_topic(topic), self._outputs[topic].topic_name
-            else:
-                seen, name = self.get_publishers_info_by_topic(topic), self._inputs[topic].topic_name
+            publishers, subscriptions = (
+                self.get_publishers_info_by_topic(topic),
+                self.get_subscriptions_info_by_topic(topic),
+            )
+            name = self.resolve_topic_name(topic)
+            seen, own = (subscriptions, publishers) if topic in self._outputs else (publishers, subscriptions)
+            here = self.get_name(), self.get_namespace()
+            definitions = [e.topic_type_hash for e in own if (e.node_name, e.node_namespace) == here]
             there: dict[str, str] = {}
-            for node in {(endpoint.node_name, endpoint.node_namespace) for endpoint in seen}:
+            different: dict[str, str] = {}
+            for endpoint in seen:
+                node = endpoint.node_name, endpoint.node_namespace
                 if node not in types_of:
                     types_of[node] = published_types(self, *node)
-                there |= {role.name: full_name(*node) for role in roles if role.known_by in types_of[node]}
+                found = {role.name: full_name(*node) for role in roles if role.known_by in types_of[node]}
+                # What was built from other message files would be matched, and read as something else.
+                (there if endpoint.topic_type_hash in definitions else different).update(found)
             self.linked |= there
             absent = [role for role in roles if role.name not in there]
             # Types say who is there, counts that the link itself stands: both are needed before the first message.
             absent = absent or roles[self._matched(topic) :]
-            missing += [f"{role.name} ({name})" for role in absent]
+            kind = description.TOPICS[topic]
+            missing += [
+                f"{role.name} ({name}"
+                + (f"; {different[role.name]} has another definition of {kind})" if role.name in different else ")")
+                for role in absent
+            ]
         return missing
 
     def node_in_role(self, role: NodeDescription) -> str | None:

@@ -14,6 +14,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
 from hsv.errors import ParameterError
+from hsv.graph.description import CONTROLLER, CONTROLLERS
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 
@@ -97,13 +98,20 @@ def refuse_unknown(node: Node, role: str, of_others: frozenset[str]) -> None:
     """
     if not node._parameter_overrides:
         return
-    from hsv.graph.node_parameters import NODE_PARAMETERS  # all components: not for a node that is given nothing
+    from hsv.graph.node_parameters import NODE_PARAMETERS, own_parameters  # all components, for who is given something
 
+    chosen = node._parameter_overrides.get("controller")
+    controller = str(chosen.value) if chosen else ""
     tables = {name: {parameter.name for parameter in table} for name, table in NODE_PARAMETERS.items()}
+    if role == CONTROLLER.name:
+        # It may be told all of the flight: who wrote it knows what it looks at.
+        tables[role] = {p.name for p in own_parameters(controller)}.union(*tables.values())
+    # What a controller of one's own has for parameters it alone knows.
+    known = controller in ("", *CONTROLLERS)
     own = {*node.get_parameters_by_prefix(""), *(p.name for p in LOCKSTEP_PARAMETERS if role), *tables.get(role, ())}
     for name in node._parameter_overrides:
         owner = next((other for other, names in tables.items() if name in names), "")
-        if name in own or (owner and name in of_others):
+        if name in own or (name in of_others and (owner or not known)):
             continue
         nearest = difflib.get_close_matches(name, own.union(*tables.values()) if name in of_others else own, 1, 0.0)
         of = f", {owner} has" if owner else ""

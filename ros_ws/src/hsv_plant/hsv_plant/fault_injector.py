@@ -3,59 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from hsv_msgs.msg import ControlInput, FaultStatus, Run
-from hsv_msgs.msg import Fault as FaultMessage
+from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError
-from hsv.faults.actuator import FAULT_PARAMETERS, Fault, FaultInjector
-from hsv.graph.description import ACTUATOR, CLEAR_FAULT, COMMAND, FAULT_INJECTOR, FAULT_STATUS, INJECT_FAULT
-from hsv.graph.exchange import actuate, fill_fault_status
-from hsv_node.lockstep import PeerNode
+from hsv.faults.actuator import FAULT_PARAMETERS, NEVER, FaultInjector, first_step
+from hsv.graph.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
+from hsv.graph.exchange import fault_in
+from hsv.simulation.blocks import Signals
+from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
 
 
-class FaultInjectorNode(PeerNode):
+class FaultInjectorNode(BlockNode):
     """Turns the command into that of the actuators, and says which faults act."""
 
     def __init__(self) -> None:
         super().__init__(FAULT_INJECTOR, "faults")
-        self.injector = FaultInjector.from_parameters(declare(self, FAULT_PARAMETERS))
-        self._actuator_message, self._status_message = ControlInput(), FaultStatus()
-        self._actuator = self.create_step_publisher(ACTUATOR)
-        self._status = self.create_step_publisher(FAULT_STATUS)
-        self.create_step_subscription(COMMAND, self._on_command)
+        values = declare(self, FAULT_PARAMETERS)
+        self._period = values["period"]
+        self._controller = controller_node(self.controller)
+        self._due = 0
+        """The step that a foreign controller has to answer next."""
+        self.component = self._injector = FaultInjector.from_parameters(values)
         self.create_service(InjectFault, INJECT_FAULT, self._inject)
         self.create_service(ClearFault, CLEAR_FAULT, self._clear)
 
     def start_run(self, run: Run) -> None:
-        """Return to the scheduled faults."""
-        self.injector.reset()
+        """Begin with step 0 and the scheduled faults."""
+        super().start_run(run)
+        self._due = 0
 
-    def _on_command(self, command: ControlInput) -> None:
-        result = actuate(self.injector, command, self._actuator_message)
-        self._actuator.publish(self._actuator_message)
-        fill_fault_status(result, command, FaultMessage, self._status_message)
-        self._status.publish(self._status_message)
-        self.diagnose(command.header.stamp, "faults act" if result.active else "no fault", step=command.step)
+    def on_message(self, topic: str, message: Any) -> None:
+        """Step; a controller that is not of this bench and answers another step than the one due ends the run."""
+        if self._controller.foreign:
+            if message.step != self._due and self.count_publishers(topic) > 1:
+                self.say_foreign(topic, message.step, self._due)
+                return
+            if message.step != self._due:
+                name = self.node_in_role(self._controller) or self._controller.name
+                self.get_logger().fatal(f"{name} answered step {message.step} on {COMMAND}, expected step {self._due}")
+                self.finish(1)
+                return
+            self._due += 1
+        super().on_message(topic, message)
+
+    def stepped(self, signals: Signals) -> None:
+        """Tell whether a fault acts."""
+        self.diagnose(signals.header.stamp, "faults act" if signals.active else "no fault", step=signals.step)
 
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:
-            fault = Fault(request.fault.channel, request.fault.type, request.fault.value)
+            fault = fault_in(request.fault)
+            if not request.duration >= 0.0:
+                raise ParameterError(
+                    f"duration = {request.duration:g}: expected at least 0 (seconds; 0: until cleared)"
+                )
         except ParameterError as error:
             response.accepted, response.message = False, str(error)
             return response
-        response.step = self.injector.inject(fault)
+        steps = first_step(request.duration, self._period) if request.duration else NEVER
+        response.step = self._injector.inject(fault, steps)
         response.accepted = True
-        response.message = f"{fault.type} {fault.value:g} of {fault.channel} from step {response.step} on"
+        until = f" to step {response.step + steps - 1}" if request.duration else " on"
+        response.message = f"{fault} from step {response.step}{until}"
         self.get_logger().info(response.message)
         return response
 
     def _clear(self, request: ClearFault.Request, response: ClearFault.Response) -> ClearFault.Response:
         try:
-            response.step = self.injector.clear(request.channel)
+            response.step = self._injector.clear(request.channel)
         except ParameterError as error:
             response.accepted, response.message = False, str(error)
             return response

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import time
 import uuid
 from collections.abc import Sequence
 
 import numpy as np
-from hsv_msgs.msg import ControlInput, Ready, RecorderProgress, Run, VehicleForces, VehicleState
+from hsv_msgs.msg import Actuator, Ready, RecorderProgress, Run, VehicleState
 from rclpy.duration import Duration
-from rosgraph_msgs.msg import Clock
 
 from hsv.graph.description import (
     ACTUATOR,
-    CLOCK,
     EXIT_DIVERGED,
     FAULT_INJECTOR,
-    FORCES,
     LAST_STATE,
     PLANT,
     READY,
@@ -25,14 +23,19 @@ from hsv.graph.description import (
     RECORDER_PROGRESS,
     RUN,
     STATE,
+    TOPICS,
+    controller_node,
     peers,
 )
-from hsv.graph.exchange import fill_clock, fill_vehicle_forces, fill_vehicle_state, input_vector, stamp_of
+from hsv.graph.exchange import FILL, READ
 from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
+from hsv.simulation.blocks import VEHICLE, Signals
+from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
+from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
@@ -45,33 +48,41 @@ LAST_WORDS = 1.0
 
 
 class PlantNode(LockstepNode):
-    """Publishes state, forces and clock; one step per message of the actuators."""
+    """Publishes measurement, state, forces and clock; one step per message of the actuators."""
 
     def __init__(self) -> None:
         super().__init__(PLANT, "flight")
         refuse_sim_time(self)
         self.values = declare(self, (*PLANT_PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
-        self._peers = peers(PLANT, self.controller, self.recorded)
+        self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
         self._ready: set[str] = set()
-        self._state_message, self._forces_message = VehicleState(), VehicleForces()
-        self._clock_message = Clock()
-        self._state_publisher = self.create_step_publisher(STATE)
-        self._clock_publisher = self.create_step_publisher(CLOCK)
-        self._forces_publisher = self.create_step_publisher(FORCES)
+        messages = {topic: message_class(TOPICS[topic])() for topic in PLANT.publishes}
+        self._state_message: VehicleState = messages[STATE]
+        # The measurement first: the other nodes work on it while the rest is published.
+        self._answers = [
+            (FILL[topic], message, self.create_step_publisher(topic)) for topic, message in messages.items()
+        ]
         self.create_step_subscription(ACTUATOR, self._on_actuator)
         self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
         self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
-        self._run = Run(run_id=uuid.uuid4().hex, period=self.plant.period, last_step=self.plant.steps)
+        self._run = Run(
+            run_id=uuid.uuid4().hex,
+            period=self.plant.period,
+            last_step=self.plant.steps,
+            interface_version=Run.INTERFACE_VERSION,
+        )
         self._announcer = self.create_publisher(Run, RUN, LATCHED)
         self._announcer.publish(self._run)
         self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
         self._broken_off = ""
         """By what, if it was."""
-        self._result = self.plant.reset()
+        self._signals = Signals()
+        self._advance()
         self._started = False
         self._recorded_step = -1
-        self._actuator: np.ndarray | None = None
+        self._answered = False
+        """Whether the actuators' input of this step has come."""
         self._flown = False
         self._begun = time.monotonic()
         self._messages = 0
@@ -87,49 +98,61 @@ class PlantNode(LockstepNode):
         self._messages += 1
         self._continue()
 
-    def _on_actuator(self, message: ControlInput) -> None:
-        if not self._started or message.step != self._result.step:
-            self.say_foreign(ACTUATOR, message.step, self._result.step)
+    def _on_actuator(self, message: Actuator) -> None:
+        signals = self._signals
+        if not self._started or message.step != signals.step:
+            self.say_foreign(ACTUATOR, message.step, signals.step)
             return
         self._messages += 1
-        if self._result.status is FlightStatus.RUNNING:
-            self._actuator = input_vector(message)
+        if signals.status is FlightStatus.RUNNING:
+            READ[ACTUATOR](message, signals)
+            if not np.isfinite(signals.actuator).all():
+                self._refuse_answer(signals)
+                return
+            self._answered = True
         else:
             self._flown = True
         self._continue()
 
+    def _refuse_answer(self, signals: Signals) -> None:
+        name = self.node_in_role(controller_node(self.controller)) or "the controller"
+        numbers = dict(zip(INPUT_NAMES, signals.actuator.tolist(), strict=True))
+        wrong = ", ".join(f"{key} = {value}" for key, value in numbers.items() if not math.isfinite(value))
+        self._broken_off = f"{name}, step {signals.step}: {wrong}, expected a finite number"
+        self.get_logger().fatal(self._broken_off)
+        self.finish(1)
+
     def _continue(self) -> None:
         """Take the next step, unless its input, the recorder or the wall clock has to be waited for."""
-        if self._flown and (not self.recorded or self._recorded_step >= self._result.step):
+        if self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
             self._land()
-        elif self._actuator is not None and self._delay() <= 0.0 and self._room():
-            actuator, self._actuator = self._actuator, None
-            self._result = self.plant.step(actuator)
+        elif self._answered and self._delay() <= 0.0 and self._room():
+            self._answered = False
+            self._advance()
             self._publish()
 
+    def _advance(self) -> None:
+        VEHICLE.step(self.plant, self._signals)
+
     def _room(self) -> bool:
-        return not self.recorded or self._result.step < self._recorded_step + MAX_AHEAD
+        return not self.recorded or self._signals.step < self._recorded_step + MAX_AHEAD
 
     def _delay(self) -> float:
         """Return the wall time (s) until the next state is due."""
         factor = self.values["real_time_factor"]
         if factor == 0.0:
             return 0.0
-        return self._begun + (self._result.step + 1) * self.plant.period / factor - time.monotonic()
+        return self._begun + (self._signals.step + 1) * self.plant.period / factor - time.monotonic()
 
     def _publish(self) -> None:
-        result = self._result
-        state, stamp = self._state_message, stamp_of(result.step, self.plant.period)
-        fill_vehicle_state(result, stamp, state)
-        # The state first: the other nodes work on it while the rest is published.
-        self._state_publisher.publish(state)
-        fill_vehicle_forces(result, stamp, self._forces_message)
-        self._forces_publisher.publish(self._forces_message)
-        fill_clock(stamp, self._clock_message)
-        self._clock_publisher.publish(self._clock_message)
-        if self.values["progress"] and (result.step % 50 == 0 or result.status is not FlightStatus.RUNNING):
-            print(f"step {result.step} of {self.plant.steps}", flush=True)
-        self.diagnose(state.header.stamp, step=result.step, status=result.status.name)
+        signals = self._signals
+        for fill, message, publisher in self._answers:
+            fill(signals, message, message_class)
+            publisher.publish(message)
+        status = FlightStatus(signals.status)
+        if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
+            print(f"step {signals.step} of {self.plant.steps}", flush=True)
+        self.diagnose(self._state_message.header.stamp, step=signals.step, status=status.name)
 
     def poll(self) -> None:
         """Start when everybody is ready, keep the pace, and name whoever is silent for too long."""
@@ -145,7 +168,7 @@ class PlantNode(LockstepNode):
         """Wake in time for the next state when paced."""
         if not self._started:
             return LINK_LOOK
-        return min(max(self._delay(), 0.0), 0.25) if self._actuator is not None and self._room() else 0.25
+        return min(max(self._delay(), 0.0), 0.25) if self._answered and self._room() else 0.25
 
     def stopped(self, signal_number: int) -> int:
         """Say that the flight is incomplete, unless whoever watches it has ended it by Ctrl-C."""
@@ -157,7 +180,7 @@ class PlantNode(LockstepNode):
         if not self._started:
             return
         run, where = f"run {short_id(self._run)}", step_in_words(self._state_message)
-        match self._result.status:
+        match self._signals.status:
             case FlightStatus.RUNNING:
                 self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
             case FlightStatus.FINISHED:
@@ -188,7 +211,7 @@ class PlantNode(LockstepNode):
         return [f"{name} ({self._readies.topic_name})" for name in unready] or self.missing_links()
 
     def _give_up(self, waited: float) -> None:
-        step = self._result.step
+        step = self._signals.step
         behind_recorder = self._flown or not self._room()
         source, topic = (
             (RECORDER, self._confirmations.topic_name)
@@ -202,13 +225,13 @@ class PlantNode(LockstepNode):
         self.finish(1)
 
     def _land(self) -> None:
-        result = self._result
-        if result.status is FlightStatus.DIVERGED:
+        signals = self._signals
+        if signals.status is FlightStatus.DIVERGED:
             self.get_logger().error(
-                f"flight diverged at t = {result.step * self.plant.period:.2f} s: "
-                f"angle of attack {result.state[2]:.3g} rad, pitch angle {result.state[3]:.3g} rad"
+                f"flight diverged at t = {signals.step * self.plant.period:.2f} s: "
+                f"angle of attack {signals.state[2]:.3g} rad, pitch angle {signals.state[3]:.3g} rad"
             )
-        self.finish(EXIT_DIVERGED if result.status is FlightStatus.DIVERGED else 0)
+        self.finish(EXIT_DIVERGED if signals.status is FlightStatus.DIVERGED else 0)
 
 
 def main(args: Sequence[str] | None = None) -> int:

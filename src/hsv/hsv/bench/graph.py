@@ -8,7 +8,6 @@ from pathlib import Path
 
 from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
-from hsv.graph.description import COMPOSED
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.preparation import prepare
@@ -24,8 +23,7 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
     """
     times: dict[int, float] = {}
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
-        prepared = prepare("case1", bag=Path(folder, "bag"))
-        nodes = (COMPOSED,) if composed else prepared.nodes
+        prepared = prepare("case1", bag=Path(folder, "bag"), composed=composed)
         shortened = Path(folder, "duration.yaml")
         shortened.write_text(ParameterSections({"duration": float(duration)}).to_yaml(), encoding="utf-8")
         arguments = parameter_arguments([*prepared.parameter_files, shortened])
@@ -33,7 +31,7 @@ def graph_lap(duration: float, *, composed: bool = False) -> float:
         def on_step(step: int) -> None:
             times[step] = time.perf_counter()
 
-        with Launcher(nodes, arguments, on_step, lambda node, text: None) as launcher:
+        with Launcher(prepared.nodes, arguments, on_step, lambda node, text: None) as launcher:
             launcher.wait()
     first, last = min(times), max(times)
     return (times[last] - times[first]) / (last - first)

@@ -22,6 +22,9 @@ RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time,
 StepTimeoutOption = Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")]
 NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
 ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]
+ExternalOption = Annotated[
+    bool, typer.Option("--external", help="Wait for a controller that is started by hand, any node of yours.")
+]
 NamespaceOption = Annotated[
     str, typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain.")
 ]

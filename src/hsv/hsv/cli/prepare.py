@@ -9,6 +9,7 @@ import typer
 
 from hsv.cli.options import (
     ComposedOption,
+    ExternalOption,
     JsonOption,
     NamespaceOption,
     NewBagOption,
@@ -23,6 +24,7 @@ def prepare(
     scenario: ScenarioArgument = "case1",
     real_time_factor: RealTimeFactorOption = 0.0,
     composed: ComposedOption = False,
+    external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = 10.0,
@@ -42,7 +44,7 @@ def prepare(
     import tempfile
 
     from hsv.cli.targets import check_folder
-    from hsv.graph.description import COMPOSED, LANDED, ROOT, checked_namespace, graph
+    from hsv.graph.description import LANDED, ROOT, checked_namespace, graph
     from hsv.graph.launcher import claim_graph
     from hsv.graph.preparation import prepare as prepare_run
 
@@ -54,13 +56,19 @@ def prepare(
     target = folder or Path(tempfile.mkdtemp(prefix="hsv_run_"))
     try:
         prepared = prepare_run(
-            scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout, folder=target
+            scenario,
+            bag=bag,
+            real_time_factor=real_time_factor,
+            step_timeout=step_timeout,
+            folder=target,
+            composed=composed,
+            external=external,
         )
     except BaseException:
         if not folder:
             shutil.rmtree(target)
         raise
-    nodes = [COMPOSED] if composed else prepared.nodes
+    nodes = prepared.nodes
     if json:
         print_json(
             {

@@ -41,13 +41,14 @@ def replay(
     from hsv.recording.reader import Bag
     from hsv.replay import engine
     from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
+    from hsv.replay.processes import processes as processes_of
 
     opened = Bag(bag)
     supply(opened, design, scenario)
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)
     controller = controller_of(values)
-    processes = engine.chosen(controller)
+    processes = processes_of(controller)
     if node and node not in processes:
         raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}")
     if node and rerun:

@@ -8,6 +8,7 @@ import typer
 
 from hsv.cli.options import (
     ComposedOption,
+    ExternalOption,
     JsonOption,
     NamespaceOption,
     NewBagOption,
@@ -24,6 +25,7 @@ def run(
     scenario: ScenarioArgument = "case1",
     real_time_factor: RealTimeFactorOption = 0.0,
     composed: ComposedOption = False,
+    external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = 10.0,
@@ -46,7 +48,14 @@ def run(
     from hsv.graph.preparation import prepare
 
     namespace = checked_namespace(namespace)
-    prepared = prepare(scenario, bag=bag, real_time_factor=real_time_factor, step_timeout=step_timeout)
+    prepared = prepare(
+        scenario,
+        bag=bag,
+        real_time_factor=real_time_factor,
+        step_timeout=step_timeout,
+        composed=composed,
+        external=external,
+    )
     loaded = prepared.scenario
     clock: dict[str, float] = {}
 
@@ -61,5 +70,5 @@ def run(
             clock["end"] = time.monotonic()
             show(number)
 
-        fly_graph(prepared, composed=composed, namespace=namespace, on_step=step, on_line=line)
+        fly_graph(prepared, namespace=namespace, on_step=step, on_line=line)
     conclude_flight(prepared.bag, report=report, units=units, json=json, wall_time=clock["end"] - clock["start"])

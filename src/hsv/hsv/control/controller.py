@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from hsv.errors import RunError
+from hsv.errors import ParameterError, RunError
 from hsv.parameters import Parameter
 from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
@@ -70,6 +70,11 @@ class ControllerResult:
     """u (2), within the limits"""
     u_unsaturated: np.ndarray
     """(2) before the limits"""
+
+    @property
+    def saturated(self) -> np.ndarray:
+        """Which of the two (2) the limits have changed."""
+        return np.asarray(self.input != self.u_unsaturated)
 
 
 class StepKernel(NamedTuple):
@@ -114,6 +119,29 @@ class ControllerClass(Protocol):
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
         """Return a controller from all flat parameters of a flight and its design, ``None`` where it has none."""
+
+
+class ElsewhereController(Controller):
+    """In place of a controller that is a ROS 2 node of its own: it cannot be stepped here."""
+
+    def __init__(self, name: str) -> None:
+        """Call it by its ``name`` in errors."""
+        self._name = name
+
+    def reset(self) -> None:
+        """Nothing is here to be reset."""
+
+    def step(self, inputs: ControllerInput) -> ControllerResult:
+        """Refuse.
+
+        Raises:
+            ParameterError: Always.
+        """
+        raise self.refusal()
+
+    def refusal(self) -> ParameterError:
+        """Return the error of who wants to fly it here."""
+        return ParameterError(f"controller = {self._name!r}: a node of its own, expected hsv run to fly it")
 
 
 class ForeignController(Controller):

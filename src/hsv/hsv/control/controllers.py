@@ -18,7 +18,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
-from hsv.control.controller import Controller, ControllerClass, ForeignController
+from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
 from hsv.errors import HsvError, ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.units import parse_quantity
@@ -34,8 +34,16 @@ SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc":
 
 _DEFAULT = "tube_mpc"
 
+NODE = "node:"
+"""With which the name of a controller begins that is a ROS 2 node of its own, ``node:package/executable``; alone where
+it is started by hand."""
+
 CONTROLLER_PARAMETERS = (
-    Parameter("controller", _DEFAULT, "what closes the loop: a registered name, or package.module:Class"),
+    Parameter(
+        "controller",
+        _DEFAULT,
+        "what closes the loop: a registered name, package.module:Class, or node:package/executable",
+    ),
 )
 
 
@@ -50,16 +58,7 @@ def controller_class(name: str) -> ControllerClass:
     Raises:
         ParameterError: There is none of that name, or it cannot be loaded.
     """
-    place = SHIPPED_CONTROLLERS.get(name, name)
-    if ":" not in place:
-        registered = [entry.value for entry in entry_points(group=GROUP) if entry.name == name]
-        if not registered:
-            near = difflib.get_close_matches(name, controller_names(), 1)
-            hint = f" (did you mean {near[0]!r}?)" if near else ""
-            raise ParameterError(
-                f"controller = {name!r}: expected one of {', '.join(controller_names())} or package.module:Class{hint}"
-            )
-        place = registered[0]
+    place = class_place(name)
     module, _, attribute = place.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute)
@@ -71,6 +70,25 @@ def controller_class(name: str) -> ControllerClass:
     if lacking:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a class of a controller")
     return found
+
+
+def class_place(name: str) -> str:
+    """Return where the class of a controller is, ``package.module:Class``, without loading it.
+
+    Raises:
+        ParameterError: There is none of that name.
+    """
+    place = SHIPPED_CONTROLLERS.get(name, name)
+    if ":" in place:
+        return place
+    for entry in entry_points(group=GROUP):
+        if entry.name == name:
+            return entry.value
+    near = difflib.get_close_matches(name, controller_names(), 1)
+    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    raise ParameterError(
+        f"controller = {name!r}: expected one of {', '.join(controller_names())} or package.module:Class{hint}"
+    )
 
 
 def table_values(kind: ControllerClass, tables: Mapping[str, Mapping[str, object]]) -> dict[str, Any]:
@@ -109,6 +127,8 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
         ParameterError, DesignError: A wrong value, named; or the controller cannot be built.
     """
     name = str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+    if name.startswith(NODE):
+        return ElsewhereController(name)
     kind = controller_class(name)
     try:
         built = kind.from_parameters(values, design)

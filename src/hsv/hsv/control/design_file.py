@@ -204,12 +204,18 @@ class ControlDesign:
         return design
 
 
+NO_DESIGN = "none"
+"""Name of the design in the parameters of a node that flies without one: nodes have a default."""
+
+
 def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
     """Return the design in the flat parameters of a flight, ``None`` where there is none.
 
     Raises:
         DesignError: As :meth:`ControlDesign.from_parameters`.
     """
+    if values.get("design.name") == NO_DESIGN:
+        return None
     flown_with_any = {parameter.name for parameter in DESIGN_NOTCH_PARAMETERS}
     brought = {parameter.name for parameter in DESIGN_PARAMETERS} - flown_with_any - {TAU.name}
     return ControlDesign.from_parameters(values) if brought & values.keys() else None

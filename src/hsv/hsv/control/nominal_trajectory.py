@@ -78,6 +78,8 @@ class NominalResult:
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
+    PARAMETERS = NOMINAL_PARAMETERS
+
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None
     ) -> None:

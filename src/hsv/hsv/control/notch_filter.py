@@ -222,6 +222,8 @@ class NotchResult:
 class NotchFilter:
     """Sections in series on the pitch rate; without sections the pitch rate passes."""
 
+    PARAMETERS = NOTCH_PARAMETERS
+
     def __init__(self, sections: Sequence[NotchSection], period: float) -> None:
         self.sections = tuple(sections)
         self.data = discretise(sections, period)

@@ -77,7 +77,7 @@ class RobustMpc(Controller):
             inside=False,
             component="",
             u_feedback=u_feedback,
-            saturated=u != total,
+            u_nominal=np.zeros(2),
             tau=np.ones(1),
             status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,
         )

@@ -182,7 +182,7 @@ class TubeResult(ControllerResult):
     inside: bool
     component: str
     u_feedback: np.ndarray
-    saturated: np.ndarray
+    u_nominal: np.ndarray
     tau: np.ndarray
     status: TubeStatusCode
 
@@ -301,7 +301,7 @@ class TubeLaw(Controller):
             inside=inside,
             component=tube.farthest(error) if tube and not inside else "",
             u_feedback=u_feedback,
-            saturated=u != total,
+            u_nominal=inputs.nominal_input,
             tau=compact(self._entries[active][1]),
             status=status,
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numba import njit
@@ -20,16 +20,19 @@ NEVER = 2**62
 
 @dataclass(frozen=True)
 class FaultType:
-    """One kind of fault: how it is coded for :func:`faulty`, what its value means and which values it admits."""
+    """One kind of fault: its code for :func:`faulty`, what its parameter is called and means, what that may be."""
 
     code: int
+    parameter: str
     meaning: str
     minimum: float
     maximum: float
 
 
 FAULT_TYPES = {
-    "loss_of_effectiveness": FaultType(0, "the actuator moves by value times the command (paper eq. 15)", 0.0, 1.0),
+    "loss_of_effectiveness": FaultType(
+        0, "effectiveness", "the actuator moves by value times the command (paper eq. 15)", 0.0, 1.0
+    ),
 }
 """The vocabulary: parser, help text and documentation are made from it."""
 
@@ -64,6 +67,26 @@ class Fault:
             raise ParameterError(
                 f"fault.value = {self.value!r}: expected {kind.minimum:g} to {kind.maximum:g} for {self.type}"
             )
+
+    @classmethod
+    def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
+        """Return the fault with these ``parameters`` of its type, by name.
+
+        Raises:
+            ParameterError: As above, or a parameter is missing or not one of the type.
+        """
+        due = FAULT_TYPES[kind].parameter if kind in FAULT_TYPES else ""
+        if due and [*parameters] != [due]:
+            raise ParameterError(f"fault.parameters = {', '.join(parameters) or 'none'}: expected {due} for {kind}")
+        return cls(channel, kind, parameters.get(due, math.nan))
+
+    def __str__(self) -> str:
+        return f"{self.type} {self.value:g} of {self.channel}"
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """The parameters of its type, by name."""
+        return {FAULT_TYPES[self.type].parameter: self.value}
 
 
 class FaultSchedule(NamedTuple):
@@ -117,6 +140,8 @@ class FaultResult:
 @dataclass
 class FaultInjector:
     """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on."""
+
+    PARAMETERS: ClassVar = FAULT_PARAMETERS
 
     scheduled: Sequence[tuple[Fault, int] | tuple[Fault, int, int]] = ()
     """Faults with their first step and, if they end, the first step without."""
@@ -175,10 +200,10 @@ class FaultInjector:
             "fault.stops": [min(e.stop * period, NEVER_TIME) for e in self._entries],
         }
 
-    def inject(self, fault: Fault) -> int:
-        """Start ``fault`` with the next step, in place of what acts on its channel; return that step."""
+    def inject(self, fault: Fault, steps: int = NEVER) -> int:
+        """Start ``fault`` with the next step, for so many, in place of what acts on its channel; return that step."""
         self.clear(fault.channel)
-        self._entries.append(_Entry(fault, self._next))
+        self._entries.append(_Entry(fault, self._next, min(self._next + steps, NEVER)))
         self._compile()
         return self._next
 

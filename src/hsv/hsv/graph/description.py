@@ -8,18 +8,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from typing import Any
 
+from hsv.control.controllers import NODE
 from hsv.errors import ParameterError
+from hsv.simulation import blocks
+from hsv.simulation.blocks import Block
 
 CLOCK = "clock"
 STATE = "hsv/state"
+MEASUREMENT = "hsv/measurement"
 FORCES = "hsv/forces"
 FILTERED_STATE = "hsv/filtered_state"
 NOMINAL = "hsv/nominal"
 COMMAND = "hsv/command"
 TUBE_STATUS = "hsv/tube_status"
 ACTUATOR = "hsv/actuator"
-FAULT_STATUS = "hsv/fault_status"
 RUN = "hsv/run"
 READY = "hsv/ready"
 RECORDER_PROGRESS = "hsv/recorder_progress"
@@ -31,16 +35,17 @@ CLEAR_FAULT = "hsv/clear_fault"
 
 TOPICS = {
     CLOCK: "rosgraph_msgs/msg/Clock",
+    MEASUREMENT: "hsv_msgs/msg/Measurement",
     STATE: "hsv_msgs/msg/VehicleState",
     FORCES: "hsv_msgs/msg/VehicleForces",
     FILTERED_STATE: "hsv_msgs/msg/FilteredState",
     NOMINAL: "hsv_msgs/msg/NominalState",
     COMMAND: "hsv_msgs/msg/ControlInput",
     TUBE_STATUS: "hsv_msgs/msg/TubeStatus",
-    ACTUATOR: "hsv_msgs/msg/ControlInput",
-    FAULT_STATUS: "hsv_msgs/msg/FaultStatus",
+    ACTUATOR: "hsv_msgs/msg/Actuator",
 }
-"""Topics with exactly one message a step, in the order in which a step is recorded."""
+"""Topics with exactly one message a step, in the order in which a step is recorded; which of them there are depends on
+the controller, see :func:`step_topics`."""
 
 LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready"}
 """Announcements that late joiners receive."""
@@ -76,6 +81,7 @@ class NodeDescription:
     package: str
     executable: str
     publishes: tuple[str, ...]
+    """In the order in which a step publishes them: first what others wait for."""
     subscribes: tuple[str, ...]
     known_by: str = ""
     """Type of a message that only this role publishes: who does plays the role, whatever it and its topics are called.
@@ -85,6 +91,10 @@ class NodeDescription:
 
     announces: tuple[str, ...] = ()
     """Further topics that only this role publishes, not in every step."""
+    block: Block | None = None
+    """What it steps, if it does."""
+    foreign: bool = False
+    """Whether it is not one of this bench's: it knows the messages alone, and announces itself to nobody."""
 
     @property
     def own_topics(self) -> tuple[str, ...]:
@@ -101,30 +111,35 @@ RECORDER = NodeDescription(
     "hsv_msgs/msg/RecorderProgress",
     (RECORDER_PROGRESS,),
 )
-PLANT = NodeDescription(
-    "plant", "hsv_plant", "plant", (CLOCK, STATE, FORCES), (ACTUATOR,), TOPICS[STATE], (RUN, LAST_STATE)
-)
-NOTCH_FILTER = NodeDescription(
-    "notch_filter", "hsv_ctrl", "notch_filter", (FILTERED_STATE,), (STATE,), TOPICS[FILTERED_STATE]
-)
-NOMINAL_TRAJECTORY = NodeDescription(
-    "nominal_trajectory", "hsv_ctrl", "nominal_trajectory", (NOMINAL,), (STATE,), TOPICS[NOMINAL]
-)
-TUBE_MPC = NodeDescription(
-    "tube_mpc", "hsv_ctrl", "tube_mpc", (COMMAND, TUBE_STATUS), (FILTERED_STATE, NOMINAL), TOPICS[TUBE_STATUS]
-)
-FAULT_INJECTOR = NodeDescription(
-    "fault_injector", "hsv_plant", "fault_injector", (ACTUATOR, FAULT_STATUS), (COMMAND,), TOPICS[FAULT_STATUS]
-)
 
-ROBUST_MPC = replace(TUBE_MPC, name="robust_mpc", executable="robust_mpc")
-"""Flies in place of the Tube-MPC controller, on the same topics."""
 
-COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
-"""All nodes of the graph in one process."""
+def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDescription:
+    """Return the node that steps ``block``, known by the type of the topic ``first``."""
+    publishes, subscribes = (tuple(f"hsv/{signal}" for signal in side) for side in (block.outputs, block.inputs))
+    return NodeDescription(block.name, package, block.name, publishes, subscribes, TOPICS[first], block=block, **others)
+
+
+NOTCH_FILTER = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
+NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL)
+FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
+
+CONTROLLER = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
+"""Flies any controller of a class of one's own, named by the parameter ``controller``."""
+
+TUBE_MPC, ROBUST_MPC = (
+    replace(CONTROLLER, name=name, executable=name, publishes=(COMMAND, TUBE_STATUS))
+    for name in ("tube_mpc", "robust_mpc")
+)
+"""Controllers with a node and a name of their own, on the same topics."""
 
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
+# The vehicle takes what was commanded in the step before, so that its input is no input of its block's step.
+PLANT = _stepping(blocks.VEHICLE, "hsv_plant", STATE, announces=(RUN, LAST_STATE))
+PLANT = replace(PLANT, publishes=(*PLANT.publishes, CLOCK), subscribes=(ACTUATOR,))
+
+COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
+"""All nodes of the graph in one process."""
 
 PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator", (), ())
 """Not of the graph: takes the place of all others when one node is replayed."""
@@ -138,15 +153,37 @@ FAULT, SET_PARAMETER, TOPIC = (
 """Not of the graph: commands that ask a running one."""
 
 
+def controller_node(controller: str) -> NodeDescription:
+    """Return the node of a controller, named as in a scenario.
+
+    Raises:
+        ParameterError: A node without a package or an executable.
+    """
+    if not controller.startswith(NODE):
+        return CONTROLLERS.get(controller, CONTROLLER)
+    package, slash, executable = controller.removeprefix(NODE).partition("/")
+    if controller != NODE and not (
+        slash and re.fullmatch(r"[\w.-]+", package) and re.fullmatch(r"[\w.-]+", executable)
+    ):
+        raise ParameterError(f"controller = {controller!r}: expected {NODE}package/executable, or {NODE} alone")
+    return replace(CONTROLLER, package=package, executable=executable, foreign=True)
+
+
 def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
     """Return all nodes of the graph with the named controller, in start order."""
-    return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLERS[controller], FAULT_INJECTOR, PLANT)
+    return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, controller_node(controller), FAULT_INJECTOR, PLANT)
+
+
+def step_topics(controller: str) -> tuple[str, ...]:
+    """Return the topics with one message a step in a graph with the named controller, in order of recording."""
+    published = {topic for node in graph(controller) for topic in node.publishes}
+    return tuple(topic for topic in TOPICS if topic in published)
 
 
 def peers(me: NodeDescription, controller: str, recorded: bool) -> list[NodeDescription]:
     """Return the other nodes of the graph that ``me`` flies in, the recorder only if ``recorded``."""
     nodes = graph(me.name if me.name in CONTROLLERS else controller)
-    return [node for node in nodes if node is not me and (recorded or node is not RECORDER)]
+    return [node for node in nodes if node.name != me.name and (recorded or node is not RECORDER)]
 
 
 def links(me: NodeDescription, controller: str, recorded: bool) -> list[tuple[str, NodeDescription]]:

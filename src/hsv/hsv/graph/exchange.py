@@ -1,7 +1,7 @@
-"""From messages to the components and back: what each process of the graph does in a step.
+"""Between messages and the signals of the loop, one pair of functions a topic.
 
-The nodes call these functions with ROS 2 messages, the replay with those of a bag's own definitions. Messages are
-objects with the fields of their type as attributes; those handed out are filled in place.
+The nodes use them with ROS 2 messages, the replay with those of a bag's own definitions. Messages are objects with the
+fields of their type as attributes; those handed out are filled in place.
 """
 
 from __future__ import annotations
@@ -11,19 +11,26 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.controller import ControllerInput
+from hsv.errors import ParameterError
+from hsv.graph.description import (
+    ACTUATOR,
+    CLOCK,
+    COMMAND,
+    FILTERED_STATE,
+    FORCES,
+    MEASUREMENT,
+    NOMINAL,
+    STATE,
+    TUBE_STATUS,
+)
 
-if TYPE_CHECKING:  # a node imports its own component alone
-    from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory
-    from hsv.control.notch_filter import NotchFilter, NotchResult
-    from hsv.control.robust_mpc import RobustMpc
-    from hsv.control.tube_law import TubeLaw, TubeResult
-    from hsv.faults.actuator import FaultInjector, FaultResult
-    from hsv.vehicle.plant import PlantResult
+if TYPE_CHECKING:
+    from hsv.faults.actuator import Fault
+    from hsv.simulation.blocks import Signals
 
 Message = Any
-
-NO_GAIN = np.empty(0)
+MessageClass = Callable[[str], Callable[..., Message]]
+"""From ``package/msg/Type`` to what makes a message of it."""
 
 
 def state_vector(message: Message) -> np.ndarray:
@@ -71,102 +78,166 @@ def fill_input(message: Message, u: np.ndarray) -> None:
     message.fuel_equivalence_ratio, message.elevator_deflection = u.tolist()
 
 
+def _place(message: Message, signals: Signals) -> None:
+    signals.header, signals.step = message.header, message.step
+
+
+def _read_measurement(message: Message, signals: Signals) -> None:
+    _place(message, signals)
+    signals.measurement, signals.status = state_vector(message.state), message.status
+
+
+def _read_state(message: Message, signals: Signals) -> None:
+    _place(message, signals)
+    signals.state, signals.status = state_vector(message), message.status
+
+
+def _read_filtered_state(message: Message, signals: Signals) -> None:
+    _read_measurement(message, signals)
+    signals.filtered_pitch_rate = message.filtered_pitch_rate
+    signals.filter_state = np.asarray(message.filter_state)
+
+
+def _read_nominal(message: Message, signals: Signals) -> None:
+    _place(message, signals)
+    signals.reference, signals.reference_input = state_vector(message.reference), input_vector(message.reference_input)
+    signals.deviation, signals.nominal_input = state_vector(message.deviation), input_vector(message.input)
+
+
+def _read_command(message: Message, signals: Signals) -> None:
+    _place(message, signals)
+    signals.command = input_vector(message)
+
+
+def _read_actuator(message: Message, signals: Signals) -> None:
+    _place(message, signals)
+    signals.actuator = input_vector(message)
+
+
+READ: dict[str, Callable[[Message, Signals], None]] = {
+    MEASUREMENT: _read_measurement,
+    STATE: _read_state,
+    FILTERED_STATE: _read_filtered_state,
+    NOMINAL: _read_nominal,
+    COMMAND: _read_command,
+    ACTUATOR: _read_actuator,
+}
+"""By topic, from its message to the signals."""
+
+
 def stamp_of(step: int, period: float) -> tuple[int, int]:
     """Return seconds and nanoseconds of simulated time at ``step``."""
     return divmod(round(step * period * 1e9), 1_000_000_000)
 
 
-def fill_vehicle_state(result: PlantResult, stamp: tuple[int, int], state: Message) -> None:
-    """Fill VehicleState from a step of the plant."""
-    state.header.stamp.sec, state.header.stamp.nanosec = stamp
-    state.step = result.step
-    fill_state(state, result.state)
-    state.status = int(result.status)
+def _begin(signals: Signals, message: Message) -> None:
+    """Head a message of the plant, with which a step begins."""
+    message.header.stamp.sec, message.header.stamp.nanosec = stamp_of(signals.step, signals.period)
+    message.step = signals.step
 
 
-def fill_vehicle_forces(result: PlantResult, stamp: tuple[int, int], forces: Message) -> None:
-    """Fill VehicleForces from a step of the plant."""
-    forces.header.stamp.sec, forces.header.stamp.nanosec = stamp
-    forces.step = result.step
-    forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = result.forces
+def _answer(signals: Signals, message: Message) -> None:
+    """Head a message with what those that it answers are headed."""
+    message.header, message.step = signals.header, signals.step
 
 
-def fill_clock(stamp: tuple[int, int], clock: Message) -> None:
-    """Fill Clock."""
-    clock.clock.sec, clock.clock.nanosec = stamp
+def _fill_clock(signals: Signals, clock: Message, _: MessageClass) -> None:
+    clock.clock.sec, clock.clock.nanosec = stamp_of(signals.step, signals.period)
 
 
-def filter_state(notch: NotchFilter, state: Message, filtered: Message) -> NotchResult:
-    """Step the notch filter: VehicleState to FilteredState."""
-    result = notch.step(state.pitch_rate)
-    filtered.header, filtered.step, filtered.status = state.header, state.step, state.status
-    copy = filtered.state
-    copy.altitude, copy.velocity = state.altitude, state.velocity
-    copy.angle_of_attack, copy.pitch_angle, copy.pitch_rate = state.angle_of_attack, state.pitch_angle, state.pitch_rate
-    copy.elastic_coordinate, copy.elastic_rate = state.elastic_coordinate, state.elastic_rate
-    filtered.filtered_pitch_rate = result.filtered_pitch_rate
-    filtered.filter_state = result.filter_state
-    return result
+def _fill_measurement(signals: Signals, measurement: Message, _: MessageClass) -> None:
+    _begin(signals, measurement)
+    fill_state(measurement.state, signals.measurement)
+    measurement.status = int(signals.status)
 
 
-def plan_nominal(trajectory: NominalTrajectory, state: Message, nominal: Message) -> NominalResult:
-    """Step the nominal trajectory: VehicleState to NominalState."""
-    result = trajectory.step(state_vector(state))
-    nominal.header, nominal.step = state.header, state.step
-    fill_state(nominal.reference, result.reference)
-    fill_input(nominal.reference_input, result.reference_input)
-    fill_state(nominal.deviation, result.deviation)
-    fill_input(nominal.input, result.input)
-    nominal.gain = NO_GAIN if result.in_family else result.gain.ravel()
-    nominal.gain_index, nominal.status = result.gain_index, int(result.status)
-    return result
+def _fill_vehicle_state(signals: Signals, state: Message, _: MessageClass) -> None:
+    _begin(signals, state)
+    fill_state(state, signals.state)
+    state.status = int(signals.status)
 
 
-def control(law: TubeLaw | RobustMpc, filtered: Message, nominal: Message, command: Message) -> TubeResult:
-    """Step the controller: FilteredState and NominalState to ControlInput."""
-    result = law.step(
-        ControllerInput(
-            filtered.step,
-            state_vector(filtered.state),
-            filtered.filtered_pitch_rate,
-            np.asarray(filtered.filter_state),
-            state_vector(nominal.reference),
-            input_vector(nominal.reference_input),
-            state_vector(nominal.deviation),
-            input_vector(nominal.input),
-        )
-    )
-    command.header, command.step = filtered.header, filtered.step
-    fill_input(command, result.input)
-    return result
+def _fill_forces(signals: Signals, forces: Message, _: MessageClass) -> None:
+    _begin(signals, forces)
+    forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = signals.forces
+    fill_input(forces.effector, signals.effector)
 
 
-def fill_tube_status(
-    result: TubeResult, filtered: Message, nominal: Message, follows_nominal: bool, status: Message
-) -> None:
-    """Fill TubeStatus from a step of the controller; ``follows_nominal``: the nominal input is part of its command."""
-    status.header, status.step = filtered.header, filtered.step
+def _fill_filtered_state(signals: Signals, filtered: Message, _: MessageClass) -> None:
+    _answer(signals, filtered)
+    fill_state(filtered.state, signals.measurement)
+    filtered.filtered_pitch_rate = signals.filtered_pitch_rate
+    filtered.filter_state = signals.filter_state
+    filtered.status = signals.status
+
+
+def _fill_nominal(signals: Signals, nominal: Message, _: MessageClass) -> None:
+    _answer(signals, nominal)
+    fill_state(nominal.reference, signals.reference)
+    fill_input(nominal.reference_input, signals.reference_input)
+    fill_state(nominal.deviation, signals.deviation)
+    fill_input(nominal.input, signals.nominal_input)
+    nominal.gain = signals.gain.ravel()
+    nominal.gain_index, nominal.status = signals.gain_index, int(signals.nominal_status)
+
+
+def _fill_command(signals: Signals, command: Message, _: MessageClass) -> None:
+    _answer(signals, command)
+    fill_input(command, signals.command)
+    command.saturated[:] = signals.answer.saturated.tolist()
+
+
+def _fill_tube_status(signals: Signals, status: Message, _: MessageClass) -> None:
+    _answer(signals, status)
+    result: Any = signals.answer
     status.error = result.error
     status.tube_centre, status.tube_half_width = result.tube_centre, result.tube_half_width
     status.level, status.inside = result.level, result.inside
-    if follows_nominal:
-        status.u_nominal = nominal.input
-    status.u_reference = nominal.reference_input
+    fill_input(status.u_nominal, result.u_nominal)
+    fill_input(status.u_reference, signals.reference_input)
     fill_input(status.u_feedback, result.u_feedback)
     fill_input(status.u_unsaturated, result.u_unsaturated)
-    status.saturated[:] = result.saturated.tolist()
     status.tau, status.status = result.tau, int(result.status)
 
 
-def actuate(injector: FaultInjector, command: Message, actuator: Message) -> FaultResult:
-    """Step the fault injector: ControlInput of the controller to ControlInput of the actuators."""
-    result = injector.step(command.step, input_vector(command))
-    actuator.header, actuator.step = command.header, command.step
-    fill_input(actuator, result.actuator)
-    return result
+def fault_in(message: Message) -> Fault:
+    """Return the fault in a message Fault.
+
+    Raises:
+        ParameterError: An unknown channel, type or parameter, or a value that is not admitted.
+    """
+    from hsv.faults.actuator import Fault  # of the nodes, the fault injector alone needs it
+
+    names, values = message.parameter_names, message.parameter_values
+    if len(names) != len(values):
+        raise ParameterError(f"fault.parameter_values: {len(values)} values, expected one a name, {len(names)}")
+    return Fault.of(message.channel, message.type, dict(zip(names, map(float, values), strict=True)))
 
 
-def fill_fault_status(result: FaultResult, command: Message, fault: Callable[..., Message], status: Message) -> None:
-    """Fill FaultStatus from a step of the fault injector; ``fault`` makes a message Fault."""
-    status.header, status.step = command.header, command.step
-    status.active = [fault(channel=f.channel, type=f.type, value=f.value) for f in result.active]
+def _fill_actuator(signals: Signals, actuator: Message, message_class: MessageClass) -> None:
+    _answer(signals, actuator)
+    fill_input(actuator, signals.actuator)
+    fault = message_class("hsv_msgs/msg/Fault")
+    actuator.active = [
+        fault(
+            channel=acting.channel,
+            type=acting.type,
+            parameter_names=list(acting.parameters),
+            parameter_values=np.array([*acting.parameters.values()]),
+        )
+        for acting in signals.active
+    ]
+
+
+FILL: dict[str, Callable[[Signals, Message, MessageClass], None]] = {
+    CLOCK: _fill_clock,
+    MEASUREMENT: _fill_measurement,
+    STATE: _fill_vehicle_state,
+    FORCES: _fill_forces,
+    FILTERED_STATE: _fill_filtered_state,
+    NOMINAL: _fill_nominal,
+    COMMAND: _fill_command,
+    TUBE_STATUS: _fill_tube_status,
+    ACTUATOR: _fill_actuator,
+}
+"""By topic, from the signals to its message."""

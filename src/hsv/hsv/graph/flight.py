@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hsv.errors import RecordingError, RunError
-from hsv.graph.description import COMPOSED, ROOT
+from hsv.graph.description import ROOT
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
@@ -15,16 +15,14 @@ from hsv.graph.preparation import PreparedRun
 def fly_graph(
     prepared: PreparedRun,
     *,
-    composed: bool = False,
     namespace: str = ROOT,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
 ) -> None:
-    """Fly ``prepared`` with its node processes, or with all nodes in one, recorded to its bag.
+    """Fly ``prepared`` with its processes, recorded to its bag.
 
     Args:
         prepared: What :func:`hsv.graph.preparation.prepare` returns.
-        composed: All nodes in one process.
         namespace: Namespace of all nodes, as :func:`hsv.graph.description.checked_namespace` returns it.
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
@@ -32,11 +30,10 @@ def fly_graph(
     Raises:
         RunError: A process failed or is not built, or the bag cannot be mended; last words are in the message.
     """
-    started = (COMPOSED,) if composed else prepared.nodes
     failures = []
     try:
         arguments = parameter_arguments(prepared.parameter_files)
-        with Launcher(started, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
+        with Launcher(prepared.nodes, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
             launcher.wait()
     except RunError as error:
         failures.append(str(error))

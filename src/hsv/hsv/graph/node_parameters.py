@@ -1,29 +1,38 @@
-"""Every parameter of every node: those of its component, and those of its part in the graph."""
+"""Every parameter of every node: those of the block that it steps, and those of its part in the graph."""
 
 from __future__ import annotations
 
+from hsv.control.controllers import controller_class
 from hsv.control.design_file import DESIGN_PARAMETERS
-from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
-from hsv.control.notch_filter import NOTCH_PARAMETERS
-from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
-from hsv.control.tube_law import TUBE_PARAMETERS
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
-from hsv.faults.actuator import FAULT_PARAMETERS
+from hsv.graph.description import RECORDER, ROBUST_MPC, TUBE_MPC
 from hsv.graph.part_parameters import PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.parameters import Parameter
-from hsv.vehicle.plant import PLANT_PARAMETERS
+from hsv.simulation.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
+
+
+def _designed(own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    names = {parameter.name for parameter in own}
+    return (*own, *(parameter for parameter in DESIGN_PARAMETERS if parameter.name not in names))
+
+
+def own_parameters(controller: str) -> tuple[Parameter, ...]:
+    """Return the parameters of the node that flies a controller, whose class is loaded.
+
+    Raises:
+        ParameterError: There is no such controller, or it cannot be loaded.
+    """
+    return _designed(tuple(controller_class(controller).PARAMETERS))
+
 
 NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
-    "plant": (*PLANT_PARAMETERS, *PACE_PARAMETERS),
-    "notch_filter": NOTCH_PARAMETERS,
-    "nominal_trajectory": (*NOMINAL_PARAMETERS, *DESIGN_PARAMETERS),
-    "tube_mpc": (
-        *TUBE_PARAMETERS,
-        *CERTIFICATE_PARAMETERS,
-        *(p for p in DESIGN_PARAMETERS if p.name not in {own.name for own in TUBE_PARAMETERS}),
-    ),
-    "robust_mpc": (*ROBUST_MPC_PARAMETERS, *DESIGN_PARAMETERS),
-    "fault_injector": FAULT_PARAMETERS,
-    "recorder": RECORDER_PARAMETERS,
+    VEHICLE.name: (*VEHICLE.parameters, *PACE_PARAMETERS),
+    NOTCH_FILTER.name: NOTCH_FILTER.parameters,
+    NOMINAL_TRAJECTORY.name: _designed(NOMINAL_TRAJECTORY.parameters),
+    TUBE_MPC.name: (*own_parameters(TUBE_MPC.name), *CERTIFICATE_PARAMETERS),
+    ROBUST_MPC.name: own_parameters(ROBUST_MPC.name),
+    FAULT_INJECTOR.name: FAULT_INJECTOR.parameters,
+    RECORDER.name: RECORDER_PARAMETERS,
 }
-"""By node; those of every node, :data:`hsv.graph.part_parameters.LOCKSTEP_PARAMETERS`, come to each."""
+"""By node, but that of a controller of one's own; those of every node,
+:data:`hsv.graph.part_parameters.LOCKSTEP_PARAMETERS`, come to each."""

@@ -5,15 +5,12 @@ Apart, so that a node does not import every other node's component: five start a
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.graph.description import CONTROLLERS
 from hsv.parameters import Parameter
 
 LOCKSTEP_PARAMETERS = (
     Parameter("recorder", True, "whether a recorder belongs to the graph"),
-    *(replace(parameter, choices=tuple(CONTROLLERS)) for parameter in CONTROLLER_PARAMETERS),
+    *CONTROLLER_PARAMETERS,
 )
 """Of every node."""
 

@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hsv.control.design_file import DESIGN_PARAMETERS, digest, find_design, read_parameters
+from hsv.control.controllers import NODE
+from hsv.control.design_file import DESIGN_PARAMETERS, NO_DESIGN, digest, find_design, read_parameters
 from hsv.design.certificate import certificate_path, find_certificate
-from hsv.errors import QuantityError, RecordingError, ScenarioError
-from hsv.graph.description import CONTROLLERS, NodeDescription, graph
+from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
+from hsv.graph.description import COMPOSED, CONTROLLER, NodeDescription, controller_node, graph
+from hsv.graph.launcher import executable
 from hsv.graph.parameter_sections import ParameterSections
-from hsv.simulation.assembly import assemble_flight, blamed_on
+from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
 
@@ -45,6 +47,8 @@ def prepare(
     real_time_factor: float = 0.0,
     step_timeout: float = 10.0,
     folder: Path | None = None,
+    composed: bool = False,
+    external: bool = False,
 ) -> PreparedRun:
     """Check scenario and design, make the bag's directory, write the parameter files of a run.
 
@@ -57,6 +61,8 @@ def prepare(
         real_time_factor: Simulated over wall time; 0: as fast as possible.
         step_timeout: Wall time (s) after which a silent node ends the run.
         folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
+        composed: All nodes in one process.
+        external: Whatever the scenario's controller is, one is flown that is started by hand.
 
     Raises:
         QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
@@ -69,14 +75,13 @@ def prepare(
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
-    if scenario.controller not in CONTROLLERS:
-        raise ScenarioError(
-            f"scenario {scenario.name!r}: controller = {scenario.controller!r}: over DDS expected one of "
-            f"{', '.join(CONTROLLERS)}; hsv simulate and hsv montecarlo fly any"
-        )
+    if external:
+        scenario = scenario.model_copy(update={"controller": NODE, "own": {}})
     with blamed_on(scenario):
-        design_file = find_design(scenario.design)
-        design = read_parameters(design_file)
+        design_file = find_design(scenario.design) if scenario.design else None
+        design = read_parameters(design_file) if design_file else {"design.name": NO_DESIGN}
+        nodes = _started(scenario.controller, composed)
+        own = own_parameters(scenario)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
@@ -88,16 +93,19 @@ def prepare(
     folder.mkdir(parents=True, exist_ok=True)
     files = {
         "scenario.toml": text,
-        "scenario.yaml": ParameterSections(scenario.parameters()).to_yaml(),
-        **design_files(design_file),
+        "scenario.yaml": ParameterSections(scenario.parameters(), {CONTROLLER.name: own} if own else {}).to_yaml(),
+        **(design_files(design_file) if design_file else {"design.yaml": ParameterSections(design).to_yaml()}),
     }
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
     bag = _new_directory([bag] if bag else [bags / default, *(bags / f"{default}_{n}" for n in range(2, 100))])
     # Where it stays, unlike the folder of this run: parameters that were dumped from the nodes can be loaded later.
-    certificate = design_file.with_suffix(".certificate.json").absolute()
-    certified = {"design.certificate": str(certificate)} if "certificate.json" in files else {}
+    certified = (
+        {"design.certificate": str(design_file.with_suffix(".certificate.json").absolute())}
+        if design_file and "certificate.json" in files
+        else {}
+    )
     run = {
         **certified,
         "real_time_factor": float(real_time_factor),
@@ -111,20 +119,36 @@ def prepare(
                 "run_id": run_id,
                 "scenario": scenario.name,
                 "title": scenario.title,
-                **provenance(scenario.design, design),
+                **provenance(scenario.controller, scenario.design, design if design_file else {}),
             }.items()
         ],
     }
     (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    nodes = graph(scenario.controller)
     return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
 
 
-def provenance(name: str, design: Mapping[str, Any]) -> dict[str, str]:
-    """Return what a bag says of where its flight comes from, with which design, and when: now."""
+def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
+    """Return what is to be started to fly with ``controller``, what ends the run last.
+
+    Raises:
+        ParameterError: The controller is a node that cannot be found.
+    """
+    flown = controller_node(controller)
+    if flown.executable and flown.foreign:
+        try:
+            executable(flown)
+        except RunError as error:
+            raise ParameterError(f"controller = {controller!r}: {error}") from None
+    nodes = ((flown,) if flown.foreign else ()) + (COMPOSED,) if composed else graph(controller)
+    return tuple(node for node in nodes if node.executable)
+
+
+def provenance(controller: str, name: str, design: Mapping[str, Any]) -> dict[str, str]:
+    """Return what a bag says of where its flight comes from: controller, design with its ``name``, and when: now."""
     return {
         "commit": commit(),
+        "controller": controller,
         "design": name,
         "design_hash": digest(design),
         "seed": "none",
@@ -132,12 +156,12 @@ def provenance(name: str, design: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def recorded_files(values: Mapping[str, Mapping[str, Any]], controller: str) -> dict[str, str]:
+def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, Any]) -> dict[str, str]:
     """Return the attachments of a bag whose run was not prepared here, by name: parameters and certificate.
 
     Args:
         values: Flat parameters of every node, by its role.
-        controller: Role of the controller, whose design it is.
+        flown: Those of the node whose design it is.
     """
     sections = ParameterSections.gathered(values)
     design = {parameter.name for parameter in DESIGN_PARAMETERS}
@@ -145,7 +169,6 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], controller: str) -> 
         "design.yaml": sections.only(sections.names & design).to_yaml(),
         "scenario.yaml": sections.only(sections.names - design).to_yaml(),
     }
-    flown = values[controller]
     certificate = find_certificate(flown.get("design.name", ""), flown.get("design.certificate", ""))
     return files | _certificate(certificate)
 

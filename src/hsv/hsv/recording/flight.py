@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hsv.graph.description import ACTUATOR, COMMAND, FAULT_STATUS, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
+from hsv.graph.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE
+from hsv.recording.former import fault_topic, saturation_topic
 from hsv.recording.reader import Bag
 from hsv.recording.steps import cut_off, expected_stamps, joined
 from hsv.simulation.fingerprint import fingerprint
@@ -51,8 +52,10 @@ def flight_data(bag: Bag) -> FlightData:
     Raises:
         RecordingError: A topic is missing, or no step is complete.
     """
-    state, nominal, command, tube = joined(bag, (STATE, NOMINAL, COMMAND, TUBE_STATUS)).values()
-    status = bag.columns(FAULT_STATUS)
+    limited = saturation_topic(bag)
+    rows = joined(bag, tuple(dict.fromkeys((STATE, NOMINAL, COMMAND, limited))))
+    state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
+    status = bag.columns(fault_topic(bag))
     acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
     return FlightData(
         time=state["header.stamp"] * 1e-9,
@@ -60,7 +63,7 @@ def flight_data(bag: Bag) -> FlightData:
         reference=state_columns(nominal, "reference."),
         deviation=state_columns(nominal, "deviation."),
         command=input_columns(command),
-        saturated=tube["saturated"],
+        saturated=rows[limited]["saturated"],
         gain_index=nominal["gain_index"],
         fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.errors import HsvError, RecordingError
-from hsv.graph.description import FAULT_STATUS, STATE, TUBE_STATUS
+from hsv.graph.description import STATE, TUBE_STATUS
 from hsv.recording.flight import flight_fingerprint
+from hsv.recording.former import fault_parameters, fault_topic, saturation_topic
 from hsv.recording.reader import Bag
 from hsv.recording.shortcomings import shortcomings
 from hsv.recording.steps import complete_stamps, cut_off
@@ -49,8 +50,8 @@ def describe(bag: Bag) -> dict[str, Any]:
             for name, data in sorted(bag.attachments.items())
         ],
         "ending": ending(bag) if STATE in bag.roles else None,
-        "faults": _faults(bag) if FAULT_STATUS in bag.roles else None,
-        "saturation": _saturation(bag) if TUBE_STATUS in bag.roles else None,
+        "faults": _faults(bag) if fault_topic(bag) in bag.roles else None,
+        "saturation": _saturation(bag) if saturation_topic(bag) in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
     }
 
@@ -91,21 +92,19 @@ def ending(bag: Bag) -> str:
 
 
 def _faults(bag: Bag) -> list[dict[str, Any]]:
-    columns = bag.columns(FAULT_STATUS)
-    stamps, active = columns["header.stamp"], columns["active"]
-    keys = sorted({(fault["channel"], fault["type"], fault["value"]) for faults in active for fault in faults})
+    columns = bag.columns(fault_topic(bag))
+    active = [[(f["channel"], f["type"], *fault_parameters(f).items()) for f in faults] for faults in columns["active"]]
     intervals = []
-    for channel, kind, value in keys:
-        acting = np.array(
-            [any((f["channel"], f["type"], f["value"]) == (channel, kind, value) for f in faults) for faults in active]
-        )
-        entry = {"channel": channel, "type": kind, "value": value}
-        intervals += [entry | interval for interval in _intervals(stamps, acting)]
+    for key in sorted({fault for faults in active for fault in faults}):
+        channel, kind, *parameters = key
+        entry = {"channel": channel, "type": kind, "parameters": dict(parameters)}
+        acting = np.array([key in faults for faults in active])
+        intervals += [entry | interval for interval in _intervals(columns["header.stamp"], acting)]
     return sorted(intervals, key=lambda interval: interval["start_s"])
 
 
 def _saturation(bag: Bag) -> dict[str, Any]:
-    saturated = bag.columns(TUBE_STATUS)["saturated"]
+    saturated = bag.columns(saturation_topic(bag))["saturated"]
     return {
         "steps": int(saturated.any(axis=1).sum()),
         "fuel_equivalence_ratio_steps": int(saturated[:, 0].sum()),

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 
 from hsv.errors import RecordingError
 from hsv.graph.description import OTHER_TOPICS, ROOT, STATE, TOPICS, resolved
+from hsv.recording.former import FORMER_TYPES
 
 NAMESPACE_KEY, REMAPPED_KEY = "namespace", "remapped"
 """Under which a bag says it in its custom data: the namespace of the graph and, as JSON, by role, the names of topics
 that have not their usual ones there. A graph that was not moved has neither."""
 
-_KINDS = TOPICS | OTHER_TOPICS
+_KINDS = {role: (kind,) for role, kind in (TOPICS | OTHER_TOPICS).items()}
+_KINDS |= {role: (*_KINDS.get(role, ()), former) for role, former in FORMER_TYPES.items()}
 _OURS = [role for role in _KINDS if role.startswith("hsv/")]
 
 
@@ -44,12 +46,12 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
         if role not in remapped and (name := resolved(role, namespace)) in topics and name not in found.values():
             found[role] = name
     for role, name in found.items():
-        if topics[name] != _KINDS[role]:
-            raise RecordingError(f"{source}: topic {name} is {topics[name]}, expected {_KINDS[role]}")
+        if topics[name] not in _KINDS[role]:
+            raise RecordingError(f"{source}: topic {name} is {topics[name]}, expected {_KINDS[role][0]}")
     # What is left over is told by its type only in what is a graph without doubt.
     for role in _OURS if 2 * sum(role in found for role in TOPICS) > len(TOPICS) else ():
-        alike = [name for name, kind in topics.items() if kind == _KINDS[role] and name not in found.values()]
-        wanting = [other for other in _OURS if _KINDS[other] == _KINDS[role] and other not in found]
+        alike = [name for name, kind in topics.items() if kind in _KINDS[role] and name not in found.values()]
+        wanting = [other for other in _OURS if {*_KINDS[other]} & {*_KINDS[role]} and other not in found]
         if wanting == [role] and len(alike) == 1:
             found[role] = alike[0]
     # In the order of the graph, whatever the order in the bag.
@@ -84,7 +86,7 @@ def _namespace(topics: Mapping[str, str], source: str) -> str:
     spaces: dict[str, set[str]] = {}
     for role in _OURS:
         for name, kind in topics.items():
-            if name.endswith(f"/{role}") and (kind == _KINDS[role] or name == resolved(role)):
+            if name.endswith(f"/{role}") and (kind in _KINDS[role] or name == resolved(role)):
                 spaces.setdefault(name.removesuffix(f"/{role}") or ROOT, set()).add(role)
     # A graph has a plant; a single node of another one, recorded with it, is no second graph.
     spaces = {space: there for space, there in spaces.items() if STATE in there} or spaces

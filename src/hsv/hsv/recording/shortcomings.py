@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from hsv.errors import RecordingError
-from hsv.graph.description import TOPICS
+from hsv.graph.description import MEASUREMENT, TUBE_MPC, step_topics
 from hsv.recording.files import being_recorded
+from hsv.recording.former import FAULT_STATUS
 from hsv.recording.reader import Bag, Loss
 from hsv.recording.steps import complete_stamps, expected_stamps, irregularities
 
@@ -21,13 +22,19 @@ def shortcomings(bag: Bag) -> list[str]:
         words.append(f"cut off after {bag.span[1] * 1e-9:.2f} s, hsv recover mends it")
     elif bag.loss:
         words.append("hsv recover makes a whole bag of the rest")
-    if missing := [bag.name_of(topic) for topic in TOPICS if topic not in bag.roles]:
+    if missing := [bag.name_of(topic) for topic in _expected(bag) if topic not in bag.roles]:
         words.append(f"no topic {', '.join(missing)}")
     try:
         words += irregularities(bag)
     except RecordingError as error:
         words.append(str(error).removeprefix(f"{bag.path}: "))
     return words
+
+
+def _expected(bag: Bag) -> list[str]:
+    """Return the step topics that a bag should hold: which of them depends on its controller, and on its age."""
+    topics = step_topics(bag.custom_data.get("controller", TUBE_MPC.name))
+    return [topic for topic in topics if not (topic == MEASUREMENT and FAULT_STATUS in bag.roles)]
 
 
 def loss_in_words(loss: Loss) -> list[str]:

@@ -14,11 +14,11 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign, find_design, read_design_parameters
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
-from hsv.faults.actuator import Fault, FaultInjector
+from hsv.faults.actuator import FaultInjector
 from hsv.graph.description import (
+    ACTUATOR,
     COMMAND,
     FAULT_INJECTOR,
-    FAULT_STATUS,
     NOMINAL,
     PLANT,
     STATE,
@@ -26,6 +26,7 @@ from hsv.graph.description import (
     TUBE_MPC,
     TUBE_STATUS,
 )
+from hsv.graph.exchange import fault_in
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS
 from hsv.graph.preparation import design_files
@@ -118,13 +119,15 @@ def controller_of(values: ParameterSections) -> str:
     return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
 
 
-def complete_steps(bag: Bag, topics: Iterable[str] = TOPICS) -> int:
+def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
     """Return the number of steps, up to the first that is missing, of which the bag has every one of ``topics``.
+
+    Without ``topics``: of all step topics that it has.
 
     Raises:
         RecordingError: A topic is missing.
     """
-    stamps = [bag.times(topic) for topic in topics]
+    stamps = [bag.times(topic) for topic in topics or [topic for topic in TOPICS if topic in bag.roles]]
     present = np.all([np.isin(expected_stamps(bag), stamp) for stamp in stamps], axis=0)
     return min(*map(len, stamps), len(present) if present.all() else int(np.argmin(present)))
 
@@ -159,8 +162,8 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False
-    for _, status in bag.decode(FAULT_STATUS):
-        recorded = [Fault(f.channel, f.type, f.value) for f in status.active]
+    for _, status in bag.decode(ACTUATOR):
+        recorded = [fault_in(message) for message in status.active]
         planned = list(injector.acting(status.step))
         if planned != recorded:
             changed = True
@@ -177,13 +180,13 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
     """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
+    if controller_of(sections) != TUBE_MPC.name:
+        return {}
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]
     if recorded_status and not np.shape(recorded_status[0].tau):
         raise RecordingError(
             f"{bag.path}: topic {bag.name_of(TUBE_STATUS)}: recorded with another definition, one number for tau"
         )
-    if controller_of(sections) != TUBE_MPC.name:
-        return {}
     values = sections.of(TUBE_MPC.name)
     design = ControlDesign.from_parameters(values)
     schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,14 +11,14 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.graph.description import CLOCK, COMMAND, STATE, TOPICS
+from hsv.graph.description import CLOCK, COMMAND, PLANT, STATE, TOPICS, step_topics
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track, expecting_fields
 from hsv.replay.attached import broken_off, complete_steps
-from hsv.replay.processes import PROCESSES, Process
+from hsv.replay.processes import Process, processes
 
 Progress = Callable[[str, int, int], None]
 """Name of what is done, steps done, steps in all."""
@@ -90,13 +90,13 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
         ParameterError, DesignError: The component refuses its parameters.
     """
     require(bag, process.outputs)
-    component = process.build(values.of(process.node.name))
+    component = process.block.build(values.of(process.node.name))
     outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
     recorded = [bag.track(topic) for topic in process.inputs]
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
 
     def step(inputs: tuple[Any, ...]) -> None:
-        process.step(component, inputs, tuple(outputs.messages.values()), bag.types.types.__getitem__)
+        process.step(component, inputs, outputs.messages, bag.types.types.__getitem__)
         outputs.keep()
 
     if process.restarts:
@@ -124,36 +124,52 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     Raises:
         As :func:`replay`.
     """
-    require(bag, TOPICS)
+    require(bag, step_topics(controller))
     with expecting_fields(bag.path):
-        tracks = fly(bag.types, controller, values, progress, str(bag.path))
-    return [compare_process(bag, process, tracks) for process in chosen(controller).values()]
+        commands = None if COMMAND in _published(controller) else bag.decode(COMMAND)
+        tracks = fly(bag.types, controller, values, progress, str(bag.path), commands)
+    return [compare_process(bag, process, tracks) for process in processes(controller).values()]
 
 
 def fly(
-    types: Typestore, controller: str, values: ParameterSections, progress: Progress, source: str = "types"
+    types: Typestore,
+    controller: str,
+    values: ParameterSections,
+    progress: Progress,
+    source: str = "types",
+    commands: Iterator[tuple[int, Any]] | None = None,
 ) -> dict[str, Track]:
     """Fly the loop in this process, message by message as the graph does, and return every step topic.
 
+    Args:
+        types: Definitions of the messages.
+        controller: Name of the controller that closes the loop.
+        values: Parameters of the nodes.
+        progress: Told how far it is.
+        source: What defines ``types``, for errors.
+        commands: Recorded ones, with their times, of a controller that is a node of its own and not here.
+
     Raises:
-        RecordingError: ``types``, which ``source`` defines, lack a field.
+        RecordingError: ``types`` lack a field, or commands are missing.
     """
-    processes = chosen(controller)
-    components = {name: process.build(values.of(name)) for name, process in processes.items()}
+    flown = processes(controller)
+    components = {name: process.block.build(values.of(name)) for name, process in flown.items()}
     made = {
         name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
-        for name, process in processes.items()
+        for name, process in flown.items()
     }
     latest: dict[str, Any] = {}
     for outputs in made.values():
         latest |= outputs.messages
-    last = components["plant"].steps
+    last = components[PLANT.name].steps
     first = True
     while first or latest[STATE].status == 0:
-        for name, process in processes.items():
+        for name, process in flown.items():
+            if commands is not None and COMMAND in process.inputs:
+                latest[COMMAND] = _next(commands, source)
             inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
             outputs = made[name]
-            process.step(components[name], inputs, tuple(outputs.messages.values()), types.types.__getitem__)
+            process.step(components[name], inputs, outputs.messages, types.types.__getitem__)
             outputs.keep()
         first = False
         if latest[STATE].step % PROGRESS_INTERVAL == 0:
@@ -162,16 +178,20 @@ def fly(
     return {topic: track for outputs in made.values() for topic, track in outputs.tracks.items()}
 
 
+def _published(controller: str) -> set[str]:
+    return {topic for process in processes(controller).values() for topic in process.outputs}
+
+
+def _next(commands: Iterator[tuple[int, Any]], source: str) -> Any:
+    for _, message in commands:
+        return message
+    raise RecordingError(f"{source}: fewer commands than the flight has steps, and their controller is not here")
+
+
 def require(bag: Bag, topics: Iterable[str]) -> None:
     """Raise a RecordingError unless all ``topics`` are in ``bag``."""
     for topic in topics:
         bag.track(topic)
-
-
-def chosen(controller: str) -> dict[str, Process]:
-    """Return the processes of a graph with ``controller``, in the order in which a step passes through them."""
-    names = [name for name in PROCESSES if name == controller or PROCESSES[name].node.publishes[0] != COMMAND]
-    return {name: PROCESSES[name] for name in names}
 
 
 def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> ProcessComparison:
@@ -182,5 +202,5 @@ def compare_process(bag: Bag, process: Process, tracks: Mapping[str, Track]) -> 
         expected, actual = bag.track(topic), tracks[topic]
         if limit is not None:
             expected, actual = expected.cut(limit), actual.cut(limit)
-        compared.append(compare(expected, actual, process.ignored, process.tolerance))
+        compared.append(compare(expected, actual, tolerance=process.tolerance))
     return ProcessComparison(process, tuple(compared))

@@ -7,11 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from hsv.errors import RecordingError
-from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, TOPICS, NodeDescription, graph
+from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, NodeDescription, graph, step_topics
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag
-from hsv.replay.engine import ProcessComparison, Progress, chosen, compare_process, require
+from hsv.replay.engine import ProcessComparison, Progress, compare_process, require
+from hsv.replay.processes import processes
 
 
 def replay_all(
@@ -23,12 +24,13 @@ def replay_all(
         RecordingError: A topic that is needed is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
-    for name in names:
-        require(bag, (*chosen(controller)[name].inputs, *chosen(controller)[name].outputs))
+    under_test = [processes(controller)[name] for name in names]
+    for process in under_test:
+        require(bag, (*process.inputs, *process.outputs))
     if not bag.messages(RUN):
         raise RecordingError(f"{bag.path}: topic {bag.name_of(RUN)}: no message, expected the announcement of the run")
-    for name in names:
-        process = chosen(controller)[name]
+    for process in under_test:
+        name = process.node.name
         with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
             answers = Path(folder, "answers")
             emulator = {
@@ -50,14 +52,14 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
         RecordingError: A topic is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
-    require(bag, TOPICS)
+    require(bag, step_topics(controller))
     with tempfile.TemporaryDirectory(prefix="hsv_replay_") as folder:
         repeated = Path(folder, "rerun")
         steps = len(bag.messages(STATE))
         run = {"recorder": True, "bag.directory": str(repeated)}
         _run(graph(controller), values.updated(run), Path(folder), PLANT.name, steps, progress)
         made = Bag(repeated)
-        for process in chosen(controller).values():
+        for process in processes(controller).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
 

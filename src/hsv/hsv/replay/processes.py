@@ -1,33 +1,35 @@
-"""The processes that a bag can repeat, as data: what each is made of, what it does in a step, how equal is equal."""
+"""The processes that a bag can repeat: how each steps its messages, and how equal is equal."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
-from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.control.notch_filter import NotchFilter
-from hsv.control.robust_mpc import RobustMpc
-from hsv.control.tube_law import TubeLaw
-from hsv.faults.actuator import FaultInjector
-from hsv.graph import exchange
-from hsv.graph.description import (
-    FAULT_INJECTOR,
-    NOMINAL_TRAJECTORY,
-    NOTCH_FILTER,
-    PLANT,
-    ROBUST_MPC,
-    STATE,
-    TUBE_MPC,
-    NodeDescription,
-)
-from hsv.vehicle.plant import Plant
+from hsv.graph.description import STATE, NodeDescription, graph
+from hsv.graph.exchange import FILL, READ, Message, MessageClass
+from hsv.simulation.blocks import LOOP, VEHICLE, Block, Signals
 
-Messages = Sequence[Any]
-MessageClass = Callable[[str], Callable[..., Any]]
-"""From ``package/msg/Type`` to what makes a message of it."""
+_TOLERANCES = {
+    "plant": (
+        1e-10,
+        "one period from the recorded state: the vehicle alone is unstable, a longer flight without its controller "
+        "would magnify the last bit in which flights from before the portable arithmetic differ",
+    ),
+    "notch_filter": (
+        1e-12,
+        "a stable filter: other roundings of its coefficients, as before the portable arithmetic, die out",
+    ),
+    "nominal_trajectory": (
+        1e-10,
+        "a contracting system that runs on its own for the whole flight; laws solved in flight stop at a tolerance",
+    ),
+    "tube_mpc": (1e-10, "the level in the set is a quadratic form whose terms of both signs nearly cancel"),
+    "robust_mpc": (1e-12, "one matrix product without memory"),
+    "controller": (1e-10, "a controller of one's own may call libraries that round as their processor does"),
+    "fault_injector": (0.0, "one multiplication, the same on every processor"),
+}
+"""Absolute and relative at once, at most 1e-10, by node; and why that much."""
 
 
 @dataclass(frozen=True)
@@ -35,18 +37,22 @@ class Process:
     """A process under test; what it reads and writes is in its ``node`` description."""
 
     node: NodeDescription
-    build: Callable[[Mapping[str, Any]], Any]
-    """From the flat parameters to the component."""
-    step: Callable[[Any, Messages, Messages, MessageClass], None]
-    """From component and input messages to the output messages, filled in place."""
-    tolerance: float
-    """Absolute and relative at once; at most 1e-10."""
-    reason: str
-    """Why that much."""
-    ignored: tuple[str, ...] = ()
-    """Field paths that do not count."""
-    restarts: bool = False
-    """Owner of time: a step begins from the recorded state and input of the step before, the first from nothing."""
+    block: Block
+
+    @property
+    def tolerance(self) -> float:
+        """Within which numbers count as equal, absolute and relative at once."""
+        return _TOLERANCES[self.node.name][0]
+
+    @property
+    def reason(self) -> str:
+        """Why that much."""
+        return _TOLERANCES[self.node.name][1]
+
+    @property
+    def restarts(self) -> bool:
+        """Whether it owns time: a step begins from recorded state and input of the one before, the first from none."""
+        return self.block is VEHICLE
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -58,90 +64,26 @@ class Process:
         """Topics that one step gives."""
         return self.node.publishes
 
+    def step(
+        self, component: Any, inputs: Sequence[Message], outputs: Mapping[str, Message], message_class: MessageClass
+    ) -> None:
+        """Step ``component`` from its input messages, none for the first step of the owner of time, to its ``outputs``.
 
-def _filter(notch: NotchFilter, inputs: Messages, outputs: Messages, _: MessageClass) -> None:
-    exchange.filter_state(notch, *inputs, *outputs)
-
-
-def _plan(trajectory: NominalTrajectory, inputs: Messages, outputs: Messages, _: MessageClass) -> None:
-    exchange.plan_nominal(trajectory, *inputs, *outputs)
-
-
-def _control(follows_nominal: bool, law: Any, inputs: Messages, outputs: Messages, _: MessageClass) -> None:
-    filtered, nominal = inputs
-    command, status = outputs
-    result = exchange.control(law, filtered, nominal, command)
-    exchange.fill_tube_status(result, filtered, nominal, follows_nominal, status)
-
-
-def _actuate(injector: FaultInjector, inputs: Messages, outputs: Messages, message_class: MessageClass) -> None:
-    (command,) = inputs
-    actuator, status = outputs
-    result = exchange.actuate(injector, command, actuator)
-    exchange.fill_fault_status(result, command, message_class("hsv_msgs/msg/Fault"), status)
+        Those are by topic, and filled in place.
+        """
+        signals = Signals()
+        if inputs:
+            for topic, message in zip(self.inputs, inputs, strict=True):
+                READ[topic](message, signals)
+        self.block.step(component, signals)
+        for topic, message in outputs.items():
+            FILL[topic](signals, message, message_class)
 
 
-def _integrate(plant: Plant, inputs: Messages, outputs: Messages, _: MessageClass) -> None:
-    if inputs:
-        actuator, state = inputs
-        plant.place(state.step, exchange.state_vector(state))
-        result = plant.step(exchange.input_vector(actuator))
-    else:
-        result = plant.reset()
-    clock, state, forces = outputs
-    stamp = exchange.stamp_of(result.step, plant.period)
-    exchange.fill_clock(stamp, clock)
-    exchange.fill_vehicle_state(result, stamp, state)
-    exchange.fill_vehicle_forces(result, stamp, forces)
+def processes(controller: str) -> dict[str, Process]:
+    """Return the processes of a graph with ``controller``, by node, in the order in which a step passes through them.
 
-
-PROCESSES = {
-    process.node.name: process
-    for process in (
-        Process(
-            PLANT,
-            Plant.from_parameters,
-            _integrate,
-            1e-10,
-            "one period from the recorded state: the vehicle alone is unstable, a longer flight without its controller "
-            "would magnify the last bit in which flights from before the portable arithmetic differ",
-            restarts=True,
-        ),
-        Process(
-            NOTCH_FILTER,
-            NotchFilter.from_parameters,
-            _filter,
-            1e-12,
-            "a stable filter: other roundings of its coefficients, as before the portable arithmetic, die out",
-        ),
-        Process(
-            NOMINAL_TRAJECTORY,
-            NominalTrajectory.from_parameters,
-            _plan,
-            1e-10,
-            "a contracting system that runs on its own for the whole flight; laws solved in flight stop at a tolerance",
-        ),
-        Process(
-            TUBE_MPC,
-            TubeLaw.from_parameters,
-            partial(_control, True),
-            1e-10,
-            "the level in the set is a quadratic form whose terms of both signs nearly cancel",
-        ),
-        Process(
-            ROBUST_MPC,
-            RobustMpc.from_parameters,
-            partial(_control, False),
-            1e-12,
-            "one matrix product without memory",
-        ),
-        Process(
-            FAULT_INJECTOR,
-            FaultInjector.from_parameters,
-            _actuate,
-            0.0,
-            "one multiplication, the same on every processor",
-        ),
-    )
-}
-"""By node, in the order in which a step passes through them; of the controllers the one that flew."""
+    A controller that is a foreign node is none of them: nobody here can repeat what it did.
+    """
+    found = [Process(node, node.block) for node in graph(controller) if node.block is not None and not node.foreign]
+    return {process.node.name: process for process in sorted(found, key=lambda found: LOOP.index(found.block))}

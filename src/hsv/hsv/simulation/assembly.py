@@ -7,15 +7,12 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from hsv.control.controllers import SHIPPED_CONTROLLERS, build_controller, controller_class, table_values
+from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class, table_values
 from hsv.control.design_file import design_of, find_design, read_design, read_design_parameters
-from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.control.notch_filter import NotchFilter
-from hsv.errors import DesignError, HsvError, ScenarioError, TrimError
-from hsv.faults.actuator import FaultInjector
+from hsv.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
+from hsv.simulation.blocks import LOOP
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
-from hsv.vehicle.plant import Plant
 
 _FIELDS = {
     r"^parameter feedback\.tau\b": "tube.tau",
@@ -33,10 +30,22 @@ def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
     Raises:
         ParameterError, QuantityError: Names what the controller does not admit.
     """
-    values = scenario.parameters()
-    if scenario.controller not in SHIPPED_CONTROLLERS:
-        values |= table_values(controller_class(scenario.controller), scenario.own)
-    return values
+    return scenario.parameters() | own_parameters(scenario)
+
+
+def own_parameters(scenario: Scenario) -> dict[str, Any]:
+    """Return the flat parameters of a controller of one's own, which is loaded; none of a shipped one, or of a node.
+
+    Raises:
+        ParameterError, QuantityError: Names what the controller does not admit.
+    """
+    if scenario.controller in SHIPPED_CONTROLLERS:
+        return {}
+    if scenario.controller.startswith(NODE):
+        for table in scenario.own:
+            raise ParameterError(f"{table}: unknown table, expected none: a node brings its own parameters")
+        return {}
+    return table_values(controller_class(scenario.controller), scenario.own)
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -64,13 +73,7 @@ def assemble(values: Mapping[str, Any]) -> Components:
         ParameterError, DesignError, TrimError: Names the parameter that is wrong.
     """
     design = design_of(values)
-    return Components(
-        Plant.from_parameters(values),
-        NotchFilter.from_parameters(values),
-        NominalTrajectory.from_parameters(values, design),
-        build_controller(values, design),
-        FaultInjector.from_parameters(values),
-    )
+    return Components(**{block.name: block.build(values, design) for block in LOOP})
 
 
 def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None) -> Components:

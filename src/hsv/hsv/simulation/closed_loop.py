@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from hsv.control.controller import Controller, ControllerInput, ForeignController
+from hsv.control.controller import Controller, ControllerInput, ElsewhereController, ForeignController
 from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
-from hsv.control.nominal_trajectory import NominalResult, NominalTrajectory, nominal_advance
-from hsv.control.notch_filter import NotchFilter, NotchResult, filter_step, rest
+from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
+from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
 from hsv.faults.actuator import FaultInjector, apply_faults
@@ -32,7 +32,7 @@ from hsv.vehicle.plant import FlightStatus, Plant
 
 @dataclass
 class Components:
-    """The five parts of the loop, as the five nodes hold them."""
+    """The components of the loop by the names of their blocks, see :mod:`hsv.simulation.blocks`."""
 
     plant: Plant
     notch_filter: NotchFilter
@@ -45,20 +45,6 @@ class Components:
         plant = self.plant
         vehicle = plant.vehicle.perturbed(perturbation)
         return replace(self, plant=Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps))
-
-
-def controller_input(step: int, state: np.ndarray, filtered: NotchResult, planned: NominalResult) -> ControllerInput:
-    """Return what the controller is given in ``step``: the measured ``state`` (9), and what the blocks before said."""
-    return ControllerInput(
-        step,
-        state,
-        filtered.filtered_pitch_rate,
-        filtered.filter_state,
-        planned.reference,
-        planned.reference_input,
-        planned.deviation,
-        planned.input,
-    )
 
 
 class History(NamedTuple):
@@ -272,8 +258,11 @@ def fly(components: Components) -> Flight:
 
     Raises:
         RunError: A controller of one's own failed; it is named, with the step.
+        ParameterError: The controller is a node of its own.
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
+    if isinstance(controller, ElsewhereController):
+        raise controller.refusal()
     tube = controller.kernel if isinstance(controller.kernel, TubeData) else NO_TUBE
     given, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
     arrays.state[:] = plant.initial.state

@@ -77,10 +77,9 @@ class Flights:
         # Recorded beside its place and moved there when it is whole.
         workplace = Path(mkdtemp(prefix=f".{bag.name}_", dir=self._folder))
         try:
-            prepared = prepare(scenario, bag=workplace / bag.name)
+            prepared = prepare(scenario, bag=workplace / bag.name, composed=True)
             fly_graph(
                 prepared,
-                composed=True,
                 on_step=lambda step: self._progress(f"flying {scenario}", step, prepared.steps),
             )
             self._progress(f"flying {scenario}", prepared.steps, prepared.steps)

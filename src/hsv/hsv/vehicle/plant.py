@@ -53,6 +53,8 @@ class PlantResult:
 class Plant:
     """The vehicle under held inputs. It starts in the trim of the *nominal* vehicle, perturbed or not."""
 
+    PARAMETERS = PLANT_PARAMETERS
+
     def __init__(self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2) -> None:
         self.vehicle = vehicle
         self.initial = initial

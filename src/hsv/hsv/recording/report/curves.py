@@ -35,7 +35,8 @@ class _Source:
 
     def __init__(self, bag: Bag) -> None:
         names = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
-        self.columns = joined(bag, list(names))
+        # A controller of one's own has no tube.
+        self.columns = joined(bag, [name for name in names if name != TUBE_STATUS or name in bag.roles])
         self.time = self.columns[STATE]["header.stamp"] * 1e-9
 
     def values(self, curve: Curve) -> np.ndarray:
@@ -45,6 +46,8 @@ class _Source:
 
     def tube(self, name: str) -> np.ndarray:
         """Return a vector field of the tube status, (n, components); components = 0 without a set."""
+        if TUBE_STATUS not in self.columns:
+            return np.empty((len(self.time), 0))
         return np.asarray(self.columns[TUBE_STATUS][name], float).reshape(len(self.time), -1)
 
 
@@ -58,6 +61,8 @@ def flight_curves(bag: Bag) -> FlightCurves:
     flight = FlightCurves(source.time)
     errors = [error_panel(component) for component in range(source.tube("error").shape[1])]
     for panel in (*PANELS, *errors):
+        if any(curve.topic not in source.columns for curve in panel.curves):
+            continue
         drawn = [DrawnCurve(curve.kind, curve.label, source.values(curve)) for curve in panel.curves]
         if np.isfinite(drawn[0].y).any():
             flight.panels.append(panel)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.graph.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE, TUBE_STATUS
+from hsv.graph.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
+from hsv.recording.former import saturation_topic
 from hsv.recording.reader import Bag
 from hsv.recording.report.panels import INPUTS
 from hsv.recording.track import expecting_fields
@@ -62,7 +63,8 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
 def _faults(description: dict[str, Any]) -> Iterator[Event]:
     for fault in description["faults"] or ():
         channel = fault["channel"].replace("_", " ")
-        text = f"{channel}: {fault['type'].replace('_', ' ')} {fault['value']:.6g}"
+        values = ", ".join(f"{name.replace('_', ' ')} {value:.6g}" for name, value in fault["parameters"].items())
+        text = f"{channel}: {fault['type'].replace('_', ' ')}, {values}"
         yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
 
 
@@ -79,9 +81,9 @@ def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
 
 
 def _saturation(bag: Bag) -> Iterator[Event]:
-    if TUBE_STATUS not in bag.roles:
+    if (topic := saturation_topic(bag)) not in bag.roles:
         return
-    columns = bag.columns(TUBE_STATUS)
+    columns = bag.columns(topic)
     time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
     for column, name in enumerate(INPUTS):
         edges = np.flatnonzero(np.diff(np.concatenate(([False], saturated[:, column], [False])).astype(np.int8)))

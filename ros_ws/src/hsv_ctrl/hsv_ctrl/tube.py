@@ -1,0 +1,53 @@
+"""What the nodes with a status of the tube have in common."""
+
+from __future__ import annotations
+
+from hsv_msgs.msg import Run
+
+from hsv.control.tube_law import TubeResult, TubeStatusCode
+from hsv.errors import ParameterError
+from hsv.graph.description import NodeDescription
+from hsv.simulation.blocks import Signals
+from hsv_node.block import BlockNode
+from hsv_node.parameters import given
+
+
+class TubeNode(BlockNode):
+    """A controller node of one name that says of every step how the error lies in the tube.
+
+    Raises:
+        ParameterError: The graph's parameter ``controller`` names another controller.
+    """
+
+    def __init__(self, role: NodeDescription) -> None:
+        super().__init__(role, "tube")
+        if given(self, "controller") and self.controller != role.name:
+            raise ParameterError(
+                f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
+            )
+        self._outside = False
+
+    def start_run(self, run: Run) -> None:
+        """Begin inside the tube."""
+        super().start_run(run)
+        self._outside = False
+
+    def stepped(self, signals: Signals) -> None:
+        """Tell of the tube; leaving it is a warning."""
+        result = signals.answer
+        assert isinstance(result, TubeResult)
+        outside = result.status is TubeStatusCode.OUTSIDE
+        left, self._outside = outside and not self._outside, outside
+        stamp = signals.header.stamp
+        if left:
+            time = stamp.sec + 1e-9 * stamp.nanosec
+            self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
+        self.diagnose(
+            stamp,
+            result.status.name,
+            warning=left,
+            step=signals.step,
+            saturated=bool(result.saturated.any()),
+            level=result.level,
+            component=result.component,
+        )

@@ -1,0 +1,61 @@
+"""A node that steps a block of the loop: joins the messages of a step, steps the component, publishes what it gives."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+from hsv_msgs.msg import Run
+
+from hsv.graph.description import TOPICS, NodeDescription
+from hsv.graph.exchange import FILL, READ
+from hsv.simulation.blocks import Signals
+from hsv_node.lockstep import PeerNode
+from hsv_node.messages import message_class
+
+
+class BlockNode(PeerNode):
+    """Answers the messages of each step with those of its block, on the topics of its role."""
+
+    component: Any
+    """What is stepped; set by the node."""
+
+    def __init__(self, role: NodeDescription, task: str) -> None:
+        super().__init__(role, task)
+        assert role.block is not None
+        self._step = role.block.step
+        self.signals = Signals()
+        self._given: dict[str, Any] = {}
+        # In the order of the role: others wait for the first, and work on it while the rest is published.
+        self._answers = [
+            (FILL[topic], message_class(TOPICS[topic])(), self.create_step_publisher(topic)) for topic in role.publishes
+        ]
+        for topic in role.subscribes:
+            self.create_step_subscription(topic, partial(self.on_message, topic))
+
+    def start_run(self, run: Run) -> None:
+        """Forget the run before."""
+        self._given.clear()
+        self.component.reset()
+
+    def stepped(self, signals: Signals) -> None:
+        """Called after each step; overridden to tell of it."""
+
+    def on_message(self, topic: str, message: Any) -> None:
+        """Step as soon as all messages of a step are there."""
+        given = self._given
+        given[topic] = message
+        if len(given) < len(self.role.subscribes) or any(other.step != message.step for other in given.values()):
+            return
+        signals = self.signals
+        for name, due in given.items():
+            READ[name](due, signals)
+        self.advance(signals)
+        for fill, answer, publisher in self._answers:
+            fill(signals, answer, message_class)
+            publisher.publish(answer)
+        self.stepped(signals)
+
+    def advance(self, signals: Signals) -> None:
+        """Step the component."""
+        self._step(self.component, signals)

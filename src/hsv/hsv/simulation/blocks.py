@@ -1,0 +1,248 @@
+"""The loop as a table: which blocks are stepped in a period, in which order, what each takes and gives.
+
+Stepwise flight, nodes, replay, recorder, parameter pages and cache warming read it; the compiled loop of
+:mod:`hsv.simulation.closed_loop` has the same order, which the tests of bit-equality guard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsv.control.controller import Controller, ControllerInput, ControllerResult
+from hsv.control.controllers import build_controller
+from hsv.errors import HsvError
+from hsv.vehicle.dynamics import PITCH_RATE
+
+if TYPE_CHECKING:  # a node imports its own component alone
+    from hsv.control.design_file import ControlDesign
+    from hsv.control.nominal_trajectory import NominalTrajectory
+    from hsv.control.notch_filter import NotchFilter
+    from hsv.faults.actuator import Fault, FaultInjector
+    from hsv.parameters import Parameter
+    from hsv.simulation.closed_loop import Components
+    from hsv.vehicle.plant import Plant
+
+
+class Signals:
+    """What the blocks say to one another in a step, SI units and radians; each writes what it gives."""
+
+    step = -1
+    """k; -1 before the vehicle has said where it starts"""
+    period: float
+    """T, s"""
+    header: Any = None
+    """Of the messages that brought the signals, if messages did."""
+
+    state: np.ndarray
+    """x (9), the truth"""
+    status = 0
+    """:class:`hsv.vehicle.plant.FlightStatus` of the state"""
+    forces: tuple[float, float, float, float, float]
+    """Lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa"""
+    effector: np.ndarray
+    """(2), where the actuators are"""
+    measurement: np.ndarray
+    """x (9) as measured"""
+
+    filtered_pitch_rate: float
+    """q_f, rad/s"""
+    filter_state: np.ndarray
+    """s (2 s) before its update"""
+
+    reference: np.ndarray
+    """x_r (9)"""
+    reference_input: np.ndarray
+    """u_r (2)"""
+    deviation: np.ndarray
+    """x_n (9)"""
+    nominal_input: np.ndarray
+    """u_n (2)"""
+    gain: np.ndarray
+    """K (2, 9) if it was found in flight, else empty"""
+    gain_index: int
+    """Of the nested family, 0 the outermost"""
+    nominal_status: int
+    """:class:`hsv.control.nominal_law.NominalStatus`"""
+
+    answer: ControllerResult
+    """Of the controller: its input, and what it says beside"""
+    command: np.ndarray
+    """u (2)"""
+    actuator: np.ndarray
+    """(2), what becomes of the command"""
+    active: tuple[Fault, ...]
+    """Faults of this step"""
+
+
+@dataclass(frozen=True)
+class Block:
+    """What is stepped once a period."""
+
+    name: str
+    component: str
+    """Its class, ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``, imported when it is needed.
+
+    Empty where the parameters choose it.
+    """
+    inputs: tuple[str, ...]
+    """Signals of the same step that it needs: what it gives feeds through from them."""
+    outputs: tuple[str, ...]
+    step: Callable[[Any, Signals], None]
+    """Steps a component on the signals."""
+    delayed: tuple[str, ...] = ()
+    """Signals of the step before that it needs."""
+    designed: bool = False
+    """Whether it is built from the controller's design, too."""
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The parameters of its own, beside those of the design."""
+        return tuple(self._class().PARAMETERS)
+
+    def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Any:
+        """Return the component that the flat parameters ``values`` describe.
+
+        ``design``: the one in ``values``, where it is known already.
+
+        Raises:
+            ParameterError, DesignError, TrimError: A wrong value, named.
+        """
+        build = self._class().from_parameters
+        return build(values, design) if self.designed else build(values)
+
+    def _class(self) -> Any:
+        module, _, name = self.component.partition(":")
+        return getattr(import_module(module), name)
+
+
+@dataclass(frozen=True)
+class ControllerBlock(Block):
+    """The block whose component the parameters choose."""
+
+    def build(self, values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:
+        """Return the controller that ``values`` name."""
+        return build_controller(values, design)
+
+
+def _fly(plant: Plant, signals: Signals) -> None:
+    if signals.step < 0:
+        result = plant.reset()
+        signals.effector = plant.initial.input
+    else:
+        plant.place(signals.step, signals.state)
+        result = plant.step(signals.actuator)
+        signals.effector = signals.actuator
+    signals.step, signals.period = result.step, plant.period
+    signals.state, signals.forces, signals.status = result.state, result.forces, result.status
+    signals.measurement = result.state
+
+
+def _filter(notch: NotchFilter, signals: Signals) -> None:
+    result = notch.step(float(signals.measurement[PITCH_RATE]))
+    signals.filtered_pitch_rate, signals.filter_state = result.filtered_pitch_rate, result.filter_state
+
+
+def _plan(trajectory: NominalTrajectory, signals: Signals) -> None:
+    result = trajectory.step(signals.measurement)
+    signals.reference, signals.reference_input = result.reference, result.reference_input
+    signals.deviation, signals.nominal_input = result.deviation, result.input
+    signals.gain = _NO_GAIN if result.in_family else result.gain
+    signals.gain_index, signals.nominal_status = result.gain_index, result.status
+
+
+def _control(controller: Controller, signals: Signals) -> None:
+    signals.answer = controller.step(
+        ControllerInput(
+            signals.step,
+            signals.measurement,
+            signals.filtered_pitch_rate,
+            signals.filter_state,
+            signals.reference,
+            signals.reference_input,
+            signals.deviation,
+            signals.nominal_input,
+        )
+    )
+    signals.command = signals.answer.input
+
+
+def _actuate(injector: FaultInjector, signals: Signals) -> None:
+    result = injector.step(signals.step, signals.command)
+    signals.actuator, signals.active = result.actuator, result.active
+
+
+_NO_GAIN = np.empty((0, 9))
+
+VEHICLE = Block(
+    "plant", "hsv.vehicle.plant:Plant", (), ("measurement", "state", "forces"), _fly, delayed=("actuator", "state")
+)
+NOTCH_FILTER = Block(
+    "notch_filter", "hsv.control.notch_filter:NotchFilter", ("measurement",), ("filtered_state",), _filter
+)
+NOMINAL_TRAJECTORY = Block(
+    "nominal_trajectory",
+    "hsv.control.nominal_trajectory:NominalTrajectory",
+    ("measurement",),
+    ("nominal",),
+    _plan,
+    designed=True,
+)
+CONTROLLER = ControllerBlock("controller", "", ("filtered_state", "nominal"), ("command",), _control)
+FAULT_INJECTOR = Block("fault_injector", "hsv.faults.actuator:FaultInjector", ("command",), ("actuator",), _actuate)
+
+
+def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """Return ``blocks`` in an order in which each finds the inputs that it needs.
+
+    Raises:
+        HsvError: A signal that nobody or that two give, or an algebraic loop.
+    """
+    givers: dict[str, Block] = {}
+    for block in blocks:
+        for signal in block.outputs:
+            if signal in givers:
+                raise HsvError(f"{block.name}: gives {signal}, expected no other block to, {givers[signal].name} does")
+            givers[signal] = block
+    for block in blocks:
+        if lacking := [signal for signal in (*block.inputs, *block.delayed) if signal not in givers]:
+            raise HsvError(f"{block.name}: needs {lacking[0]}, expected one of {', '.join(givers)}")
+    ordered: list[Block] = []
+
+    def place(block: Block, path: tuple[Block, ...]) -> None:
+        if block in path:
+            names = " -> ".join(b.name for b in (*path[path.index(block) :], block))
+            raise HsvError(
+                f"algebraic loop {names}: expected a block in it that needs a signal of the step before only"
+            )
+        if block not in ordered:
+            for signal in block.inputs:
+                place(givers[signal], (*path, block))
+            ordered.append(block)
+
+    for block in blocks:
+        place(block, ())
+    return tuple(ordered)
+
+
+LOOP = in_order((VEHICLE, NOTCH_FILTER, NOMINAL_TRAJECTORY, CONTROLLER, FAULT_INJECTOR))
+"""The blocks, in the order in which a step passes through them."""
+
+
+def steps(components: Components) -> Iterator[Signals]:
+    """Fly ``components`` from the beginning, step by step; yield the signals of every step, the same object each time.
+
+    Raises:
+        RunError: A controller of one's own failed.
+    """
+    signals = Signals()
+    for block in LOOP:
+        getattr(components, block.name).reset()
+    while signals.status == 0:
+        for block in LOOP:
+            block.step(getattr(components, block.name), signals)
+        yield signals
