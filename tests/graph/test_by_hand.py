@@ -20,7 +20,6 @@ from hsv.graph.exclusive import is_published
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
 from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes
 
 pytestmark = pytest.mark.graph
 

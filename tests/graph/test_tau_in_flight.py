@@ -18,7 +18,6 @@ from hsv.control.design_file import find_design, read_design, write_design
 from hsv.recording.reader import Bag
 from hsv.replay.attached import complete_steps, flown_parameters
 from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes
 
 pytestmark = pytest.mark.graph
 

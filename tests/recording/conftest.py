@@ -85,6 +85,15 @@ class Messages:
         header = self.store.types["std_msgs/msg/Header"](stamp=self.time(time_ns), frame_id="")
         return self.serialize(self.make(message_type, header=header, step=step, **given))
 
+    def fault(self, effectiveness: float, channel: str = "elevator_deflection") -> Any:
+        """Make a loss of effectiveness."""
+        return self.store.types["hsv_msgs/msg/Fault"](
+            channel=channel,
+            type="loss_of_effectiveness",
+            parameter_names=["effectiveness"],
+            parameter_values=np.array([effectiveness]),
+        )
+
     def _value(self, field: Field, length: int | None) -> Any:
         some = int(self.random.integers(0, 6)) if length is None else length
         if field.count == "one":

@@ -56,7 +56,7 @@ QOS = {
 @pytest.fixture
 def written(kit: SimpleNamespace, tmp_path: Path) -> Written:
     """A bag of all our message types, a latched topic and one first seen in flight, and what was written to it."""
-    names = {f"/hsv/{name.rpartition('/')[2].lower()}": name for name in kit.types}
+    names = {f"/hsv/any_{name.rpartition('/')[2].lower()}": name for name in kit.types}
     topics = [kit.topic(name, kind, kit.latched if kind.endswith("/Ready") else None) for name, kind in names.items()]
     writer = BagWriter(tmp_path / "run", topics, {"run_id": "17e5", "commit": "0123"})
     writer.attach("scenario.toml", "application/toml", b"duration = '4 s'\n")
@@ -177,8 +177,8 @@ def test_rosbags_reads_it_all(written: Written) -> None:
         assert reader.message_count == len(log)
         assert sorted((c.topic, time, bytes(data)) for c, time, data in reader.messages()) == sorted(log)
         qos = {c.topic: c.ext.offered_qos_profiles[0] for c in reader.connections}
-        assert qos["/hsv/ready"].durability == QosDurability.TRANSIENT_LOCAL
-        assert qos["/hsv/vehiclestate"].reliability == QosReliability.RELIABLE
+        assert qos["/hsv/any_ready"].durability == QosDurability.TRANSIENT_LOCAL
+        assert qos["/hsv/any_vehiclestate"].reliability == QosReliability.RELIABLE
 
 
 def test_mcap_ros2_decodes_it_alike(written: Written) -> None:
@@ -193,11 +193,11 @@ def test_mcap_ros2_decodes_it_alike(written: Written) -> None:
         assert summary.statistics.chunk_count == len(summary.chunk_indexes) > 5
         # The first chunk holds all definitions besides its messages.
         assert max(index.uncompressed_size for index in summary.chunk_indexes[1:]) < 20_000
-        for topic in ("/hsv/vehiclestate", "/hsv/nominalstate"):
+        for topic in ("/hsv/any_vehiclestate", "/hsv/any_nominalstate"):
             theirs = [message.decoded_message for message in reader.iter_decoded_messages([topic])]
             columns = bag.columns(topic)
             assert [message.step for message in theirs] == columns["step"].tolist()
-            path_ = "elastic_rate" if topic == "/hsv/vehiclestate" else "deviation.elastic_rate"
+            path_ = "elastic_rate" if topic == "/hsv/any_vehiclestate" else "deviation.elastic_rate"
             values = [message if path_ == "elastic_rate" else message.deviation for message in theirs]
             np.testing.assert_array_equal([value.elastic_rate for value in values], columns[path_])
 

@@ -35,7 +35,9 @@ def test_at_once_equals_one_by_one(kit: SimpleNamespace, length: int) -> None:
             fast = columns_at_once(store.fielddefs, name, raw)
         except NoCommonLayoutError:
             # Text and messages in sequences are the only ones that are left to the other way.
-            assert length and name in ("hsv_msgs/msg/FaultStatus", "sensor_msgs/msg/JointState"), name
+            assert length and name in ("hsv_msgs/msg/Actuator", "hsv_msgs/msg/Fault", "sensor_msgs/msg/JointState"), (
+                name
+            )
         else:
             assert_same(fast, slow)
 
@@ -61,7 +63,6 @@ def test_names_shapes_and_values(kit: SimpleNamespace) -> None:
     assert columns["header.frame_id"].tolist() == [""] * 3
     assert columns["step"].tolist() == [0, 1, 2]
     assert columns["error"].tolist() == [list(range(7))] * 3
-    assert columns["saturated"].shape == (3, 2) and columns["saturated"].dtype == bool
     assert columns["u_feedback.fuel_equivalence_ratio"].tolist() == [0.25] * 3
     assert np.isnan(columns["u_feedback.elevator_deflection"]).all()
     assert columns["inside"].all()
@@ -105,19 +106,18 @@ def test_surplus_that_serialize_message_leaves_is_accepted(kit: SimpleNamespace)
 
 def test_bag_columns_of_varying_layout_and_of_no_message(kit: SimpleNamespace, tmp_path: Path) -> None:
     messages = kit.messages
-    fault = messages.store.types["hsv_msgs/msg/Fault"](
-        channel="elevator_deflection", type="loss_of_effectiveness", value=0.9
-    )
-    topics = [kit.topic("/hsv/fault_status", "hsv_msgs/msg/FaultStatus"), kit.topic("/hsv/none", kit.types[0])]
+    fault = messages.fault(0.9)
+    topics = [kit.topic("/hsv/actuator", "hsv_msgs/msg/Actuator"), kit.topic("/hsv/none", kit.types[0])]
     writer = BagWriter(tmp_path / "bag", topics)
     for k in range(4):
-        data = messages.stamped("hsv_msgs/msg/FaultStatus", k * 10, k, active=[fault] * (k // 2))
-        writer.write("/hsv/fault_status", k * 10, data)
+        data = messages.stamped("hsv_msgs/msg/Actuator", k * 10, k, active=[fault] * (k // 2))
+        writer.write("/hsv/actuator", k * 10, data)
     writer.close()
     bag = Bag(tmp_path / "bag")
-    columns = bag.columns("/hsv/fault_status")
+    columns = bag.columns("/hsv/actuator")
     assert columns["header.stamp"].tolist() == [0, 10, 20, 30] and columns["step"].tolist() == [0, 1, 2, 3]
-    one = {"channel": "elevator_deflection", "type": "loss_of_effectiveness", "value": 0.9}
-    assert columns["active"].tolist() == [[], [], [one], [one]]
+    one = {"channel": "elevator_deflection", "type": "loss_of_effectiveness", "parameter_names": ["effectiveness"]}
+    values = [[list(fault.pop("parameter_values")) for fault in faults] for faults in columns["active"]]
+    assert columns["active"].tolist() == [[], [], [one], [one]] and values == [[], [], [[0.9]], [[0.9]]]
     empty = bag.columns("/hsv/none")
     assert {len(column) for column in empty.values()} == {0} and "header.stamp" in empty

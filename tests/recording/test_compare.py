@@ -18,16 +18,17 @@ KIND = "hsv_msgs/msg/VehicleForces"
 def track(kit: SimpleNamespace) -> Any:
     def make(values: list[float], kind: str = KIND, **given: Any) -> Track:
         times = [k * 20_000_000 for k in range(len(values))]
+        still = kit.messages.store.types["hsv_msgs/msg/InputVector"](
+            fuel_equivalence_ratio=0.3, elevator_deflection=0.2
+        )
+        fixed = {"pitching_moment": 0.0, "dynamic_pressure": 5.0, "effector": still}
         data = [
-            kit.messages.stamped(kind, time, k, **({"lift": values[k], "drag": 1.0, "thrust": 2.0} | FIXED | given))
+            kit.messages.stamped(kind, time, k, **({"lift": values[k], "drag": 1.0, "thrust": 2.0} | fixed | given))
             for k, time in enumerate(times)
         ]
         return Track("/hsv/forces", kind, kit.messages.store, times, data)
 
     return make
-
-
-FIXED = {"pitching_moment": 0.0, "dynamic_pressure": 5.0}
 
 
 def differs(comparison: Comparison) -> bool:
@@ -97,10 +98,10 @@ def test_the_largest_difference_of_every_field(track: Any) -> None:
 
 def test_arrays_and_lists_of_messages(kit: SimpleNamespace) -> None:
     def faults(value: float, count: int) -> Track:
-        make = kit.messages.store.types["hsv_msgs/msg/Fault"]
-        active = [make(channel="elevator_deflection", type="loss_of_effectiveness", value=value)] * count
-        data = [kit.messages.stamped("hsv_msgs/msg/FaultStatus", 0, 0, active=active)]
-        return Track("/hsv/fault_status", "hsv_msgs/msg/FaultStatus", kit.messages.store, [0], data)
+        active = [kit.messages.fault(value)] * count
+        still = {"fuel_equivalence_ratio": 0.3, "elevator_deflection": 0.2}
+        data = [kit.messages.stamped("hsv_msgs/msg/Actuator", 0, 0, active=active, **still)]
+        return Track("/hsv/actuator", "hsv_msgs/msg/Actuator", kit.messages.store, [0], data)
 
     assert compare(faults(0.9, 1), faults(0.9 + 1e-12, 1), tolerance=1e-10).first is None
     for other in (faults(0.8, 1), faults(0.9, 2)):

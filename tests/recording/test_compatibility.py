@@ -17,7 +17,7 @@ MESSAGES = 40
 @pytest.fixture
 def bag(kit: SimpleNamespace, tmp_path: Path) -> Path:
     """A bag with random messages of all our types."""
-    names = {f"/hsv/{name.rpartition('/')[2].lower()}": name for name in kit.types}
+    names = {f"/hsv/any_{name.rpartition('/')[2].lower()}": name for name in kit.types}
     writer = BagWriter(tmp_path / "bag", [kit.topic(name, kind) for name, kind in names.items()])
     for k in range(MESSAGES):
         for name, kind in names.items():

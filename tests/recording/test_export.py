@@ -15,21 +15,21 @@ from hsv.recording.export import Format, export
 from hsv.recording.reader import Bag
 from hsv.recording.writer import BagWriter
 
-STATE, TUBE, FAULTS = "/hsv/state", "/hsv/tube_status", "/hsv/fault_status"
+STATE, TUBE, FAULTS = "/hsv/state", "/hsv/tube_status", "/hsv/actuator"
 
 
 @pytest.fixture
 def bag(kit: SimpleNamespace, tmp_path: Path) -> Bag:
-    kinds = {STATE: "VehicleState", TUBE: "TubeStatus", FAULTS: "FaultStatus"}
+    kinds = {STATE: "VehicleState", TUBE: "TubeStatus", FAULTS: "Actuator"}
     writer = BagWriter(tmp_path / "bag", [kit.topic(t, f"hsv_msgs/msg/{k}") for t, k in kinds.items()])
-    fault = kit.messages.store.types["hsv_msgs/msg/Fault"](channel="elevator_deflection", type="stuck", value=0.1)
+    fault = kit.messages.fault(0.1)
     for k in range(20):
         time = k * 20_000_000
         writer.write(STATE, time, kit.messages.stamped("hsv_msgs/msg/VehicleState", time, k))
         error = np.arange(5 if k < 3 else 7, dtype=np.float64)
         writer.write(TUBE, time, kit.messages.stamped("hsv_msgs/msg/TubeStatus", time, k, error=error))
         active = [fault] * (k > 9)
-        writer.write(FAULTS, time, kit.messages.stamped("hsv_msgs/msg/FaultStatus", time, k, active=active))
+        writer.write(FAULTS, time, kit.messages.stamped("hsv_msgs/msg/Actuator", time, k, active=active))
     writer.close()
     return Bag(tmp_path / "bag")
 
@@ -39,10 +39,10 @@ def test_csv(bag: Bag, tmp_path: Path) -> None:
     assert [file.name for file in files] == [
         "hsv_state.csv",
         "hsv_tube_status.csv",
-        "hsv_fault_status.csv",
+        "hsv_actuator.csv",
         "incomplete.txt",
     ]
-    assert "no topic /clock, /hsv/forces" in files[3].read_text()
+    assert "no topic /clock, /hsv/measurement, /hsv/forces" in files[3].read_text()
     with files[0].open() as stream:
         rows = list(csv.DictReader(stream))
     columns = bag.columns(STATE)
@@ -72,7 +72,7 @@ def test_npz(bag: Bag, tmp_path: Path) -> None:
         np.testing.assert_array_equal(
             data["hsv_state.elastic_coordinate [kg^0.5 m]"], bag.columns(STATE)["elastic_coordinate"]
         )
-        assert data["hsv_fault_status.active"][0] == "[]"
+        assert data["hsv_actuator.active"][0] == "[]"
         assert "no topic /clock" in str(data["incomplete"])
 
 

@@ -19,45 +19,46 @@ PERIOD = 10**7
 
 @pytest.fixture
 def described(kit: SimpleNamespace, tmp_path: Path) -> dict[str, object]:
-    fault_type, tube_type = "hsv_msgs/msg/FaultStatus", "hsv_msgs/msg/TubeStatus"
+    actuator, command, tube = (f"hsv_msgs/msg/{name}" for name in ("Actuator", "ControlInput", "TubeStatus"))
+    topics = {"/hsv/actuator": actuator, "/hsv/command": command, "/hsv/tube_status": tube}
     writer = BagWriter(
-        tmp_path / "bag",
-        [kit.topic("/hsv/fault_status", fault_type), kit.topic("/hsv/tube_status", tube_type)],
-        {"scenario": "case1", "seed": "3"},
+        tmp_path / "bag", [kit.topic(name, kind) for name, kind in topics.items()], {"scenario": "case1", "seed": "3"}
     )
     writer.attach("scenario.toml", "application/toml", b"12345")
-    make = kit.messages.store.types["hsv_msgs/msg/Fault"]
-    elevator = make(channel="elevator_deflection", type="loss_of_effectiveness", value=0.9)
-    fuel = make(channel="fuel_equivalence_ratio", type="loss_of_effectiveness", value=0.5)
+    elevator, fuel = kit.messages.fault(0.9), kit.messages.fault(0.5, "fuel_equivalence_ratio")
     for step in range(100):
         time = step * PERIOD
-        active = [fuel] * (20 <= step < 30 or 40 <= step < 50) + [elevator] * (step >= 60)
-        writer.write("/hsv/fault_status", time, kit.messages.stamped(fault_type, time, step, active=active))
         outside = 70 <= step < 75
-        tube = {
-            "status": 1 if step < 10 else 2 if outside else 0,
-            "level": math.nan if step < 10 else 1.5 if outside else 0.5,
-            "inside": step >= 10 and not outside,
-            "saturated": np.array([80 <= step < 90, step == 85]),
+        given = {
+            actuator: {"active": [fuel] * (20 <= step < 30 or 40 <= step < 50) + [elevator] * (step >= 60)},
+            command: {"saturated": np.array([80 <= step < 90, step == 85])},
+            tube: {
+                "status": 1 if step < 10 else 2 if outside else 0,
+                "level": math.nan if step < 10 else 1.5 if outside else 0.5,
+                "inside": step >= 10 and not outside,
+            },
         }
-        writer.write("/hsv/tube_status", time, kit.messages.stamped(tube_type, time, step, **tube))
+        for name, kind in topics.items():
+            writer.write(name, time, kit.messages.stamped(kind, time, step, **given[kind]))
     writer.close()
     return describe(Bag(tmp_path / "bag"))
 
 
 def test_description(described: dict[str, object]) -> None:
     described = json.loads(json.dumps(described, allow_nan=False))
-    assert described["complete"] and described["messages"] == 200
+    assert described["complete"] and described["messages"] == 300
     assert described["duration_s"] == pytest.approx(0.99)
     assert described["custom_data"] == {"scenario": "case1", "seed": "3"}
     assert described["attachments"] == [{"name": "scenario.toml", "media_type": "application/toml", "size_bytes": 5}]
-    assert [topic["name"] for topic in described["topics"]] == ["/hsv/fault_status", "/hsv/tube_status"]
+    assert [topic["name"] for topic in described["topics"]] == ["/hsv/actuator", "/hsv/command", "/hsv/tube_status"]
     assert all(topic["rate_hz"] == pytest.approx(100) and topic["messages"] == 100 for topic in described["topics"])
-    loss = {"type": "loss_of_effectiveness"}
+    loss = {"type": "loss_of_effectiveness", "parameters": {"effectiveness": 0.5}}
     assert described["faults"] == [
-        {"channel": "fuel_equivalence_ratio", "value": 0.5, "start_s": 0.2, "end_s": 0.3} | loss,
-        {"channel": "fuel_equivalence_ratio", "value": 0.5, "start_s": 0.4, "end_s": 0.5} | loss,
-        {"channel": "elevator_deflection", "value": 0.9, "start_s": 0.6, "end_s": None} | loss,
+        {"channel": "fuel_equivalence_ratio", "start_s": 0.2, "end_s": 0.3} | loss,
+        {"channel": "fuel_equivalence_ratio", "start_s": 0.4, "end_s": 0.5} | loss,
+        {"channel": "elevator_deflection", "start_s": 0.6, "end_s": None}
+        | loss
+        | {"parameters": {"effectiveness": 0.9}},
     ]
     assert described["saturation"] == {
         "steps": 10,

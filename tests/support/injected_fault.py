@@ -44,7 +44,9 @@ def inject_and_land(processes: Processes, flying: subprocess.Popen[str], bag: Pa
     first = _asked(processes, "inject", FUEL, "loss_of_effectiveness", "95 %")["step"]
     wait_until(lambda: recorded_steps(bag) > first, [flying.pid], lambda: recorded_steps(bag))
     acting = _asked(processes, "list")
-    assert acting["active"] == [{"channel": FUEL, "type": "loss_of_effectiveness", "value": 0.95}]
+    assert acting["active"] == [
+        {"channel": FUEL, "type": "loss_of_effectiveness", "parameters": {"effectiveness": 0.95}}
+    ]
     assert first <= acting["step"] and acting["time_s"] == pytest.approx(acting["step"] * 0.02)
     end = _asked(processes, "clear", FUEL)["step"]
     wait_until(lambda: recorded_steps(bag) > end, [flying.pid], lambda: recorded_steps(bag))
@@ -57,7 +59,7 @@ def inject_and_land(processes: Processes, flying: subprocess.Popen[str], bag: Pa
 def _assert_fault_acted(bag: Bag, first: int, end: int) -> None:
     steps = complete_steps(bag)
     assert bag.complete and first < end < steps
-    active = [message.step for _, message in bag.decode("/hsv/fault_status") if message.active]
+    active = [message.step for _, message in bag.decode("/hsv/actuator") if message.active]
     assert active == list(range(first, end))
     actuator, command = (bag.columns(topic)["fuel_equivalence_ratio"] for topic in ("/hsv/actuator", "/hsv/command"))
     ratio = actuator[:steps] / command[:steps]

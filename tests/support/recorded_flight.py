@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import yaml
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from hsv.control.design_file import find_design, find_file
-from hsv.graph.description import CLOCK, STATE, TOPICS, resolved
-from hsv.recording.fields import blank, nanoseconds
+from hsv.graph.description import STATE, TOPICS, resolved
+from hsv.graph.parameter_sections import ParameterSections
+from hsv.recording.fields import blank
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
-from hsv.replay.processes import processes
+from hsv.replay.engine import fly
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import parse_scenario, scenario_text
 
@@ -60,8 +60,8 @@ def record_flight(
     writer = BagWriter(directory, topics, custom | {"design": flown.design, "seed": "none"})
     design = {name: value for name, value in values.items() if name not in flown.parameters()}
     writer.attach("scenario.toml", "text/plain", text.encode())
-    writer.attach("scenario.yaml", "text/plain", _yaml(flown.parameters()))
-    writer.attach("design.yaml", "text/plain", _yaml(design))
+    writer.attach("scenario.yaml", "text/plain", ParameterSections(flown.parameters()).to_yaml().encode())
+    writer.attach("design.yaml", "text/plain", ParameterSections(design).to_yaml().encode())
     certificate = find_file(flown.design, ".certificate.json")
     assert certificate.parent == find_design(flown.design).parent
     writer.attach("certificate.json", "application/json", certificate.read_bytes())
@@ -73,19 +73,10 @@ def record_flight(
 
 
 def _fly(writer: BagWriter, types: Typestore, values: dict[str, Any]) -> None:
-    processes = processes("tube_mpc")
-    components = {name: process.build(values) for name, process in processes.items()}
-    messages = {topic: blank(types, kind) for topic, kind in TOPICS.items()}
-    first = True
-    while first or messages[STATE].status == 0:
-        for name, process in processes.items():
-            inputs = () if process.restarts and first else tuple(messages[topic] for topic in process.inputs)
-            outputs = tuple(messages[topic] for topic in process.outputs)
-            process.step(components[name], inputs, outputs, types.types.__getitem__)
-        time = nanoseconds(messages[CLOCK].clock)
-        for topic, kind in TOPICS.items():
-            writer.write(resolved(topic), time, bytes(types.serialize_cdr(messages[topic], kind)))
-        first = False
+    tracks = fly(types, "tube_mpc", ParameterSections(values), lambda *_: None)
+    for row, time in enumerate(tracks[STATE].times):
+        for topic in TOPICS:
+            writer.write(resolved(topic), time, tracks[topic].data[row])
 
 
 def _say(writer: BagWriter, types: Typestore, time: int, level: int, text: str) -> None:
@@ -97,7 +88,3 @@ def _say(writer: BagWriter, types: Typestore, time: int, level: int, text: str) 
     array = blank(types, DIAGNOSTICS)
     array.status = [status]
     writer.write("/diagnostics", time, bytes(types.serialize_cdr(array, DIAGNOSTICS)))
-
-
-def _yaml(parameters: dict[str, Any]) -> bytes:
-    return yaml.safe_dump({"/**": {"ros__parameters": parameters}}).encode()

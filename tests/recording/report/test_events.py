@@ -15,11 +15,11 @@ def test_a_quiet_flight_has_its_fault_and_nothing_else(quiet):
 
 
 def test_limited_commands_are_the_saturated_steps(loud):
-    saturated = loud.columns("/hsv/tube_status")["saturated"]
+    saturated = loud.columns("/hsv/command")["saturated"]
     assert saturated[:, 0].any() and not saturated[:, 1].any()
     events = of_kind(loud, "saturation")
     assert {event.subject for event in events} == {"fuel_equivalence_ratio"}
-    time = loud.columns("/hsv/tube_status")["header.stamp"] * 1e-9
+    time = loud.columns("/hsv/command")["header.stamp"] * 1e-9
     assert events[0].start == time[saturated[:, 0]][0]
     for moment in time[saturated[:, 0]]:
         assert any(event.start <= moment <= (20.0 if event.end is None else event.end) for event in events)

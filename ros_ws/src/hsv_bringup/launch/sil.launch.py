@@ -32,7 +32,8 @@ ARGUMENTS = {
     "scenario": ("case1", "name of a shipped scenario (hsv scenarios lists them), or path of a TOML file"),
     "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
     "real_time_factor": ("0.0", "pace: 1 is real time, 0 as fast as possible"),
-    "step_timeout": ("10.0", "wall time (s) after which a silent node ends the run"),
+    "step_timeout": ("", "wall time (s) after which a silent node ends the run; default: 10, or 4 beside a foreign node"),
+    "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),
     "units": ("si", "units of the summary and the report: si, or paper for ft, ft/s, deg"),
@@ -43,6 +44,7 @@ ARGUMENTS = {
 
 CHOICES = {
     "composed": ("true", "false"),
+    "external": ("true", "false"),
     "report": ("true", "false"),
     "units": ("si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
@@ -133,10 +135,11 @@ def prepare(context: LaunchContext) -> list[Action]:
     except PackageNotFoundError:
         refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
-    command += ["--real-time-factor", options["real_time_factor"], "--step-timeout", options["step_timeout"]]
+    command += ["--real-time-factor", options["real_time_factor"]]
+    command += ["--step-timeout", options["step_timeout"]] if options["step_timeout"] else []
     command += ["--namespace", options["namespace"]]
     command += ["--bag", options["bag"]] if options["bag"] else []
-    command += ["--composed"] if options["composed"] == "true" else []
+    command += [f"--{name}" for name in ("composed", "external") if options[name] == "true"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")), done.returncode)

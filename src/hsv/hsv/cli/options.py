@@ -19,7 +19,12 @@ VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '790
 CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
-StepTimeoutOption = Annotated[float, typer.Option(help="Wall time (s) after which a silent node ends the run.")]
+StepTimeoutOption = Annotated[
+    float | None,
+    typer.Option(
+        help="Wall time (s) after which a silent node ends the run; default: 10, or 4 beside a foreign node."
+    ),
+]
 NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
 ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]
 ExternalOption = Annotated[

@@ -27,7 +27,7 @@ def prepare(
     external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
-    step_timeout: StepTimeoutOption = 10.0,
+    step_timeout: StepTimeoutOption = None,
     folder: Annotated[
         Path | None, typer.Option(help="Folder for the parameter files; default: a new temporary one.")
     ] = None,

@@ -28,7 +28,7 @@ def run(
     external: ExternalOption = False,
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
-    step_timeout: StepTimeoutOption = 10.0,
+    step_timeout: StepTimeoutOption = None,
     report: ReportOption = True,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
     units: UnitsOption = Units.si,

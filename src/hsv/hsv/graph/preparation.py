@@ -21,6 +21,9 @@ from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
+STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 4.0
+"""Wall time (s) after which a silent node ends a run; nobody knows what a controller that is a node of its own does."""
+
 
 @dataclass(frozen=True)
 class PreparedRun:
@@ -45,7 +48,7 @@ def prepare(
     bags: Path = Path("bags"),
     bag: Path | None = None,
     real_time_factor: float = 0.0,
-    step_timeout: float = 10.0,
+    step_timeout: float | None = None,
     folder: Path | None = None,
     composed: bool = False,
     external: bool = False,
@@ -59,7 +62,8 @@ def prepare(
         bags: Where the bag is made if ``bag`` is not given, named by scenario and time.
         bag: Bag to record to, a new directory.
         real_time_factor: Simulated over wall time; 0: as fast as possible.
-        step_timeout: Wall time (s) after which a silent node ends the run.
+        step_timeout: Wall time (s) after which a silent node ends the run; ``None``: :data:`STEP_TIMEOUT`, or
+            :data:`FOREIGN_STEP_TIMEOUT` where the controller is a node of its own.
         folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
         composed: All nodes in one process.
         external: Whatever the scenario's controller is, one is flown that is started by hand.
@@ -71,7 +75,7 @@ def prepare(
     """
     if not 0.0 <= real_time_factor <= 1000.0:
         raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
-    if not 0.1 <= step_timeout <= 1e6:
+    if step_timeout is not None and not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
     text = scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
@@ -82,6 +86,8 @@ def prepare(
         design = read_parameters(design_file) if design_file else {"design.name": NO_DESIGN}
         nodes = _started(scenario.controller, composed)
         own = own_parameters(scenario)
+        foreign = controller_node(scenario.controller).foreign
+    wait = step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
     run_id = uuid.uuid4().hex
@@ -109,7 +115,7 @@ def prepare(
     run = {
         **certified,
         "real_time_factor": float(real_time_factor),
-        "step_timeout": float(step_timeout),
+        "step_timeout": float(wait),
         "recorder": True,
         "bag.directory": str(bag.absolute()),
         "bag.attachments": [str(folder / name) for name in files],
@@ -125,7 +131,7 @@ def prepare(
     }
     (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
-    return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, step_timeout, temporary)
+    return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, wait, temporary)
 
 
 def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:

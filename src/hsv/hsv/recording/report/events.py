@@ -63,8 +63,10 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
 def _faults(description: dict[str, Any]) -> Iterator[Event]:
     for fault in description["faults"] or ():
         channel = fault["channel"].replace("_", " ")
-        values = ", ".join(f"{name.replace('_', ' ')} {value:.6g}" for name, value in fault["parameters"].items())
-        text = f"{channel}: {fault['type'].replace('_', ' ')}, {values}"
+        given = fault["parameters"]
+        named = {name: f"{name.replace('_', ' ')} " if len(given) > 1 else "" for name in given}
+        values = ", ".join(f"{named[name]}{value:.6g}" for name, value in given.items())
+        text = f"{channel}: {fault['type'].replace('_', ' ')} {values}"
         yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
 
 

@@ -1,0 +1,149 @@
+"""Controllers of one's own over DDS: a class, a compiled kernel, and a node that knows the messages alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from injected_fault import last_line
+from node_processes import Processes
+from ros_domain import own_environment
+from waiting import exit_code_of, output_of, wait_until
+
+from hsv.recording.flight import flight_fingerprint
+from hsv.recording.reader import Bag
+from hsv.replay.attached import complete_steps
+
+pytestmark = pytest.mark.graph
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+WRONG = Path(__file__).parents[1] / "support" / "wrong_controller.py"
+WRONG_STEP = 100
+SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Build the example's node as a workspace of its own; return what an environment needs to find all examples."""
+    folder = tmp_path_factory.mktemp("workspace")
+    shutil.copytree(EXAMPLES / "node", folder / "src")
+    words = ["colcon", "--log-base", "log", "build", "--base-paths", "src"]
+    subprocess.run(words, cwd=folder, check=True, capture_output=True)
+    prefix = folder / "install" / "hsv_example_node"
+    [site] = prefix.glob("lib/python3*/site-packages")
+    # Class and kernel are named by their place: nothing is installed into the environment of the tests.
+    modules = (site, EXAMPLES / "lqr", EXAMPLES / "compiled")
+    return {
+        "AMENT_PREFIX_PATH": os.pathsep.join((str(prefix), os.environ["AMENT_PREFIX_PATH"])),
+        "PYTHONPATH": os.pathsep.join((*map(str, modules), os.environ.get("PYTHONPATH", ""))),
+    }
+
+
+@pytest.fixture
+def processes(installed: dict[str, str], tmp_path: Path) -> Iterator[Processes]:
+    with own_environment() as environment:
+        started = Processes(environment | installed, tmp_path)
+        yield started
+        started.stop()
+
+
+def scenario(folder: Path, example: str, more: str = "", duration: float = 11.0) -> Path:
+    """Write a shortened scenario of an example."""
+    path = folder / f"{example}.toml"
+    path.write_text(SHORT.format(example=EXAMPLES / example / "scenario.toml", more=more, duration=duration))
+    return path
+
+
+def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
+    done = processes.run("hsv", "run", path, "--no-report", "--bag", processes.folder / name, *words)
+    assert done.returncode == 0, done.stdout
+    return Bag(processes.folder / name)
+
+
+@pytest.mark.parametrize(("example", "place"), [("lqr", "hsv_lqr:Lqr"), ("compiled", "hsv_scheduled:Scheduled")])
+def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: str, place: str) -> None:
+    path = scenario(processes.folder, example, f'controller = "{place}"')
+    simulated = processes.run("hsv", "simulate", path)
+    assert simulated.returncode == 0, simulated.stdout
+    [fingerprint] = [line.split()[1] for line in simulated.stdout.splitlines() if line.startswith("fingerprint")]
+    for words in ((), ("--composed",)):
+        bag = flown(processes, path, f"flown{''.join(words)}", *words)
+        assert f"{flight_fingerprint(bag)}" == fingerprint
+        assert "tube" not in " ".join(bag.topics) and bag.custom_data["controller"] == place
+    for words in ((), ("--rerun",), ("--over-dds", "--node", "controller")):
+        replayed = processes.run("hsv", "replay", bag.folder, *words)
+        assert replayed.returncode == 0 and "identical in every byte" in replayed.stdout, replayed.stdout
+    reported = processes.run("hsv", "report", bag.folder, "--out", processes.folder / "page.html")
+    assert reported.returncode == 0, reported.stdout
+
+
+def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: Processes) -> None:
+    path = scenario(processes.folder, "node")
+    bags = [flown(processes, path, "started")]
+    # Late: all others wait for it.
+    run = processes.start(
+        "hsv", "run", path, "--external", "--composed", "--no-report", "--bag", processes.folder / "late"
+    )
+    wait_until(lambda: (processes.folder / "late" / "late_0.mcap").exists(), [run.pid])
+    regulator = processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", "__node:=any_name")
+    said = output_of(run)
+    assert run.returncode == 0, said
+    bags += [Bag(processes.folder / "late"), flown(processes, path, "next", "--external")]
+    assert regulator.poll() is None
+    assert len({flight_fingerprint(bag) for bag in bags}) == 1
+    for words in ((), ("--rerun",)):
+        replayed = processes.run("hsv", "replay", bags[1].folder, *words)
+        assert replayed.returncode == 0, replayed.stdout
+        lines = [line for line in replayed.stdout.splitlines() if "identical in every byte" in line]
+        assert len(lines) == 4, replayed.stdout
+
+
+@pytest.mark.parametrize(
+    ("how", "words"),
+    [
+        ("killed", "no answer from"),
+        ("hung", "no answer from"),
+        ("wrong_step", f"/regulator answered step {WRONG_STEP - 1} on hsv/command, expected step"),
+        ("nan", f"/regulator, step {WRONG_STEP}: elevator_deflection = nan, expected a finite number"),
+    ],
+)
+def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Processes, how: str, words: str) -> None:
+    path = scenario(processes.folder, "node", 'controller = "node:"')
+    foreign = processes.start(sys.executable, WRONG, how, str(WRONG_STEP))
+    done = processes.run("hsv", "run", path, "--composed", "--no-report", "--bag", processes.folder / how)
+    assert done.returncode == 1 and words in done.stdout, done.stdout
+    assert "Traceback" not in done.stdout
+    bag = Bag(processes.folder / how)
+    # What was not a number is recorded, and flown no further.
+    assert bag.complete and complete_steps(bag) == WRONG_STEP + (how == "nan")
+    assert (exit_code_of(foreign) == -9) if how == "killed" else foreign.poll() is None
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('controller = "node:hsv_example_node"', "expected node:package/executable, or node: alone"),
+        ('controller = "node:nowhere/regulator"', "no executable regulator of package nowhere"),
+        ('controller = "hsv_lqr:Nothing"', "cannot be loaded, AttributeError"),
+        ("[regulator]\ngain = 1.0", "regulator: unknown table, expected none: a node brings its own parameters"),
+    ],
+)
+def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, words: str) -> None:
+    done = processes.run("hsv", "run", scenario(processes.folder, "node", more), "--bag", processes.folder / "bag")
+    assert done.returncode == 2 and words in last_line(done) and len(done.stdout.splitlines()) == 1, done.stdout
+    assert not (processes.folder / "bag").exists()
+
+
+def test_a_node_does_not_fly_in_process(processes: Processes) -> None:
+    done = processes.run("hsv", "simulate", scenario(processes.folder, "node"))
+    assert done.returncode == 2 and "a node of its own, expected hsv run" in last_line(done), done.stdout
+
+
+def test_the_node_of_classes_flies_no_other(processes: Processes) -> None:
+    done = processes.run("ros2", "run", "hsv_ctrl", "controller")
+    assert done.returncode == 2 and "the node tube_mpc flies it" in last_line(done), done.stdout

@@ -1,0 +1,37 @@
+"""The example's regulator, which goes wrong: ``python3 wrong_controller.py killed|hung|wrong_step|nan STEP``."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import sys
+import time
+
+import rclpy
+from hsv_example_node.regulator import Regulator
+
+
+def main(how: str, step: int) -> None:
+    """Fly, and go wrong."""
+    rclpy.init()
+    node = Regulator()
+    publish = node.command.publish
+
+    def go_wrong(message):
+        if message.step == step and how == "killed":
+            os.kill(os.getpid(), signal.SIGKILL)
+        elif message.step == step and how == "hung":
+            time.sleep(3600.0)
+        elif message.step == step and how == "wrong_step":
+            message.step -= 1
+        elif message.step == step and how == "nan":
+            message.elevator_deflection = math.nan
+        publish(message)
+
+    node.command.publish = go_wrong
+    rclpy.spin(node)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))
