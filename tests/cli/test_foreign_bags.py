@@ -61,10 +61,10 @@ def test_a_topic_of_another_type_or_definition(
         ("VehicleState", "altitude", ["info", "plot", "report", "replay"]),
         ("VehicleState", "step", ["replay", "replay --rerun"]),
         ("NominalState", "gain_index", ["plot", "report", "replay"]),
-        ("TubeStatus", "saturated", ["info", "plot", "report", "replay"]),
+        ("ControlInput", "saturated", ["info", "plot", "report", "replay"]),
         ("TubeStatus", "tau", ["replay", "replay --rerun"]),
-        ("FaultStatus", "active", ["info", "plot", "report", "replay"]),
-        ("FaultStatus", "step", ["replay"]),
+        ("Actuator", "active", ["info", "plot", "report", "replay"]),
+        ("Actuator", "step", ["replay"]),
     ],
 )
 def test_a_field_that_a_definition_lacks_is_named(

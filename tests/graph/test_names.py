@@ -38,7 +38,7 @@ REMAPPED = [
         "hsv/command:=/wish/command",
         "clock:=tick",
         "hsv/run:=announced",
-        "hsv/fault_status:=/faults/now",
+        "hsv/actuator:=/faults/now",
         "hsv/inject_fault:=/faults/inject",
     )
     for word in ("-r", rule)
@@ -110,7 +110,7 @@ def test_remapped_by_hand_with_duplicates_and_parameters_dumped(processes: Proce
     processes.stop()
     bag = Bag(prepared.bag)
     roles = {"hsv/state": "/truth", "hsv/command": "/wish/command", "clock": "/tick", "hsv/nominal": "/hsv/nominal"}
-    roles |= {"hsv/run": "/announced", "hsv/fault_status": "/faults/now"}
+    roles |= {"hsv/run": "/announced", "hsv/actuator": "/faults/now"}
     assert {role: bag.name_of(role) for role in roles} == roles
     scenario = load_scenario(str(short_scenario(folder, 0.02 * (complete_steps(bag) + 1), 3)))
     flown = fly(assemble(flight_parameters(scenario))).history.state

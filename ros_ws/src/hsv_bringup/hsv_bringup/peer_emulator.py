@@ -80,7 +80,12 @@ class PeerEmulatorNode(LockstepNode):
             self.create_subscription(Run, description.RUN, self._on_run, LATCHED)
             return True
         assert self._run is not None, "hsv replay takes no bag without the announcement of its run"
-        run = Run(run_id="replay", period=self._run.period, last_step=self._run.last_step)
+        run = Run(
+            run_id="replay",
+            period=self._run.period,
+            last_step=self._run.last_step,
+            interface_version=Run.INTERFACE_VERSION,
+        )
         self._announcer = self._peers[description.PLANT.name].create_publisher(Run, description.RUN, LATCHED)
         self._announcer.publish(run)
         self.create_subscription(Ready, description.READY, self._on_ready, LATCHED)

@@ -222,6 +222,12 @@ class PeerNode(LockstepNode):
         return 0.25 if self._announced else LINK_LOOK
 
     def _on_run(self, run: Run) -> None:
+        if run.interface_version != Run.INTERFACE_VERSION:
+            self.get_logger().fatal(
+                f"interface version {run.interface_version} of the plant: expected {Run.INTERFACE_VERSION}, as here"
+            )
+            self.finish(2)
+            return
         period = self.get_parameter("period").value if self.has_parameter("period") else run.period
         if period != run.period:
             self.get_logger().fatal(f"parameter period = {period}: expected the plant's, {run.period}")
