@@ -10,6 +10,7 @@ setup(
             "**/*.toml",
             "bench/*.c",
             "campaign/template/*",
+            "control/include/*.h",
             "recording/layouts/*",
             "recording/report/plotly/*",
             "recording/report/template/*",

@@ -31,6 +31,14 @@ class RunError(HsvError, RuntimeError):
     """A flight that did not come to its planned end."""
 
 
+class ControllerError(RunError):
+    """A controller of one's own that failed in flight; the message names it, and the step where it is known."""
+
+
+class ProcessError(RunError):
+    """A process that runs other people's code and crashed, or hangs."""
+
+
 class CampaignError(HsvError, ValueError):
     """A Monte Carlo campaign with a wrong setting, or its results missing, foreign or of another campaign."""
 

@@ -18,6 +18,7 @@ from hsv.cli.diff import diff
 from hsv.cli.export import export
 from hsv.cli.fault import fault
 from hsv.cli.figures import figures
+from hsv.cli.include import include
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.montecarlo import montecarlo
@@ -61,6 +62,7 @@ for command in (
     run,
     prepare,
     conclude,
+    include,
     info,
     plot,
     report,

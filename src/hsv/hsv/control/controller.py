@@ -24,13 +24,13 @@ import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hsv.errors import ParameterError, RunError
+from hsv.errors import ControllerError, ParameterError, RunError
 from hsv.parameters import Parameter
-from hsv.vehicle.dynamics import INPUT_NAMES
+from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, STATE_UNITS
 from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 
 if TYPE_CHECKING:
@@ -62,6 +62,37 @@ class ControllerInput(NamedTuple):
     """u_n (2)"""
 
 
+class Signal(NamedTuple):
+    """Numbers that go from block to block."""
+
+    name: str
+    unit: str
+    """SI; several, separated by commas, are repeated number by number"""
+    size: int
+
+
+_STATE_UNIT, _INPUT_UNIT = ", ".join(STATE_UNITS), ", ".join(INPUT_UNITS)
+
+CONTROLLER_INPUTS = (
+    Signal("state", _STATE_UNIT, N_STATES),
+    Signal("filtered_pitch_rate", "rad/s", 1),
+    Signal("reference", _STATE_UNIT, N_STATES),
+    Signal("reference_input", _INPUT_UNIT, N_INPUTS),
+    Signal("deviation", _STATE_UNIT, N_STATES),
+    Signal("nominal_input", _INPUT_UNIT, N_INPUTS),
+)
+"""What a compiled controller is given, one after the other, by the names of :class:`ControllerInput`; the state of the
+notch filter follows. C has the same order in ``hsv_block.h``."""
+
+CONTROLLER_OUTPUTS = (Signal("wanted_input", _INPUT_UNIT, N_INPUTS),)
+"""What a compiled controller answers."""
+
+
+def filter_state_signal(size: int) -> Signal:
+    """Return the signal that follows :data:`CONTROLLER_INPUTS`, of a notch filter with ``size`` states."""
+    return Signal("filter_state", "rad, rad s", size)
+
+
 @dataclass(frozen=True)
 class ControllerResult:
     """What the bench takes from a controller; one with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
@@ -81,8 +112,8 @@ class StepKernel(NamedTuple):
     """A compiled step function, as of :func:`numba.cfunc`, with its arrays.
 
     The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; what is
-    not 0 ends the flight. ``in`` holds x (9), q_f, x_r (9), u_r (2), x_n (9), u_n (2), s (2 s) one after the other,
-    ``out`` takes the wanted input (2). Everything that is kept from step to step is in ``state``.
+    not 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` and s (2 s) one after the other, ``out`` takes the
+    wanted input (2). Everything that is kept from step to step is in ``state``.
     """
 
     address: int
@@ -114,7 +145,7 @@ class ControllerClass(Protocol):
     and elevator deflection (rad), which the bench limits; or, in place of a ``step``, a :class:`StepKernel` ``kernel``.
     """
 
-    PARAMETERS: ClassVar[tuple[Parameter, ...]]
+    PARAMETERS: tuple[Parameter, ...]
     """Of the controller alone, named ``table.parameter``; a scenario has them in that table."""
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
@@ -149,11 +180,10 @@ class ForeignController(Controller):
 
     def __init__(self, name: str, controller: Any) -> None:
         """Call the ``controller`` by its ``name`` in errors."""
-        self._name = name
+        self.name = name
         self._controller = controller
         self.kernel: StepKernel | None = getattr(controller, "kernel", None)
         if self.kernel is not None:
-            self._function = STEP_FUNCTION(self.kernel.address)
             self.reset()
 
     def reset(self) -> None:
@@ -167,14 +197,16 @@ class ForeignController(Controller):
         """Return the input of this step as the controller wants it, not limited, finite or not.
 
         Raises:
-            RunError: The controller failed, or did not answer with two numbers.
+            ControllerError: The controller failed, or did not answer with two numbers.
         """
         try:
-            given = self._controller.step(inputs) if self.kernel is None else self._called(inputs)
+            given = self._answer(inputs)
+        except ControllerError:
+            raise
         # Foreign code may fail in any way.
         except Exception as error:
             words = " ".join(str(error).split())
-            raise RunError(f"{self._name}, step {inputs.step}: {type(error).__name__}: {words}") from error
+            raise ControllerError(f"{self.name}, step {inputs.step}: {type(error).__name__}: {words}") from error
         try:
             fuel, elevator = given
             return float(fuel), float(elevator)
@@ -185,22 +217,41 @@ class ForeignController(Controller):
         """Return the limited input of this step.
 
         Raises:
-            RunError: The controller failed, or did not answer with two finite numbers.
+            ControllerError: The controller failed, or did not answer with two finite numbers.
         """
         wanted = np.array(self.wanted(inputs))
         if not np.all(np.isfinite(wanted)):
             raise self.failure(inputs.step, f"answered {wanted.tolist()}")
         return ControllerResult(np.minimum(np.maximum(wanted, INPUT_MINIMUM), INPUT_MAXIMUM), wanted)
 
-    def failure(self, step: int, what: str) -> RunError:
+    def failure(self, step: int, what: str) -> ControllerError:
         """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
-        return RunError(f"{self._name}, step {step}: {what}, expected a finite number for {' and '.join(INPUT_NAMES)}")
+        expected = f"expected a finite number for {' and '.join(INPUT_NAMES)}"
+        return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
 
-    def _called(self, inputs: ControllerInput) -> np.ndarray:
-        assert self.kernel is not None
-        k, x, q_f, s, *planned = inputs
-        flat, wanted = np.concatenate((x, [q_f], *planned, s)), np.full(len(INPUT_NAMES), np.nan)
-        arrays = (flat, wanted, self._state, self.kernel.parameters)
-        if code := self._function(k, *(array.ctypes.data for array in arrays)):
-            raise RunError(f"returned {code}")
-        return wanted
+    def _answer(self, inputs: ControllerInput) -> Any:
+        if self.kernel is None:
+            return self._controller.step(inputs)
+        return call_step_function(
+            self.kernel.address, inputs.step, flat_input(inputs), self._state, self.kernel.parameters
+        )
+
+
+def flat_input(inputs: ControllerInput) -> np.ndarray:
+    """Return what a compiled controller is given, in one array."""
+    named = [np.ravel(getattr(inputs, signal.name)) for signal in CONTROLLER_INPUTS]
+    return np.concatenate((*named, inputs.filter_state))
+
+
+def call_step_function(
+    address: int, step: int, given: np.ndarray, state: np.ndarray, parameters: np.ndarray
+) -> np.ndarray:
+    """Call the function of a compiled controller and return the wanted input (2); ``state`` is changed in place.
+
+    Raises:
+        RunError: It returned anything but 0.
+    """
+    wanted = np.full(N_INPUTS, np.nan)  # what is not answered is no number
+    if code := STEP_FUNCTION(address)(step, *(a.ctypes.data for a in (given, wanted, state, parameters))):
+        raise RunError(f"returned {code}")
+    return wanted

@@ -6,7 +6,8 @@ A package registers its controllers as entry points of the group ``hsv.controlle
     lqr = "hsv_lqr:Lqr"
 
 A scenario then says ``controller = "lqr"``; where nothing is registered, ``controller = "package.module:Class"``.
-What such a class must have is in :mod:`hsv.control.controller`.
+What such a class must have is in :mod:`hsv.control.controller`. One in C is ``controller = "path/lib.so:symbol"``, see
+:mod:`hsv.control.library`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
+from hsv.control.library import LibraryClass, library_place
 from hsv.errors import HsvError, ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.units import parse_quantity
@@ -42,7 +44,7 @@ CONTROLLER_PARAMETERS = (
     Parameter(
         "controller",
         _DEFAULT,
-        "what closes the loop: a registered name, package.module:Class, or node:package/executable",
+        "what closes the loop: a registered name, package.module:Class, path/lib.so:symbol or node:package/executable",
     ),
 )
 
@@ -53,11 +55,13 @@ def controller_names() -> list[str]:
 
 
 def controller_class(name: str) -> ControllerClass:
-    """Return the class of a controller, a registered one or ``package.module:Class``.
+    """Return the class of a controller, a registered one, ``package.module:Class`` or ``path/lib.so:symbol``.
 
     Raises:
         ParameterError: There is none of that name, or it cannot be loaded.
     """
+    if library := library_place(name):
+        return LibraryClass(name, *library)
     place = class_place(name)
     module, _, attribute = place.partition(":")
     try:
@@ -87,7 +91,8 @@ def class_place(name: str) -> str:
     near = difflib.get_close_matches(name, controller_names(), 1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise ParameterError(
-        f"controller = {name!r}: expected one of {', '.join(controller_names())} or package.module:Class{hint}"
+        f"controller = {name!r}: expected one of {', '.join(controller_names())}, package.module:Class or "
+        f"path/lib.so:symbol{hint}"
     )
 
 

@@ -4,27 +4,35 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from hsv.control.controller import Controller, ControllerInput, ElsewhereController, ForeignController
+from hsv.control.controller import (
+    CONTROLLER_INPUTS,
+    Controller,
+    ControllerInput,
+    ElsewhereController,
+    ForeignController,
+)
+from hsv.control.library import LibraryController
 from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
+from hsv.errors import ControllerError, ProcessError
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
 from hsv.simulation.metrics import FlightData, flight_metrics
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.plant import FlightStatus, Plant
@@ -70,14 +78,40 @@ class History(NamedTuple):
     @classmethod
     def empty(cls, rows: int) -> History:
         """Return room for ``rows`` steps."""
-        widths = (9, 0, 9, 2, 0, 2, 2, 2)
-        return cls(*(np.empty((rows, w)) if w else np.empty(rows) for w in widths))
+        return cls.over(np.empty(rows * cls.numbers()), rows)
+
+    @classmethod
+    def over(cls, memory: np.ndarray, rows: int) -> History:
+        """Return ``rows`` steps that lie in ``memory``, one column after the other."""
+        cuts = np.cumsum([rows * max(width, 1) for width in _COLUMNS])
+        columns = zip(np.split(memory[: cuts[-1]], cuts[:-1]), _COLUMNS, strict=True)
+        return cls(*(column.reshape(rows, width) if width else column for column, width in columns))
+
+    @staticmethod
+    def numbers() -> int:
+        """Return how many numbers a step has."""
+        return sum(max(width, 1) for width in _COLUMNS)
+
+    def copy(self) -> History:
+        """Return a copy, one column after the other in new memory."""
+        copied = History.empty(len(self.filtered_pitch_rate))
+        for column, own in zip(copied, self, strict=True):
+            column[:] = own
+        return copied
+
+    def cut(self, rows: int) -> History:
+        """Return the first ``rows`` steps."""
+        return History(*(column[:rows] for column in self))
+
+
+_COLUMNS = (9, 0, 9, 2, 0, 2, 2, 2)
+"""Widths of the columns of a :class:`History`; 0: a number a step."""
 
 
 class LoopArrays(NamedTuple):
     """The signals of a step between nominal trajectory and actuators, and the memory of the tube law, in place.
 
-    Those up to ``filter_state`` are one array, in this order: what a controller is given.
+    What a controller is given is one array.
     """
 
     state: np.ndarray
@@ -92,16 +126,20 @@ class LoopArrays(NamedTuple):
     memory: np.ndarray
 
 
-_WIDTHS = (N_STATES, 1, N_STATES, N_INPUTS, N_STATES, N_INPUTS)
-_ENDS = tuple(accumulate(_WIDTHS))
+_NAMES = (*(signal.name for signal in CONTROLLER_INPUTS), "filter_state")
+_ENDS = tuple(accumulate(signal.size for signal in CONTROLLER_INPUTS))
 _CUTS = [slice(start, end) for start, end in zip((0, *_ENDS), (*_ENDS, None), strict=True)]
 _ONE_AT_A_TIME = threading.Lock()
 
 
+def _cut(given: np.ndarray) -> dict[str, np.ndarray]:
+    """Return by name what is in the one array that a compiled controller is given."""
+    return {name: given[cut] for name, cut in zip(_NAMES, _CUTS, strict=True)}
+
+
 def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, LoopArrays]:
     given = np.zeros(_ENDS[-1] + filter_states)
-    views = [*(given[cut] for cut in _CUTS), np.zeros(N_INPUTS), np.zeros(1), memory]
-    return given, LoopArrays._make(views)
+    return given, LoopArrays(**_cut(given), wanted=np.zeros(N_INPUTS), gain_index=np.zeros(1), memory=memory)
 
 
 @njit(cache=True, nogil=True)
@@ -254,11 +292,48 @@ def fly(components: Components) -> Flight:
     """Fly ``components`` from the plant's initial trim to the end of its duration, or until it diverges.
 
     The loop is compiled; a nominal law that solves a problem in flight and a controller of one's own in Python are
-    called from it. Flights with such a block wait for one another: it has one state.
+    called from it. Flights with such a block wait for one another: it has one state. With a controller in a shared
+    library the loop flies in a child process, and flights wait for one another, too.
 
     Raises:
-        RunError: A controller of one's own failed; it is named, with the step.
+        ControllerError: A controller of one's own failed; it is named, with the step.
         ParameterError: The controller is a node of its own.
+    """
+    rows = components.plant.steps + 1
+    if isinstance(components.controller, LibraryController):
+        with watched(components.controller, rows) as (history, request):
+            flown = request("fly", rows, kept=vars(components))
+            return _flight(components, history.copy().cut(flown))
+    history = History.empty(rows)
+    return _flight(components, history.cut(fly_into(history, components)))
+
+
+@contextmanager
+def watched(controller: LibraryController, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
+    """Yield the history, of so many steps, that a library's flights are written to, and what requests them.
+
+    Flights are given up when they stand still; an error says in which step.
+    """
+    with controller.library.sharing(rows * History.numbers()) as memory:
+        history = History.over(memory, rows)
+
+        def begun() -> int:
+            # The pitch rate of a step is written before the controller is called.
+            return int(np.count_nonzero(~np.isnan(history.filtered_pitch_rate)))
+
+        history.filtered_pitch_rate[:] = np.nan
+        try:
+            yield history, partial(controller.library.request, begun=begun)
+        except ProcessError as error:
+            where = f", step {begun() - 1}" if begun() else ""
+            raise ControllerError(f"{controller.name}{where}: {error}") from error
+
+
+def fly_into(history: History, components: Components) -> int:
+    """Fly ``components`` in this process, as many steps as ``history`` has rows; return how many were flown.
+
+    Raises:
+        ControllerError, ParameterError: As :func:`fly`.
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
     if isinstance(controller, ElsewhereController):
@@ -279,7 +354,6 @@ def fly(components: Components) -> Flight:
             address, state, parameters = controller.kernel
             memory = state.copy()
             controller_call = call_of(address, given, arrays.wanted, memory, parameters)
-    history = History.empty(plant.steps + 1)
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
             nominal.law.reset()
@@ -305,7 +379,7 @@ def fly(components: Components) -> Flight:
     if rows < 0:
         assert isinstance(controller, ForeignController)
         raise controller.failure(-1 - rows, f"returned an error or answered {arrays.wanted.tolist()}")
-    return _flight(components, History(*(column[:rows] for column in history)))
+    return rows
 
 
 def _solving(law: NominalLaw, arrays: LoopArrays) -> Callback:
@@ -319,10 +393,9 @@ def _solving(law: NominalLaw, arrays: LoopArrays) -> Callback:
 def _controlling(controller: ForeignController, given: np.ndarray, arrays: LoopArrays) -> Callback:
     def control(step: int) -> None:
         # A copy: a controller may keep what it was given.
-        now = given.copy()
-        x, q_f, x_r, u_r, x_n, u_n, s = [now[cut] for cut in _CUTS]
-        inputs = ControllerInput(step, x, float(q_f[0]), s, x_r, u_r, x_n, u_n)
-        arrays.wanted[0], arrays.wanted[1] = controller.wanted(inputs)
+        now: dict[str, Any] = _cut(given.copy())
+        now["filtered_pitch_rate"] = now["filtered_pitch_rate"].item()
+        arrays.wanted[0], arrays.wanted[1] = controller.wanted(ControllerInput(step, **now))
 
     return Callback(control)
 

@@ -15,9 +15,10 @@ from pydantic import Field, StrictBool, StrictInt, ValidationError
 
 from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
+from hsv.control.library import inside
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
-from hsv.inheritance import EXTENDS, follow_extends, is_path
+from hsv.inheritance import follow_extends, is_path
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
 from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
 from hsv.simulation.metrics import METRICS
@@ -110,7 +111,7 @@ class Scenario(Table):
     design: str = "baseline"
     """Name or path; empty: none"""
     controller: str = "tube_mpc"
-    """A registered name, or ``package.module:Class``"""
+    """A registered name, ``package.module:Class``, or ``path/lib.so:symbol``, the path absolute"""
     duration: Time
     vehicle: VehicleTable = VehicleTable()
     initial: InitialTable
@@ -180,15 +181,28 @@ def scenario_names() -> list[str]:
 
 
 def scenario_text(name: str) -> str:
-    """Return the text of a shipped scenario (by name) or of a file (by path), with what it extends written out.
+    """Return the text of a shipped scenario (by name) or of a file (by path), which stands alone.
+
+    What it extends is written out, and the path of a library absolute.
 
     Raises:
-        ScenarioError: No such scenario or file, or it cannot be read.
+        ScenarioError: No such scenario or file, it cannot be read, or a path leads out of its folder.
     """
     text = _own_text(name)
-    if EXTENDS not in _table(text, name):
-        return text
-    return tomli_w.dumps(follow_extends(name, lambda other: _table(_own_text(other), other), _refused, REPLACED))
+    own = _table(text, name)
+    whole = follow_extends(name, lambda other: _located(_table(_own_text(other), other), other), _refused, REPLACED)
+    return text if whole == own else tomli_w.dumps(whole)
+
+
+def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the table of a file with the path of a library absolute; that of a shipped one is from where we are."""
+    controller = table.get("controller")
+    if not isinstance(controller, str):
+        return table
+    try:
+        return {**table, "controller": inside(controller, Path(name).parent if is_path(name) else Path())}
+    except ParameterError as error:
+        raise _refused(name, error) from error
 
 
 def _refused(name: str, why: object) -> ScenarioError:
@@ -229,7 +243,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
         table = _table(text, name)
         for field, value in changes.items():
             _set(table, field, value, name)
-        text = tomli_w.dumps(table)
+        text = tomli_w.dumps(_located(table, name) if "controller" in changes else table)
     return parse_scenario(text, Path(name).stem)
 
 

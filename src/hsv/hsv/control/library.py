@@ -1,0 +1,188 @@
+"""Controllers in C: ``controller = "path/lib.so:symbol"``, the symbol a block of ``hsv_block.h``.
+
+This process never loads the library: it is described, stepped and flown by a child, see
+:mod:`hsv.control.library_process`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from hsv.control.c_block import Block
+from hsv.control.controller import (
+    CONTROLLER_INPUTS,
+    CONTROLLER_OUTPUTS,
+    ControllerInput,
+    ForeignController,
+    Signal,
+    StepKernel,
+    filter_state_signal,
+    flat_input,
+)
+from hsv.control.library_process import LibraryUser, library_user
+from hsv.control.notch_filter import NotchFilter
+from hsv.errors import ControllerError, HsvError, ParameterError, ProcessError, reason
+from hsv.parameters import check_all
+
+
+def library_place(controller: str) -> tuple[Path, str] | None:
+    """Return path and symbol of a controller in a shared library, nothing where it is another one."""
+    path, _, symbol = controller.rpartition(":")
+    return (Path(path), symbol) if "/" in path or path.endswith(".so") else None
+
+
+def inside(controller: str, folder: Path) -> str:
+    """Return the ``controller`` of a scenario in ``folder``, the path of a library absolute.
+
+    Raises:
+        ParameterError: The path leads out of the folder: a scenario names nothing but what comes with it.
+    """
+    place = library_place(controller)
+    if place is None:
+        return controller
+    path, symbol = place
+    found = (folder / path).resolve()
+    if not found.is_relative_to(folder.resolve()):
+        raise ParameterError(f"controller = {controller!r}: expected a path inside the scenario's folder")
+    return f"{found}:{symbol}"
+
+
+@dataclass(frozen=True)
+class LibraryRecord:
+    """What a recorded flight keeps of the library that it was flown with."""
+
+    sha256: str
+    """Of the file, hexadecimal"""
+    source_name: str
+    """As the block says, from the library's folder; empty where it says nothing"""
+    source: bytes
+
+
+def library_record(controller: str) -> LibraryRecord | None:
+    """Return what is to be kept of a scenario's ``controller``, nothing where it is not in a library.
+
+    Raises:
+        ParameterError: The library, or the source that its block names, cannot be read.
+    """
+    place = library_place(controller)
+    if place is None:
+        return None
+    path, symbol = place
+    name = LibraryClass(controller, path, symbol).block.source
+    source = _content(path.parent / name, f"controller = {controller!r}: source = {name!r}") if name else b""
+    return LibraryRecord(library_digest(controller), name, source)
+
+
+def library_digest(controller: str) -> str:
+    """Return the SHA-256 of the library of a scenario's ``controller``, hexadecimal; empty where it is in none.
+
+    Raises:
+        ParameterError: It cannot be read.
+    """
+    place = library_place(controller)
+    return hashlib.sha256(_content(place[0], f"controller = {controller!r}")).hexdigest() if place else ""
+
+
+def _content(path: Path, field: str) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ParameterError(f"{field}: cannot be read ({reason(error)})") from error
+
+
+class LibraryClass:
+    """The class of a controller in a shared library, see :class:`hsv.control.controller.ControllerClass`."""
+
+    def __init__(self, name: str, path: Path, symbol: str) -> None:
+        """Describe the controller ``name``, which is the block under a ``symbol`` of the library.
+
+        Raises:
+            ParameterError: There is no such library or block, or it is no controller; the field is named.
+        """
+        self._name, self._path, self._symbol = name, path, symbol
+        try:
+            self.block: Block = library_user(path).describe(symbol)
+            _check_signals("inputs", self.block.inputs, _expected_inputs(self.block))
+            _check_signals("outputs", self.block.outputs, CONTROLLER_OUTPUTS)
+        except OSError as error:
+            raise ParameterError(
+                f"controller = {name!r}: cannot be read ({reason(error)}), expected a shared library"
+            ) from error
+        except ProcessError as error:
+            raise ParameterError(f"controller = {name!r}: {error} while it was loaded") from error
+        except HsvError as error:
+            raise ParameterError(f"controller = {name!r}: {error}") from error
+        self.PARAMETERS = self.block.parameters
+
+    def from_parameters(self, values: Mapping[str, Any], design: object) -> LibraryController:
+        """Return the controller.
+
+        Raises:
+            ParameterError: A parameter has another size, or the notch filter has, that is flown.
+        """
+        own = check_all(self.PARAMETERS, values)
+        for parameter in self.PARAMETERS:
+            if np.size(own[parameter.name]) != np.size(parameter.default):
+                raise ParameterError(
+                    f"{parameter.name}: {np.size(own[parameter.name])} numbers, expected {np.size(parameter.default)}"
+                )
+        if len(self.block.inputs) > len(CONTROLLER_INPUTS):
+            states = 2 * len(NotchFilter.from_parameters(values).sections)
+            _check_signals("inputs", self.block.inputs, (*CONTROLLER_INPUTS, filter_state_signal(states)))
+        numbers = np.concatenate([np.ravel(own[parameter.name]) for parameter in self.PARAMETERS] or [np.zeros(0)])
+        return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers)
+
+
+def _expected_inputs(block: Block) -> tuple[Signal, ...]:
+    """Return as many of a controller's inputs as the block has; the size of the last one depends on the flight."""
+    return (*CONTROLLER_INPUTS, filter_state_signal(block.inputs[-1].size if block.inputs else 0))[: len(block.inputs)]
+
+
+def _check_signals(field: str, found: tuple[Signal, ...], expected: tuple[Signal, ...]) -> None:
+    for index, (signal, other) in enumerate(zip(found, expected, strict=False)):
+        if signal != other:
+            raise ParameterError(f"{field}[{index}] = {_words(signal)}, expected {_words(other)}")
+    if len(found) != len(expected):
+        raise ParameterError(f"{len(found)} {field}, expected {', '.join(signal.name for signal in expected)}")
+
+
+def _words(signal: Signal) -> str:
+    return f"{signal.name}, {signal.size} in {signal.unit!r}"
+
+
+class LibraryController(ForeignController):
+    """A controller in a shared library. In flight as in single steps, its function is called by the child process."""
+
+    def __init__(self, name: str, path: Path, symbol: str, state_size: int, parameters: np.ndarray) -> None:
+        super().__init__(name, None)
+        self.path, self.symbol, self.parameters = path, symbol, parameters
+        self._state = np.zeros(state_size)
+
+    @property
+    def library(self) -> LibraryUser:
+        """What uses the library."""
+        return library_user(self.path)
+
+    def loaded(self, address: int) -> ForeignController:
+        """Return the same where the library is loaded, with its function at an address."""
+        kernel = StepKernel(address, np.zeros_like(self._state), self.parameters)
+        return ForeignController(self.name, SimpleNamespace(kernel=kernel))
+
+    def reset(self) -> None:
+        """Start a new run."""
+        self._state = np.zeros_like(self._state)
+
+    def _answer(self, inputs: ControllerInput) -> Any:
+        call = self.symbol, inputs.step, flat_input(inputs), self._state, self.parameters
+        try:
+            wanted, self._state = self.library.request("step", *call)
+        except ProcessError as error:
+            raise ControllerError(f"{self.name}, step {inputs.step}: {error}") from error
+        return wanted

@@ -1,0 +1,205 @@
+"""The child process that a shared library is loaded and flown in: its crash is only its own.
+
+One child serves one library file and many flights; it is started when it is first asked, and anew after a crash, and
+where the file has changed. What it runs is :mod:`hsv.simulation.library_child`, in which a library is used in the same
+way, without another child.
+"""
+
+from __future__ import annotations
+
+import atexit
+import mmap
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
+from functools import cache
+from multiprocessing.connection import Connection, Pipe
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from hsv.control.c_block import Block
+from hsv.errors import ProcessError
+
+NO_PROGRESS = 20.0
+"""Time, s, after which a step, or loading, that does not come to its end is given up."""
+
+_POLL = 0.5
+"""Time, s, after which progress is looked at."""
+
+
+class SharedMemory:
+    """Memory behind a file descriptor, which two processes have."""
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+        self._mapped = np.empty(0)
+
+    def numbers(self, count: int) -> np.ndarray:
+        """Return the first ``count`` numbers of it; it grows where there are fewer."""
+        if len(self._mapped) < count:
+            if os.fstat(self.descriptor).st_size < 8 * count:
+                os.truncate(self.descriptor, 8 * count)
+            # Mapped once: every page of a new mapping costs time when it is first written.
+            self._mapped = np.frombuffer(mmap.mmap(self.descriptor, 8 * count))
+        return self._mapped[:count]
+
+
+class LibraryProcess:
+    """The child of one library file; one request at a time."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.RLock()
+        self._child: subprocess.Popen[bytes] | None = None
+        self._connection: Connection[Any, Any]
+        self._file: tuple[int, ...] = ()
+        self._blocks: dict[str, Block] = {}
+        self._memory = SharedMemory(os.memfd_create("hsv_library"))
+        atexit.register(self.end)
+
+    def describe(self, symbol: str) -> Block:
+        """Return the block under a symbol of the library.
+
+        Raises:
+            OSError: The file cannot be read.
+            ParameterError: There is no such block; what is wrong is named.
+            ProcessError: The child crashed or hangs.
+        """
+        with self._lock:
+            self._renew()
+            if symbol not in self._blocks:
+                self._blocks[symbol] = self.request("describe", symbol)
+            return self._blocks[symbol]
+
+    def request(
+        self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = lambda: 1
+    ) -> Any:
+        """Return what the child answers to a request, see :class:`hsv.simulation.library_child.LoadedLibrary`.
+
+        Args:
+            name: Of the request.
+            arguments: Of the request.
+            kept: More of them, by name, that the child keeps: what is the same object as the last time is not sent.
+            begun: Returns how many steps are begun, 0 before there is anything that could hang.
+
+        Raises:
+            ProcessError: The child crashed or hangs.
+            HsvError: The child's own answer.
+        """
+        with self._lock:
+            self._renew()
+            if self._child is None:
+                self._start()
+            news = None
+            if kept is not None:
+                news = {key: value for key, value in kept.items() if value is not self._kept.get(key)}
+                self._kept |= news
+            try:
+                self._connection.send((name, arguments, news))
+                self._wait(begun)
+                answer = self._connection.recv()
+            except (EOFError, ConnectionError):
+                raise ProcessError(self._ending()) from None
+            except BaseException:
+                # What it answers to this would be taken for the answer to the next request.
+                self.end()
+                raise
+        if isinstance(answer, Exception):
+            raise answer
+        return answer
+
+    @contextmanager
+    def sharing(self, numbers: int) -> Iterator[np.ndarray]:
+        """Yield memory (numbers) that the child shares; nobody else requests anything meanwhile."""
+        with self._lock:
+            yield self._memory.numbers(numbers)
+
+    def end(self) -> None:
+        """End the child; the next request starts another."""
+        if self._child is not None:
+            self._child.kill()
+            self._child.wait()
+            self._connection.close()
+            self._child = None
+
+    def _renew(self) -> None:
+        """Forget everything of a file that has changed."""
+        status = self._path.stat()
+        file = (status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size)
+        if file != self._file:
+            self.end()
+            self._file, self._blocks = file, {}
+
+    def _start(self) -> None:
+        self._kept: dict[str, Any] = {}
+        self._connection, theirs = Pipe()
+        descriptors = (theirs.fileno(), self._memory.descriptor)
+        # What the library prints must not get between the numbers of a command.
+        self._child = subprocess.Popen(
+            [sys.executable, "-P", "-m", "hsv.simulation.library_child", self._path, *map(str, descriptors)],
+            stdin=subprocess.DEVNULL,
+            stdout=2,
+            pass_fds=descriptors,
+        )
+        theirs.close()
+        # Its imports take as long as they take on a busy machine.
+        with suppress(EOFError):
+            self._connection.recv()
+
+    def _wait(self, begun: Callable[[], int]) -> None:
+        last, since = begun(), time.monotonic()
+        while not self._connection.poll(_POLL):
+            now = begun()
+            if now != last:
+                last, since = now, time.monotonic()
+            elif now and time.monotonic() - since > NO_PROGRESS:
+                self.end()
+                raise ProcessError(f"no answer for {NO_PROGRESS:g} s")
+
+    def _ending(self) -> str:
+        """Return how the child ended by itself."""
+        assert self._child is not None
+        child = self._child
+        self.end()
+        code = child.returncode
+        return f"crashed ({signal.Signals(-code).name})" if code < 0 else f"ended its process with exit code {code}"
+
+
+class LibraryUser(Protocol):
+    """What uses a library, in a child or in this process."""
+
+    def describe(self, symbol: str) -> Block:
+        """As :meth:`LibraryProcess.describe`."""
+
+    def request(
+        self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = ...
+    ) -> Any:
+        """As :meth:`LibraryProcess.request`."""
+
+    def sharing(self, numbers: int) -> AbstractContextManager[np.ndarray]:
+        """As :meth:`LibraryProcess.sharing`."""
+
+
+_child_of = cache(LibraryProcess)
+# A forked process has the lock and the connection of its parent's child, but no child.
+os.register_at_fork(after_in_child=_child_of.cache_clear)
+
+_in_this_process: Callable[[Path], LibraryUser] | None = None
+
+
+def use_in_this_process(user: Callable[[Path], LibraryUser]) -> None:
+    """Let ``user``, by the path of a library, use libraries from now on: this process is the child."""
+    global _in_this_process
+    _in_this_process = user
+
+
+def library_user(path: Path) -> LibraryUser:
+    """Return what uses the library at a path: this process's child, or this process where it is the child."""
+    return (_in_this_process or _child_of)(path)
