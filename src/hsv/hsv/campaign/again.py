@@ -16,7 +16,7 @@ from hsv.campaign.pilot import Outcome, Pilot
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
-from hsv.errors import CampaignError
+from hsv.errors import CampaignError, ControllerError
 from hsv.graph.description import TUBE_STATUS
 
 
@@ -42,8 +42,11 @@ def in_process(results: Results, flight: int) -> Repetition:
         CampaignError: No such flight.
     """
     row, pilot = _row(results, flight), Pilot(results.campaign)
-    data = pilot.fly(pilot.sample(flight)).data()
-    return Repetition(flight, _outcome(row), pilot.outcome(data))
+    try:
+        repeated = pilot.outcome(pilot.fly(pilot.sample(flight)).data())
+    except ControllerError as error:
+        repeated = pilot.crashed(error)
+    return Repetition(flight, _outcome(row), repeated)
 
 
 def over_dds(
@@ -94,8 +97,8 @@ def _row(results: Results, flight: int) -> dict[str, Any]:
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:
-    return {name: row[name] for name in ("diverged", *OUTCOMES)}
+    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES)}
 
 
-def _same(a: float | bool | None, b: float | bool | None) -> bool:
+def _same(a: float | bool | str | None, b: float | bool | str | None) -> bool:
     return a == b or (isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b))

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from hsv.campaign.factors import Factor, check_names, factors_of
+from hsv.control.library import library_digest
 from hsv.errors import CampaignError
 from hsv.simulation.assembly import blamed_on, design_parameters, scenario_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
@@ -39,6 +40,8 @@ class Campaign:
     factors: tuple[Factor, ...]
     commit: str
     """Version of the program, so that no result mixes two."""
+    library: str = ""
+    """SHA-256 of the controller's library, for the same reason; empty where it is in none."""
 
     @property
     def scenario(self) -> Scenario:
@@ -145,5 +148,5 @@ def plan(
     if not 0 <= seed < 2**63:
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
     with blamed_on(scenario):
-        design = design_parameters(scenario)
-    return Campaign(scenario.name, text, design, method, samples, seed, factors, commit)
+        design, library = design_parameters(scenario), library_digest(scenario.controller)
+    return Campaign(scenario.name, text, design, method, samples, seed, factors, commit, library)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 from hsv.campaign.campaign import Campaign
@@ -12,6 +13,7 @@ from hsv.campaign.fleet import Fleet
 from hsv.campaign.pilot import pilot
 from hsv.campaign.store import Store
 from hsv.campaign.table import schema
+from hsv.errors import ControllerError
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,11 @@ def conduct(
 def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
     """Return what ``flights`` take on so many cores as fast as this one, measured on the scenario itself."""
     own = pilot(campaign.text)
-    own.outcome(own.fly_unchanged().data())
+    with suppress(ControllerError):
+        own.outcome(own.fly_unchanged().data())
     started = time.perf_counter()
-    own.outcome(own.fly(own.sample(0)).data())
+    with suppress(ControllerError):
+        own.outcome(own.fly(own.sample(0)).data())
     seconds = time.perf_counter() - started
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
     rows = flights * 8 * len(schema(campaign))

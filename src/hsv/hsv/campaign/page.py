@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,8 @@ from markupsafe import Markup
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.campaign.pilot import Pilot
-from hsv.campaign.summary import Results, distributions, limits, shares, worst_flights
-from hsv.errors import CampaignError, reason
+from hsv.campaign.summary import ENDED, Results, distributions, limits, shares, worst_flights
+from hsv.errors import CampaignError, ControllerError, reason
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import compressed
@@ -63,6 +64,7 @@ def render(results: Results) -> str:
         constant=[d for d in shown if d.minimum == d.maximum],
         units={d.name: d.unit for d in shown},
         worst=worst,
+        ended=ENDED,
         points=POINTS,
         drawn=len(_drawn(results)),
         signals=SIGNALS,
@@ -128,7 +130,11 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
     windows = window_starts(pilot.steps)
     reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
     time = windows[reached] * pilot.period
-    flights = {"unchanged": pilot.fly_unchanged(), f"flight {worst}": pilot.fly(pilot.sample(worst))}
+    flights = {}
+    with suppress(ControllerError):
+        flights["unchanged"] = pilot.fly_unchanged()
+    with suppress(ControllerError):
+        flights[f"flight {worst}"] = pilot.fly(pilot.sample(worst))
     return {
         "time": _packed(time),
         "signals": [

@@ -10,7 +10,10 @@ from hsv.campaign.campaign import Campaign
 from hsv.campaign.factors import flown_scenario
 from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
+from hsv.control.controller import Controller
+from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.errors import CampaignError, ControllerError
 from hsv.faults.actuator import FaultInjector
 from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Flight, fly
@@ -18,7 +21,7 @@ from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.plant import Plant
 
-Outcome = dict[str, float | bool | None]
+Outcome = dict[str, float | bool | str | None]
 
 
 class Pilot:
@@ -28,6 +31,11 @@ class Pilot:
         self.campaign = campaign
         self.sampler = Sampler(campaign)
         self.scenario = campaign.scenario
+        if library_digest(self.scenario.controller) != campaign.library:
+            raise CampaignError(
+                f"controller = {self.scenario.controller!r}: not the library that the campaign began with, expected "
+                f"the one of SHA-256 {campaign.library}"
+            )
         self._nominal = campaign.parameters
         self._parts = assemble_flight(self.scenario, campaign.design)
         self._levels = TubeLevels(self._nominal)
@@ -62,6 +70,11 @@ class Pilot:
         """Fly the scenario itself."""
         return fly(self._parts)
 
+    @property
+    def controller(self) -> Controller:
+        """The controller that flies."""
+        return self._parts.controller
+
     def outcome(self, flight: FlightData) -> Outcome:
         """Return what a campaign keeps of a flight: whether and when it ended early, worst tube level, metrics (SI)."""
         return {
@@ -69,7 +82,12 @@ class Pilot:
             "end_time": float(flight.time[-1]),
             "tube_level": self._levels.worst(flight),
             **flight_metrics(flight),
+            "crashed": None,
         }
+
+    def crashed(self, error: ControllerError) -> Outcome:
+        """Return what a campaign keeps of a flight that its controller ended: why, and nothing else."""
+        return {"diverged": False, "crashed": str(error)}
 
 
 @lru_cache(maxsize=1)

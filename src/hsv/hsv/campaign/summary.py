@@ -19,6 +19,9 @@ from hsv.errors import CampaignError
 
 CONFIDENCE = 0.95
 
+CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
+"""In place of a limit: how a flight ended that did not come to its end."""
+
 TUBE_LIMIT = 1.0
 """Level of e - c up to which the error is in the set."""
 
@@ -42,7 +45,7 @@ class Share:
 
 @dataclass(frozen=True)
 class WorstFlight:
-    """A flight, the limit it comes closest to or breaks most, and value over limit (infinite: diverged)."""
+    """A flight, the limit it comes closest to or breaks most, and value over limit (infinite: it did not end)."""
 
     flight: int
     limit: str
@@ -74,6 +77,11 @@ class Results:
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""
         return np.asarray(self._read(columns=[name])[name].to_numpy())
+
+    @property
+    def crashed(self) -> np.ndarray:
+        """Whether its controller ended a flight (flights)."""
+        return np.asarray(self._read(columns=["crashed"])["crashed"].is_valid())
 
     @property
     def samples(self) -> np.ndarray:
@@ -108,8 +116,8 @@ def limits(results: Results) -> dict[str, float]:
 
 
 def shares(results: Results) -> list[Share]:
-    """Return the share of flights that do not diverge, and within each limit; an undefined metric is not within."""
-    flown = ~results.column("diverged")
+    """Return the share of flights that come to their end, and within each limit; an undefined metric is not within."""
+    flown = ~(results.column("diverged") | results.crashed)
     rows = [_share(results.campaign, "flown_to_the_end", None, flown)]
     for name, limit in limits(results).items():
         # A comparison with what is not a number is false.
@@ -131,20 +139,25 @@ def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple
 
 
 def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
-    """Return the flights with the largest metric over limit, those that diverged first (earliest first)."""
+    """Return the flights with the largest metric over limit; first those that crashed, then diverged (earliest)."""
     stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
-    diverged, end = results.column("diverged"), results.column("end_time")
+    diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
     ratios = np.zeros((len(diverged), len(stated) or 1))
     for index, (name, limit) in enumerate(stated.items()):
         ratio = np.abs(results.column(name)) / limit
         ratios[:, index] = np.where(np.isnan(ratio), np.inf, ratio)
-    largest = np.where(diverged, np.inf, ratios.max(axis=1))
-    order = np.lexsort((np.arange(len(end)), np.where(diverged, end, math.inf), -largest))[:number]
+    largest = np.where(diverged | crashed, np.inf, ratios.max(axis=1))
+    ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
+    order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
     samples, names = results.samples, list(stated) or [""]
     return [
         WorstFlight(
             flight=int(flight),
-            limit="diverged" if diverged[flight] else names[int(np.argmax(ratios[flight]))],
+            limit=CRASHED
+            if crashed[flight]
+            else DIVERGED
+            if diverged[flight]
+            else names[int(np.argmax(ratios[flight]))],
             ratio=float(largest[flight]),
             sample={f.name: float(v) for f, v in zip(results.campaign.factors, samples[flight], strict=True)},
         )

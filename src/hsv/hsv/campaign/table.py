@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from io import BytesIO
 from typing import Any
 
@@ -12,6 +13,9 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.pilot import pilot
+from hsv.control.library import LibraryController
+from hsv.errors import ControllerError
+from hsv.simulation.closed_loop import watched
 from hsv.simulation.metrics import METRICS
 
 CAMPAIGN, ENVELOPE = b"hsv.campaign", b"hsv.envelope"
@@ -28,7 +32,8 @@ def schema(campaign: Campaign) -> pa.Schema:
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
     outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
-    return pa.schema([*fixed, *samples, pa.field("diverged", pa.bool_(), False), *outcomes])
+    ended = [pa.field("diverged", pa.bool_(), False), pa.field("crashed", pa.string())]
+    return pa.schema([*fixed, *samples, *ended, *outcomes])
 
 
 def _number(name: str, unit: str) -> pa.Field:
@@ -38,12 +43,25 @@ def _number(name: str, unit: str) -> pa.Field:
 def fly_batch(text: str, batch: int) -> bytes:
     """Fly a batch of the campaign written in ``text``; return its rows and envelope as a Parquet file."""
     own = pilot(text)
+    if isinstance(own.controller, LibraryController):
+        # Whole batches in the library's process, and one by one only where a flight makes it crash.
+        with suppress(ControllerError), watched(own.controller, own.steps + 1) as (_, request):
+            return bytes(request("call", _flown_here, text, batch))
+    return _flown_here(text, batch)
+
+
+def _flown_here(text: str, batch: int) -> bytes:
+    own = pilot(text)
     campaign, envelope, rows = own.campaign, Envelope.empty(), []
     flights = campaign.flights(batch)
     for flight, sample, seed in zip(flights, *own.sampler.draw(flights), strict=True):
-        data = own.fly(sample).data()
-        envelope.add(data, own.steps)
-        rows.append(row(sample, flight, int(seed), campaign, own.outcome(data)))
+        try:
+            data = own.fly(sample).data()
+            envelope.add(data, own.steps)
+            outcome = own.outcome(data)
+        except ControllerError as error:
+            outcome = own.crashed(error)
+        rows.append(row(sample, flight, int(seed), campaign, outcome))
     return encode(campaign, rows, envelope)
 
 

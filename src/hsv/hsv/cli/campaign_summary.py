@@ -10,6 +10,7 @@ from hsv.campaign.conduct import Capacity
 from hsv.campaign.page import write_page
 from hsv.campaign.summary import (
     CONFIDENCE,
+    ENDED,
     Distribution,
     Results,
     Share,
@@ -114,11 +115,11 @@ def _print_tables(
         values = (number(v, d.unit) for v in (d.minimum, d.median, d.percentile_95, d.maximum))
         table.add_row(d.name.replace("_", " "), *values, shown((1.0, d.unit), units)[1].removesuffix("1"))
     console.print(table)
-    worst = [w for w in worst if w.limit]  # of a scenario without limits, those that diverged
+    worst = [w for w in worst if w.limit]  # of a scenario without limits, those that ended early
     if worst:
         console.print("worst flights, by what they use of their limits:")
     for w in worst:
-        used = w.limit if w.limit == "diverged" else f"{100 * w.ratio:.0f} % of {w.limit.replace('_', ' ')}"
+        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {w.limit.replace('_', ' ')}"
         console.print(f"  {w.flight}: {used}; {sample_words(w.sample)}", soft_wrap=True)
 
 

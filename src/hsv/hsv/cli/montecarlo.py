@@ -168,6 +168,7 @@ def replay(
                 "identical": not differing,
                 "differing": differing,
                 "diverged": repeated.repeated["diverged"],
+                "crashed": repeated.repeated["crashed"],
                 "sample_si": sample,
                 "outcome": to_json(quantities, units),
                 "bag": str(repeated.bag) if repeated.bag else None,
@@ -176,6 +177,8 @@ def replay(
     else:
         print_table(f"flight {flight} of {result.name}", quantities, units)
         console.print("sample  " + sample_words(sample), soft_wrap=True)
+        if crashed := repeated.repeated["crashed"]:
+            console.print(f"crashed {crashed}", soft_wrap=True, markup=False)
         if repeated.bag:
             console.print(f"bag     {repeated.bag}", soft_wrap=True)
         if not differing:
