@@ -1,8 +1,8 @@
 """The child process that a shared library is loaded and flown in: its crash is only its own.
 
-One child serves one library file and many flights; it is started when it is first asked, and anew after a crash, and
-where the file has changed. What it runs is :mod:`hsv.simulation.library_child`, in which a library is used in the same
-way, without another child.
+One child serves one library file and many flights; it is started when it is first asked, and anew where the file has
+changed. After a crash it goes on as if it had just been started. What it runs is :mod:`hsv.simulation.library_child`,
+where a library is used in the same way, without another child.
 """
 
 from __future__ import annotations
@@ -97,6 +97,8 @@ class LibraryProcess:
             self._renew()
             if self._child is None:
                 self._start()
+            while self._connection.poll():
+                self._receive()  # It crashed meanwhile, for no reason of a request.
             news = None
             if kept is not None:
                 news = {key: value for key, value in kept.items() if value is not self._kept.get(key)}
@@ -104,9 +106,7 @@ class LibraryProcess:
             try:
                 self._connection.send((name, arguments, news))
                 self._wait(begun)
-                answer = self._connection.recv()
-            except (EOFError, ConnectionError):
-                raise ProcessError(self._ending()) from None
+                answer = self._receive()
             except BaseException:
                 # What it answers to this would be taken for the answer to the next request.
                 self.end()
@@ -124,7 +124,8 @@ class LibraryProcess:
     def end(self) -> None:
         """End the child; the next request starts another."""
         if self._child is not None:
-            self._child.kill()
+            with suppress(ProcessLookupError):
+                os.killpg(self._child.pid, signal.SIGKILL)
             self._child.wait()
             self._connection.close()
             self._child = None
@@ -138,7 +139,6 @@ class LibraryProcess:
             self._file, self._blocks = file, {}
 
     def _start(self) -> None:
-        self._kept: dict[str, Any] = {}
         self._connection, theirs = Pipe()
         descriptors = (theirs.fileno(), self._memory.descriptor)
         # What the library prints must not get between the numbers of a command.
@@ -147,11 +147,21 @@ class LibraryProcess:
             stdin=subprocess.DEVNULL,
             stdout=2,
             pass_fds=descriptors,
+            process_group=0,
         )
         theirs.close()
         # Its imports take as long as they take on a busy machine.
-        with suppress(EOFError):
-            self._connection.recv()
+        self._receive()
+
+    def _receive(self) -> Any:
+        try:
+            answer = self._connection.recv()
+        except (EOFError, ConnectionError):
+            self.end()
+            raise ProcessError("its process has ended") from None
+        if answer is None or isinstance(answer, ProcessError):
+            self._kept: dict[str, Any] = {}
+        return answer
 
     def _wait(self, begun: Callable[[], int]) -> None:
         last, since = begun(), time.monotonic()
@@ -162,14 +172,6 @@ class LibraryProcess:
             elif now and time.monotonic() - since > NO_PROGRESS:
                 self.end()
                 raise ProcessError(f"no answer for {NO_PROGRESS:g} s")
-
-    def _ending(self) -> str:
-        """Return how the child ended by itself."""
-        assert self._child is not None
-        child = self._child
-        self.end()
-        code = child.returncode
-        return f"crashed ({signal.Signals(-code).name})" if code < 0 else f"ended its process with exit code {code}"
 
 
 class LibraryUser(Protocol):

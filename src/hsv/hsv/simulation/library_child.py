@@ -1,5 +1,8 @@
 """What runs in the child process of a shared library: it loads the library and flies the compiled loop with it.
 
+Two processes: the first waits for the second, which does all that, to crash, tells the parent of it, and forks another
+one. It never loads the library itself, so that the next one starts afresh, and at once.
+
 :mod:`hsv.control.library_process` starts it as ``python3 -m hsv.simulation.library_child LIBRARY CONNECTION MEMORY``;
 the last two are file descriptors.
 """
@@ -16,7 +19,7 @@ from functools import cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -24,8 +27,9 @@ from hsv.control.c_block import Block, load_block
 from hsv.control.controller import call_step_function
 from hsv.control.library import LibraryController
 from hsv.control.library_process import SharedMemory, use_in_this_process
-from hsv.errors import HsvError
+from hsv.errors import HsvError, ProcessError
 from hsv.simulation.closed_loop import Components, History, fly_into
+from hsv.warm import warm
 
 
 class LoadedLibrary:
@@ -89,22 +93,38 @@ def main() -> None:
     """Do what is requested until the parent has ended."""
     # Ctrl-C is for the parent, which ends its child.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    connection: Connection[Any, Any] = Connection(int(sys.argv[2]))
-    library = LoadedLibrary(Path(sys.argv[1]), SharedMemory(int(sys.argv[3])))
+    path, connection, memory = Path(sys.argv[1]), Connection(int(sys.argv[2])), SharedMemory(int(sys.argv[3]))
+    connection.send(None)
+    prepare = cache(warm)
+    with suppress(ConnectionError):
+        while True:
+            pid = os.fork()
+            if pid == 0:
+                serve(LoadedLibrary(path, memory), connection)
+            code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+            end = f"crashed ({signal.Signals(-code).name})" if code < 0 else f"ended its process with exit code {code}"
+            connection.send(ProcessError(end))
+            # Where one flight crashed, others may: the next processes inherit the compiled code.
+            prepare()
+
+
+def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:
+    """Do what is requested until the parent has ended, or the library ends this process."""
     use_in_this_process(lambda path: library)
     Thread(target=_end_with_parent, args=(connection.fileno(),), daemon=True).start()
-    connection.send(None)
     kept: dict[str, Any] = {}
-    with suppress(EOFError):
-        while True:
+    while True:
+        try:
             name, arguments, news = connection.recv()
-            if news is not None:
-                kept |= news
-            try:
-                answer = library.request(name, *arguments, kept=None if news is None else kept)
-            except HsvError as error:
-                answer = error
-            connection.send(answer)
+        except EOFError:
+            os._exit(1)
+        if news is not None:
+            kept |= news
+        try:
+            answer = library.request(name, *arguments, kept=None if news is None else kept)
+        except HsvError as error:
+            answer = error
+        connection.send(answer)
 
 
 def _end_with_parent(connection: int) -> None:

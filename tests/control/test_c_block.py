@@ -1,0 +1,61 @@
+"""Descriptions of blocks in C: those that are right agree with the bench's own, those that are wrong are named."""
+
+import ctypes
+
+import pytest
+from c_libraries import build_probe
+
+from hsv.control.c_block import load_block
+from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS, filter_state_signal
+from hsv.errors import ParameterError
+
+
+def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):
+    library = build_probe(tmp_path, "-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)")
+    block = load_block(library, "probe")
+    assert block.inputs == (*CONTROLLER_INPUTS, filter_state_signal(4))
+    assert block.outputs == CONTROLLER_OUTPUTS
+    ends = [0]
+    for signal in CONTROLLER_INPUTS:
+        ends.append(ends[-1] + signal.size)
+    assert list((ctypes.c_int64 * len(ends)).in_dll(ctypes.CDLL(str(library)), "offsets")) == ends
+
+
+def test_parameters_are_described_as_those_of_python(tmp_path):
+    block = load_block(build_probe(tmp_path), "probe")
+    assert (block.name, block.source, block.state_size) == ("probe", "probe.c", 1)
+    weight, crash_at, *_, above = block.parameters
+    assert (weight.name, weight.default, weight.unit) == ("probe.weight", [0.5, 0.02, 0.5], "1/s")
+    assert (weight.minimum, weight.maximum) == (-10.0, 10.0)
+    assert (crash_at.name, crash_at.default, crash_at.unit) == ("probe.crash_at", -1.0, "")
+    assert (above.unit, above.description) == ("m", "altitude")
+    above.check(-1e300)
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["-DABI=7"], r"^abi_version = 7, expected 1, as of hsv_block.h"),
+        (["-DSTEP=0"], r"^step = NULL, expected a function"),
+        (['-DNAME="two words"'], r"^name = 'two words', expected letters, digits and underscores"),
+        (['-DNAME="\\xff"'], r"^name = b'\\xff', expected text in UTF-8"),
+        (["-DNAME=0"], r"^name = '', expected letters"),
+        (["-DSTATE_SIZE=-1"], r"^state_size = -1, expected 0 to"),
+        (["-DINPUT_COUNT=1LL<<40"], r"^input_count = 1099511627776, expected 0 to"),
+        (['-DINPUTS={"x","m",0}'], r"^inputs\[0\].size = 0, expected 1 to"),
+        (['-DWEIGHT_UNIT="furlongz"'], r"^parameters\[0\].unit = 'furlongz', expected an SI unit"),
+        (['-DWEIGHT="crash_at"'], r"^parameters probe.crash_at, probe.crash_at, .*expected names that differ"),
+    ],
+)
+def test_a_wrong_description_is_named(tmp_path, flags, message):
+    library = build_probe(tmp_path, "-Wno-error", "-w", *flags)
+    with pytest.raises(ParameterError, match=message):
+        load_block(library, "probe")
+
+
+def test_what_is_no_library_or_has_no_such_symbol_is_named(tmp_path):
+    (tmp_path / "text.so").write_text("no library")
+    with pytest.raises(ParameterError, match=r"^cannot be loaded \(.*\), expected a shared library"):
+        load_block(tmp_path / "text.so", "probe")
+    with pytest.raises(ParameterError, match=r"^no symbol 'prob', expected a constant of the type hsv_block"):
+        load_block(build_probe(tmp_path), "prob")
