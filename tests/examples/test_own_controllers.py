@@ -2,11 +2,21 @@
 
 import json
 import os
+import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
 import pytest
+from printed_commands import printed
+from pyarrow import parquet
+
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 FLYABLE = ["compiled", "lqr"]
@@ -72,3 +82,56 @@ def test_what_an_example_refuses_is_said_in_a_line(hsv, tmp_path):
     assert ran.returncode == 2
     [line] = ran.stderr.splitlines()
     assert "cannot be built, ValueError: scheduled.high_velocity = 2484.12 m/s: expected more" in line
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
+    """Return a folder with the example in C as in the checkout, where its commands have been run as printed."""
+    folder = tmp_path_factory.mktemp("checkout")
+    example = Path("examples", "c_gain_scheduled")
+    shutil.copytree(EXAMPLES.parent / example, folder / example, ignore=shutil.ignore_patterns("*.so"))
+    commands = printed(str(example / "README.md"))
+    assert [command.split()[0] for command in commands] == ["make", "hsv", "hsv"]
+    for command in commands:
+        ran = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True)
+        assert ran.returncode == 0, f"{command}: {ran.stderr}"
+    return folder
+
+
+def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout, monkeypatch):
+    matplotlib.use("agg")
+    monkeypatch.chdir(checkout)
+    text = Path("examples", "c_gain_scheduled", "README.md").read_text(encoding="utf-8")
+    [block] = re.findall(r"^```python\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    names = {}
+    exec(compile(block, "README.md", "exec"), names)
+    ours, theirs = names["flights"].values()
+    assert abs(ours.metrics["altitude_end_error"]) < 30.0 and abs(ours.metrics["velocity_end_error"]) < 5.0
+    assert ours.fingerprint != theirs.fingerprint
+    assert Path("scheduled_and_tube.png").exists()
+    [result] = Path("campaigns").glob("*.parquet")
+    assert len(parquet.read_table(result)) == 100
+
+
+def test_the_example_in_c_flies_the_same_bits_as_the_one_that_numba_compiles(checkout, monkeypatch):
+    monkeypatch.syspath_prepend(EXAMPLES / "compiled")
+    path = str(checkout / "examples" / "c_gain_scheduled" / "scenario.toml")
+    compiled = assemble_flight(load_scenario(path, {"controller": "hsv_scheduled:Scheduled"}))
+    # Computed on another machine, the gains may differ in last bits from those that the C source has.
+    gains = compiled.controller.kernel.parameters[2:].tolist()
+    changes = {"scheduled.low_gain": gains[:10], "scheduled.high_gain": gains[10:]}
+    assert fly(assemble_flight(load_scenario(path, changes))).fingerprint == fly(compiled).fingerprint
+
+
+def test_what_the_example_in_c_refuses_is_said_in_a_line(checkout, hsv, tmp_path):
+    for text, message in {
+        "[scheduled]\nlow_velocity = '7900 ft'": "scheduled.low_velocity = '7900 ft': wrong unit",
+        "controller = 'elsewhere.so:scheduled'": "controller = '.*elsewhere.so:scheduled': cannot be read",
+        "controller = '../scheduled.so:scheduled'": "expected a path inside the scenario's folder",
+    }.items():
+        path = tmp_path / "mine.toml"
+        path.write_text(f'extends = "{checkout}/examples/c_gain_scheduled/scenario.toml"\n{text}\n')
+        ran = hsv("simulate", str(path))
+        assert ran.returncode == 2
+        [line] = ran.stderr.splitlines()
+        assert re.search(message, line), line
