@@ -11,6 +11,7 @@ setup(
             "bench/*.c",
             "campaign/template/*",
             "control/include/*.h",
+            "export/*.j2",
             "recording/layouts/*",
             "recording/report/plotly/*",
             "recording/report/template/*",

@@ -29,6 +29,7 @@ HERE = {
     "hsv linearise --coupling derived",
     "hsv design baseline",
     "hsv verify offline_design/baseline.yaml",
+    "hsv export-controller baseline --out controller",
     "hsv run case1 --composed",
     "hsv montecarlo case1 --samples 100 --seed 1",
     "hsv figures --only 9",

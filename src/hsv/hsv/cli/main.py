@@ -16,6 +16,7 @@ from hsv.cli.conclude import conclude
 from hsv.cli.design import design
 from hsv.cli.diff import diff
 from hsv.cli.export import export
+from hsv.cli.export_controller import export_controller
 from hsv.cli.fault import fault
 from hsv.cli.figures import figures
 from hsv.cli.include import include
@@ -72,6 +73,7 @@ for command in (
     diff,
     recover,
     export,
+    export_controller,
     bench,
     figures,
     claims,

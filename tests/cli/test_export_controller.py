@@ -1,0 +1,55 @@
+import dataclasses
+
+import pytest
+
+from hsv.control.c_block import include_folder
+from hsv.control.design_file import find_design, read_design, write_design
+from hsv.export.controller import HEADER, SOURCE, controller_source, step_bounds
+
+BASELINE = read_design(find_design("baseline"))
+
+
+def test_it_writes_the_source_and_its_header_and_says_what_a_step_takes(hsv, tmp_path):
+    ran = hsv("export-controller", "baseline", "--out", "new/controller", "--json")
+    assert ran.code == 0
+    folder = tmp_path / "new" / "controller"
+    assert {path.name for path in folder.iterdir()} == {SOURCE, HEADER}
+    assert (folder / SOURCE).read_text() == controller_source(BASELINE)
+    assert (folder / HEADER).read_bytes() == (include_folder() / HEADER).read_bytes()
+    assert {row["path"]: row["size_bytes"] for row in ran.json["written"]} == {
+        f"new/controller/{name}": (folder / name).stat().st_size for name in (SOURCE, HEADER)
+    }
+    bounds = {name: dataclasses.asdict(bound) for name, bound in step_bounds(BASELINE).items()}
+    assert ran.json["most_in_a_step"] == bounds
+    assert bounds["nominal_trajectory"]["multiplications"] > 1000
+
+
+def test_a_design_by_its_path_takes_the_place_of_one_written_before(hsv, tmp_path):
+    assert hsv("export-controller", "baseline", "--out", "controller").code == 0
+    ran = hsv("export-controller", str(find_design("adjustable")), "--out", "controller")
+    assert ran.code == 0
+    assert "nominal_trajectory" in ran.out
+    assert 'design "adjustable"' in (tmp_path / "controller" / SOURCE).read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("nothing", "--out", "new"), "design = 'nothing': no such file"),
+        (("tubeless.yaml", "--out", "new"), "tube.shape: empty, expected a design with a tube"),
+        (("baseline", "--out", "full"), "out = 'full': holds notes.txt, expected a new folder"),
+        (("baseline", "--out", "full/notes.txt"), "out = 'full/notes.txt': cannot be written"),
+        (("baseline", "--out", "full/controller.c"), "out = 'full/controller.c': cannot be written"),
+        (("baseline",), "Missing option '--out'"),
+    ],
+)
+def test_wrong_input_is_one_line(hsv, tmp_path, words, expected):
+    write_design(tmp_path / "tubeless.yaml", dataclasses.replace(BASELINE, tube=None), "for this test")
+    (tmp_path / "full").mkdir()
+    for name in ("controller.c", "notes.txt"):
+        (tmp_path / "full" / name).touch()
+    ran = hsv("export-controller", *words)
+    assert ran.code == 2
+    assert expected in ran.error
+    assert not (tmp_path / "new").exists()
+    assert (tmp_path / "full" / "controller.c").read_text() == ""
