@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.c_block import include_folder
 from hsv.control.nominal_law import FamilyLaw
-from hsv.control.notch_filter import NotchData
 from hsv.control.tube_law import TubeLaw
 from hsv.errors import RunError
+from hsv.export.controller import SOURCE, controller_source
 from hsv.simulation.closed_loop import Components, History
 from hsv.vehicle.envelope import ANGLE_LIMIT
 
@@ -27,29 +28,12 @@ FLAGS = ("-O3", "-ffp-contract=off")
 _Doubles, _Integers = POINTER(c_double), POINTER(c_int64)
 
 
-class _Notch(Structure):
-    _fields_ = [("sections", c_int64), *((name, _Doubles) for name in "ABCDG")]
-
-
-class _Axis(Structure):
-    _fields_ = [("pieces", c_int64), ("vertices", c_int64), ("breakpoints", _Doubles), ("coefficients", _Doubles)]
-
-
-class _Polytope(Structure):
-    _fields_ = [("S", _Doubles), ("altitude", _Axis), ("velocity", _Axis)]
-
-
-class _Family(Structure):
-    _fields_ = [("count", c_int64), ("size", c_int64), ("gains", _Doubles), ("ellipsoids", _Doubles)]
-
-
 class _Tube(Structure):
     _fields_ = [
-        ("gain_count", c_int64),
-        ("filtered", c_int64),
+        ("rows", c_int64),
+        ("size", c_int64),
         ("starts", _Integers),
-        *((name, _Doubles) for name in ("gains", "minimum", "maximum")),
-        ("notch", _Notch),
+        *((name, _Doubles) for name in ("parameters", "minimum", "maximum")),
     ]
 
 
@@ -70,7 +54,7 @@ class _History(Structure):
 
 
 class CFlight:
-    """The flight of ``components`` by the C build; the tube law over the nested family, as the compiled loop."""
+    """The flight of ``components`` by the C build; the tube law over the nested family, as it is exported."""
 
     def __init__(self, components: Components, flags: Sequence[str] = FLAGS) -> None:
         """Compile and bind.
@@ -79,15 +63,19 @@ class CFlight:
             RunError: No C compiler, a failed build, or components that the C build does not know.
         """
         law, nominal = components.controller, components.nominal_trajectory
-        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)) or law.kernel.integral_rate > 0.0:
+        if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)):
             raise RunError("C build: it flies the tube law over the nested family, expected a scenario with these")
+        sections = components.notch_filter.sections
+        if law.design.filtered and not sections:
+            raise RunError("C build: nominal.filtered without a notch filter in the loop, expected one")
         self._folder = tempfile.TemporaryDirectory(prefix="hsv_bench_")
-        self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), flags)))
+        source = controller_source(law.design, sections)
+        self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), source, flags)))
         self._library.fly.restype = c_int64
         self._kept: list[np.ndarray] = []
-        plant, notch, data = components.plant, components.notch_filter.data, nominal.data
-        S, tube = data.polytope, law.kernel
+        plant, tube = components.plant, law.kernel
         faults, reference = components.fault_injector.schedule, nominal.reference.data
+        parameters = np.array([[*tau, tube.integral_rate] for _, tau in law.factors])
         self._initial = plant.initial.state
         self._rows = plant.steps + 1
         self._arguments: list[Any] = [
@@ -95,20 +83,12 @@ class CFlight:
             c_double(plant.period),
             c_int64(plant.substeps),
             c_double(ANGLE_LIMIT),
-            ctypes.byref(self._notch(notch)),
-            ctypes.byref(_Polytope(self._doubles(S.S), self._axis(S.altitude), self._axis(S.velocity))),
-            ctypes.byref(
-                _Family(
-                    len(data.gains), data.ellipsoids.shape[1], self._doubles(data.gains), self._doubles(data.ellipsoids)
-                )
-            ),
+            c_int64(len(sections)),
             ctypes.byref(
                 _Tube(
-                    len(tube.gains),
-                    tube.filtered,
+                    *parameters.shape,
                     self._integers(tube.starts),
-                    *(self._doubles(a) for a in (tube.gains, tube.minimum, tube.maximum)),
-                    self._notch(tube.notch),
+                    *(self._doubles(a) for a in (parameters, tube.minimum, tube.maximum)),
                 )
             ),
             ctypes.byref(
@@ -140,25 +120,16 @@ class CFlight:
         self._kept.append(np.ascontiguousarray(values, kind))
         return self._kept[-1].ctypes.data_as(pointer)
 
-    def _notch(self, notch: NotchData) -> _Notch:
-        return _Notch(len(notch.D), *(self._doubles(getattr(notch, name)) for name in "ABCDG"))
 
-    def _axis(self, axis: Any) -> _Axis:
-        return _Axis(
-            len(axis.breakpoints) - 1,
-            axis.coefficients.shape[2],
-            self._doubles(axis.breakpoints),
-            self._doubles(axis.coefficients),
-        )
-
-
-def _compiled(folder: Path, flags: Sequence[str]) -> Path:
+def _compiled(folder: Path, controller: str, flags: Sequence[str]) -> Path:
     compiler = shutil.which("cc")
     if compiler is None:
         raise RunError("C build: no C compiler cc on PATH, expected one (sudo apt-get install gcc)")
-    library = folder / "flight.so"
-    with as_file(files("hsv.bench").joinpath("flight.c")) as source:
-        command = [compiler, *flags, "-std=c11", "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
+    library, source = folder / "flight.so", folder / SOURCE
+    source.write_text(controller, encoding="utf-8")
+    with as_file(files("hsv.bench").joinpath("flight.c")) as flight:
+        names = [f"-I{include_folder()}", "-o", str(library), str(flight), str(source), "-lm"]
+        command = [compiler, *flags, "-std=c99", "-shared", "-fPIC", *names]
         result = subprocess.run(command, capture_output=True, text=True)
     if result.returncode:
         raise RunError(f"C build: {' '.join(command)} failed: {result.stderr.strip().splitlines()[-1:]}")

@@ -1,13 +1,17 @@
 /* The in-process flight of the compiled loop, written in C: the yardstick of "hsv bench".
  *
- * The same arithmetic in the same order as hsv.simulation.closed_loop._fly and what it calls, so that, without
- * contraction, the results can be compared bit by bit. Names are those of the Python sources.
+ * Filter, nominal trajectory and tube law are those of "hsv export-controller"; vehicle, faults and the loop are here, the
+ * same arithmetic in the same order as hsv.simulation.closed_loop._fly and what it calls, so that, without contraction, the
+ * results can be compared bit by bit. Names are those of the Python sources.
  */
+#include "hsv_block.h"
+
 #include <math.h>
-#include <stdint.h>
 #include <string.h>
 
-enum { N = 9, M = 2, WIDTH = N * (N + M), MAX_SECTIONS = 4, PITCH_RATE = 4 };
+enum { N = HSV_STATES, M = HSV_INPUTS };
+
+extern const hsv_block notch_filter, nominal_trajectory, tube_law;
 
 /* In the order of hsv.vehicle.parameters.VehicleParameters. */
 typedef struct {
@@ -24,31 +28,11 @@ typedef struct {
     double inertial_coupling_1, inertial_coupling_2;
 } Vehicle;
 
+/* The parameters of tube_law, a row of so many from each step in starts on, and the limits of its input. */
 typedef struct {
-    int64_t sections;
-    const double *A, *B, *C, *D, *G;
-} Notch;
-
-typedef struct {
-    int64_t pieces, vertices;
-    const double *breakpoints, *coefficients;
-} Axis;
-
-typedef struct {
-    const double *S;
-    Axis altitude, velocity;
-} Polytope;
-
-typedef struct {
-    int64_t count, size;
-    const double *gains, *ellipsoids;
-} Family;
-
-typedef struct {
-    int64_t gain_count, filtered;
+    int64_t rows, size;
     const int64_t *starts;
-    const double *gains, *minimum, *maximum;
-    Notch notch;
+    const double *parameters, *minimum, *maximum;
 } Tube;
 
 typedef struct {
@@ -146,139 +130,6 @@ static void advance(double *x, const double *u, const Vehicle *p, double period,
     }
 }
 
-static void rest(const Notch *notch, double value, double *state)
-{
-    for (int64_t i = 0; i < notch->sections; i++) {
-        state[2 * i] = notch->G[2 * i] * value;
-        state[2 * i + 1] = notch->G[2 * i + 1] * value;
-    }
-}
-
-static double filter_step(const Notch *notch, double *state, double value)
-{
-    for (int64_t i = 0; i < notch->sections; i++) {
-        const double *A = notch->A + 4 * i, *B = notch->B + 2 * i, *C = notch->C + 2 * i;
-        const double a = state[2 * i], b = state[2 * i + 1];
-        const double output = C[0] * a + C[1] * b + notch->D[i] * value;
-        state[2 * i] = A[0] * a + A[1] * b + B[0] * value;
-        state[2 * i + 1] = A[2] * a + A[3] * b + B[1] * value;
-        value = output;
-    }
-    return value;
-}
-
-static double level(const double *ellipsoid, int64_t size, const double *x)
-{
-    double total = 0.0;
-    for (int64_t i = 0; i < size; i++) {
-        double row = 0.0;
-        for (int64_t j = 0; j < size; j++)
-            row += ellipsoid[i * size + j] * x[j];
-        total += x[i] * row;
-    }
-    return total;
-}
-
-static int64_t nominal_input(const Family *family, const double *deviation, double *u_n)
-{
-    int64_t index = 0;
-    for (int64_t g = family->count - 1; g >= 0; g--)
-        if (level(family->ellipsoids + g * family->size * family->size, family->size, deviation) <= 1.0 + 1e-6) {
-            index = g;
-            break;
-        }
-    const double *gain = family->gains + index * M * N;
-    for (int i = 0; i < M; i++) {
-        u_n[i] = 0.0;
-        for (int j = 0; j < N; j++)
-            u_n[i] += gain[i * N + j] * deviation[j];
-    }
-    return index;
-}
-
-static double clamp(double value, double low, double high)
-{
-    if (!(value > low))
-        return low;
-    return value > high ? high : value;
-}
-
-static int64_t piece(const Axis *axis, double value)
-{
-    int64_t i = 0;
-    while (i < axis->pieces - 1 && value >= axis->breakpoints[i + 1])
-        i++;
-    return i;
-}
-
-static double weight(const Axis *axis, int64_t piece, double local, int64_t vertex)
-{
-    const double *c = axis->coefficients + piece * axis->vertices + vertex;
-    const int64_t power = axis->pieces * axis->vertices;
-    return ((c[0] * local + c[power]) * local + c[2 * power]) * local + c[3 * power];
-}
-
-static void schedule(const Polytope *polytope, double altitude, double velocity, double *restrict S)
-{
-    const Axis *h_axis = &polytope->altitude, *v_axis = &polytope->velocity;
-    const double h = clamp(altitude, h_axis->breakpoints[0], h_axis->breakpoints[h_axis->pieces]);
-    const double v = clamp(velocity, v_axis->breakpoints[0], v_axis->breakpoints[v_axis->pieces]);
-    const int64_t h_piece = piece(h_axis, h), v_piece = piece(v_axis, v);
-    const double h_local = h - h_axis->breakpoints[h_piece], v_local = v - v_axis->breakpoints[v_piece];
-    memset(S, 0, WIDTH * sizeof *S);
-    for (int64_t i = 0; i < h_axis->vertices; i++) {
-        const double h_weight = weight(h_axis, h_piece, h_local, i);
-        for (int64_t j = 0; j < v_axis->vertices; j++) {
-            const double both = h_weight * weight(v_axis, v_piece, v_local, j);
-            const double *vertex = polytope->S + (i * v_axis->vertices + j) * WIDTH;
-            for (int e = 0; e < WIDTH; e++)
-                S[e] += both * vertex[e];
-        }
-    }
-}
-
-static void nominal_advance(const Polytope *polytope, double altitude, double velocity, double *deviation,
-                            const double *u_n, const double *defect)
-{
-    double S[WIDTH], new[N];
-    schedule(polytope, altitude, velocity, S);
-    for (int i = 0; i < N; i++) {
-        const double *row = S + i * (N + M);
-        double total = 0.0;
-        for (int j = 0; j < N; j++)
-            total += row[j] * deviation[j];
-        for (int j = 0; j < M; j++)
-            total += row[N + j] * u_n[j];
-        new[i] = total + defect[i];
-    }
-    memcpy(deviation, new, sizeof new);
-}
-
-static int64_t active_gain(const Tube *tube, int64_t step)
-{
-    int64_t index = 0;
-    while (index + 1 < tube->gain_count && tube->starts[index + 1] <= step)
-        index++;
-    return index;
-}
-
-static void tube_input(const Tube *tube, int64_t active, const double *x, double pitch_rate_error, const double *x_r,
-                       const double *x_n, const double *u_n, const double *u_r, double *u_total, double *u)
-{
-    const double *gain = tube->gains + active * M * N;
-    for (int i = 0; i < M; i++) {
-        double feedback = 0.0;
-        for (int j = 0; j < N; j++) {
-            const double error = j == PITCH_RATE ? pitch_rate_error : x[j] - x_n[j] - x_r[j];
-            feedback += gain[i * N + j] * error;
-        }
-        u_total[i] = feedback + u_n[i] + u_r[i];
-        const double wanted = isfinite(u_total[i]) ? u_total[i] : u_r[i];
-        const double above = wanted > tube->minimum[i] ? wanted : tube->minimum[i];
-        u[i] = above < tube->maximum[i] ? above : tube->maximum[i];
-    }
-}
-
 static void apply_faults(const Faults *faults, int64_t step, const double *command, double *actuator)
 {
     memcpy(actuator, command, M * sizeof *actuator);
@@ -301,37 +152,65 @@ static int in_model_range(const double *x, double angle_limit)
     return fabs(x[2]) <= angle_limit && fabs(x[3]) <= angle_limit && x[1] > 0.0;
 }
 
-/* Fly as many steps as there are rows, from x; return the number of rows written (fewer: diverged). */
-int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angle_limit, const Notch *notch,
-            const Polytope *polytope, const Family *family, const Tube *tube, const Faults *faults,
-            const Reference *reference, double *x, const History *history)
+static const double *active_parameters(const Tube *tube, int64_t step)
 {
-    double filter_state[2 * MAX_SECTIONS], planned_state[2 * MAX_SECTIONS], x_n[N], u_n[M], total[M], u[M], actuator[M];
-    rest(notch, x[PITCH_RATE], filter_state);
-    memcpy(planned_state, filter_state, 2 * notch->sections * sizeof *planned_state);
-    const int filtered = tube->filtered && notch->sections > 0 && notch->sections == tube->notch.sections;
-    const double *start = reference->state + reference_row(reference, 0) * N;
-    for (int i = 0; i < N; i++)
-        x_n[i] = x[i] - start[i];
+    int64_t row = 0;
+    while (row + 1 < tube->rows && tube->starts[row + 1] <= step)
+        row++;
+    return tube->parameters + row * tube->size;
+}
+
+/* Fly as many steps as there are rows, from x; return the number of rows written (fewer: diverged). Without the notch
+ * filter in the loop the pitch rate passes. */
+int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angle_limit, int64_t notched,
+            const Tube *tube, const Faults *faults, const Reference *reference, double *x, const History *history)
+{
+    const int64_t filter_size = notch_filter.state_size;
+    double filter_state[filter_size], filtered[1 + filter_size];
+    double asked[3 * N], nominal_state[N], nominal[N + M + 2];
+    double given[HSV_FILTER_STATE + filter_size], tube_state[tube_law.state_size];
+    double wanted[M], u[M], actuator[M];
+    memset(filter_state, 0, sizeof filter_state);
+    memset(filtered, 0, sizeof filtered);
+    memset(nominal_state, 0, sizeof nominal_state);
+    memset(tube_state, 0, sizeof tube_state);
     for (int64_t k = 0; k < history->rows; k++) {
         if (k > 0)
             advance(x, actuator, vehicle, period, substeps);
         const int64_t row = reference_row(reference, k);
         const double *x_r = reference->state + row * N, *u_r = reference->input + row * M;
-        memcpy(history->state + k * N, x, sizeof(double[N]));
-        const double q_f = filter_step(notch, filter_state, x[PITCH_RATE]);
-        history->filtered_pitch_rate[k] = q_f;
-        memcpy(history->deviation + k * N, x_n, sizeof x_n);
-        history->gain_index[k] = (double)nominal_input(family, x_n, u_n);
-        memcpy(history->nominal_input + k * M, u_n, sizeof u_n);
-        const double pitch_rate_error =
-            filtered ? q_f - filter_step(&tube->notch, planned_state, x_r[PITCH_RATE] + x_n[PITCH_RATE])
-                     : q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE];
-        tube_input(tube, active_gain(tube, k), x, pitch_rate_error, x_r, x_n, u_n, u_r, total, u);
-        memcpy(history->u_unsaturated + k * M, total, sizeof total);
-        memcpy(history->command + k * M, u, sizeof u);
-        nominal_advance(polytope, x[0], x[1], x_n, u_n, reference->defect + row * N);
+        const double *d_r = reference->defect + row * N;
+
+        if (notched)
+            notch_filter.step(k, x + HSV_PITCH_RATE, filtered, filter_state, NULL);
+        else
+            filtered[0] = x[HSV_PITCH_RATE];
+
+        memcpy(asked, x, sizeof(double[N]));
+        memcpy(asked + N, x_r, sizeof(double[N]));
+        memcpy(asked + 2 * N, d_r, sizeof(double[N]));
+        nominal_trajectory.step(k, asked, nominal, nominal_state, NULL);
+
+        memcpy(given + HSV_STATE, x, sizeof(double[N]));
+        memcpy(given + HSV_FILTERED_PITCH_RATE, filtered, sizeof(double));
+        memcpy(given + HSV_REFERENCE, x_r, sizeof(double[N]));
+        memcpy(given + HSV_REFERENCE_INPUT, u_r, sizeof(double[M]));
+        memcpy(given + HSV_DEVIATION, nominal, sizeof(double[N + M]));
+        memcpy(given + HSV_FILTER_STATE, filtered + 1, sizeof filter_state);
+        tube_law.step(k, given, wanted, tube_state, active_parameters(tube, k));
+        for (int i = 0; i < M; i++) {
+            const double above = wanted[i] > tube->minimum[i] ? wanted[i] : tube->minimum[i];
+            u[i] = above < tube->maximum[i] ? above : tube->maximum[i];
+        }
         apply_faults(faults, k, u, actuator);
+
+        memcpy(history->state + k * N, x, sizeof(double[N]));
+        history->filtered_pitch_rate[k] = filtered[0];
+        memcpy(history->deviation + k * N, nominal, sizeof(double[N]));
+        memcpy(history->nominal_input + k * M, nominal + N, sizeof(double[M]));
+        history->gain_index[k] = nominal[N + M];
+        memcpy(history->u_unsaturated + k * M, wanted, sizeof wanted);
+        memcpy(history->command + k * M, u, sizeof u);
         memcpy(history->actuator + k * M, actuator, sizeof actuator);
         if (!in_model_range(x, angle_limit))
             return k + 1;

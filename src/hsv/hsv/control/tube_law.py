@@ -192,6 +192,8 @@ class TubeLaw(Controller):
 
     PARAMETERS = TUBE_PARAMETERS
     kernel: TubeData
+    factors: list[tuple[int, np.ndarray]]
+    """First step and tau (5) of each gain of the kernel."""
 
     def __init__(
         self,
@@ -206,7 +208,7 @@ class TubeLaw(Controller):
         The set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes`` of
         tau: first step and factors (5), in order. ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
         """
-        self._design = design
+        self.design = design
         self._certified = coupling in (None, design.coupling)
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
@@ -247,18 +249,18 @@ class TubeLaw(Controller):
         Raises:
             ParameterError: They are not certified.
         """
-        self._tau = certified(values, self._design.tau_minimum)
-        past = [entry for entry in self._entries if entry[0] < self._next]
-        to_come = [entry for entry in self._entries if entry[0] > self._next]
+        self._tau = certified(values, self.design.tau_minimum)
+        past = [entry for entry in self.factors if entry[0] < self._next]
+        to_come = [entry for entry in self.factors if entry[0] > self._next]
         self._arrange([*past, (self._next, self._tau), *to_come])
         return self._next
 
-    def _arrange(self, entries: list[tuple[int, np.ndarray]]) -> None:
-        self._entries = entries
-        design = self._design
+    def _arrange(self, factors: list[tuple[int, np.ndarray]]) -> None:
+        self.factors = factors
+        design = self.design
         self.kernel = TubeData(
-            np.stack([design.adjusted_gain(tau) for _, tau in entries]),
-            np.array([start for start, _ in entries], np.int64),
+            np.stack([design.adjusted_gain(tau) for _, tau in factors]),
+            np.array([start for start, _ in factors], np.int64),
             design.input_minimum,
             design.input_maximum,
             True,
@@ -302,6 +304,6 @@ class TubeLaw(Controller):
             component=tube.farthest(error) if tube and not inside else "",
             u_feedback=u_feedback,
             u_nominal=inputs.nominal_input,
-            tau=compact(self._entries[active][1]),
+            tau=compact(self.factors[active][1]),
             status=status,
         )
