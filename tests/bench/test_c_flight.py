@@ -15,7 +15,19 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
 
 
 @needs_compiler
-@pytest.mark.parametrize("scenario", ["case1", "case1_derived", "case1_no_notch", "case1_uncertain", "case1_single_k"])
+@pytest.mark.parametrize(
+    "scenario",
+    [
+        "case1",
+        "case1_derived",
+        "case1_integral_heavy",
+        "case1_no_notch",
+        "case1_second_mode_notch",
+        "case1_single_k",
+        "case1_uncertain",
+        "case2",
+    ],
+)
 def test_the_c_build_flies_the_same_flight(scenario):
     parts = components(scenario, duration=110.0)
     assert largest_difference(fly(parts).history, CFlight(parts).fly()) <= TOLERANCE
@@ -65,3 +77,5 @@ def test_a_failed_build_says_so():
 def test_components_that_the_c_build_does_not_know_are_refused():
     with pytest.raises(RunError, match="nested family"):
         CFlight(components(duration=1.0, controller="robust_mpc"))
+    with pytest.raises(RunError, match=r"nominal\.filtered without a notch filter"):
+        CFlight(components("case2", duration=1.0, notch__enabled=False))

@@ -86,7 +86,7 @@ def test_the_blocks_describe_themselves(built):
         "tube_law": [9, 1, 9, 2, 9, 2, *([states] if design.filtered else []), 2],
     }
     assert {name: block.state_size for name, block in blocks.items()} == {
-        name: bound.state for name, bound in step_bounds(design).items()
+        name: bound.state_size for name, bound in step_bounds(design).items()
     }
     tau, rate = blocks["tube_law"].parameters
     assert_array_equal(tau.default, design.tau)
@@ -155,7 +155,7 @@ def test_the_law_answers_the_same_bits(built, rate):
 
 def test_other_sections_of_the_filter_take_the_place_of_the_designs():
     design, other = DESIGNS["baseline"], (NotchSection(19.47, 0.02, 19.47, 0.5), NotchSection(22.78, 0.02, 22.78, 0.5))
-    assert step_bounds(design, other)["notch_filter"].state == 4
+    assert step_bounds(design, other)["notch_filter"].state_size == 4
     assert "SECTIONS = 2," in controller_source(design, other)
 
 
@@ -179,6 +179,13 @@ def test_no_step_takes_more_than_is_stated(design, tmp_path):
 @each_design
 def test_lines_are_no_longer_than_a_page_is_wide(design):
     assert max(map(len, controller_source(design).splitlines())) <= 120
+
+
+def test_a_name_does_not_end_the_comment_that_it_stands_in():
+    source = controller_source(dataclasses.replace(DESIGNS["baseline"], name="a */ int b;\n/*", coupling='"*/'))
+    assert source.splitlines()[0].endswith('of the design "a __ int b____", blocks of hsv_block.h in C99.')
+    assert "*/ int" not in source
+    assert '"___"' in source
 
 
 def test_a_design_without_a_tube_is_refused():

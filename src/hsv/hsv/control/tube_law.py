@@ -192,6 +192,7 @@ class TubeLaw(Controller):
 
     PARAMETERS = TUBE_PARAMETERS
     kernel: TubeData
+    design: ControlDesign
     factors: list[tuple[int, np.ndarray]]
     """First step and tau (5) of each gain of the kernel."""
 

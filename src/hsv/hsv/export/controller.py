@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ class StepBound:
     additions: int
     """And subtractions."""
     comparisons: int
-    state: int
+    state_size: int
 
 
 def controller_files(design: ControlDesign) -> dict[str, str]:
@@ -72,7 +73,7 @@ def controller_source(design: ControlDesign, notch: Sequence[NotchSection] = ())
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters["initialiser"] = _initialiser
+    environment.filters |= {"initialiser": _initialiser, "plain": _plain}
     return environment.get_template(f"{SOURCE}.j2").render(
         design=design,
         digest=design.to_parameters()["design.hash"],
@@ -100,15 +101,20 @@ def step_bounds(design: ControlDesign, notch: Sequence[NotchSection] = ()) -> di
             multiplications=gains * membership + m * n + weights + vertices * (1 + width) + width,
             additions=n + gains * membership + m * n + weights + len(axes) + vertices * width + width + n,
             comparisons=gains + sum(3 + pieces - 1 for pieces, _ in axes),
-            state=n,
+            state_size=n,
         ),
         "tube_law": StepBound(
             multiplications=9 * filtered + m * (n + rigid + 3 * integrated) + integrated,
             additions=2 * n + 2 + 6 * filtered + m * (n + integrated + 4) + 3 * integrated,
             comparisons=4 * m + 1,
-            state=integrated + 2 * filtered,
+            state_size=integrated + 2 * filtered,
         ),
     }
+
+
+def _plain(text: str) -> str:
+    """Return a name as it can stand in a comment of C: it must not end it."""
+    return re.sub(r"[^A-Za-z0-9_. -]", "_", text)
 
 
 def _initialiser(array: np.ndarray, column: int = 4) -> str:
