@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from hsv.campaign.factors import scenario_toml
-from hsv.campaign.pilot import Outcome, Pilot
+from hsv.campaign.pilot import Outcome
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
 from hsv.errors import CampaignError, ControllerError
 from hsv.graph.description import TUBE_STATUS
+from hsv.simulation.trust import require_path_inside
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,9 @@ def in_process(results: Results, flight: int) -> Repetition:
 
     Raises:
         CampaignError: No such flight.
+        ParameterError: The results name code, and are not trusted.
     """
-    row, pilot = _row(results, flight), Pilot(results.campaign)
+    row, pilot = _row(results, flight), results.pilot
     try:
         repeated = pilot.outcome(pilot.fly(pilot.sample(flight)).data())
     except ControllerError as error:
@@ -62,6 +64,7 @@ def over_dds(
 
     Raises:
         CampaignError: No such flight, or the design is not what it was.
+        ParameterError: The results name code, or a design in another folder, and are not trusted.
         RunError: A process failed; its last words are in the message.
     """
     from hsv.graph.flight import fly_graph
@@ -69,8 +72,9 @@ def over_dds(
     from hsv.recording.flight import flight_data
     from hsv.recording.reader import Bag
 
-    row, pilot = _row(results, flight), Pilot(results.campaign)
+    row, pilot = _row(results, flight), results.pilot
     scenario = pilot.scenario
+    require_path_inside(scenario.design, "design", results.path, results.trust)
     if read_parameters(find_design(scenario.design)) != results.campaign.design:
         raise CampaignError(
             f"design {scenario.design!r}: not the one that the campaign flew, expected the same to fly it over DDS"

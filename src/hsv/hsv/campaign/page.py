@@ -14,13 +14,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
-from hsv.campaign.pilot import Pilot
 from hsv.campaign.summary import ENDED, Results, distributions, limits, shares, worst_flights
 from hsv.errors import CampaignError, ControllerError, reason
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import compressed
 from hsv.simulation.closed_loop import Flight
+from hsv.vehicle.plant import Plant
 
 POINTS = 2000
 """Flights that scatter plots draw at most, of more every n-th; WebGL would draw more, in fewer plots a page."""
@@ -65,6 +65,7 @@ def render(results: Results) -> str:
         units={d.name: d.unit for d in shown},
         worst=worst,
         ended=ENDED,
+        flown_again=results.flyable,
         points=POINTS,
         drawn=len(_drawn(results)),
         signals=SIGNALS,
@@ -125,16 +126,19 @@ def histogram(values: np.ndarray) -> dict[str, list[float]]:
 
 
 def _envelope(results: Results, worst: int) -> dict[str, Any]:
-    """Return the envelopes, with the flight of the unchanged scenario and the worst one flown again."""
-    pilot, envelope = Pilot(results.campaign), results.envelope
-    windows = window_starts(pilot.steps)
+    """Return the envelopes, with the flight of the unchanged scenario and the worst one, where they may be flown."""
+    campaign, envelope = results.campaign, results.envelope
+    plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
+    windows = window_starts(plant.steps)
     reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
-    time = windows[reached] * pilot.period
+    time = windows[reached] * plant.period
     flights = {}
-    with suppress(ControllerError):
-        flights["unchanged"] = pilot.fly_unchanged()
-    with suppress(ControllerError):
-        flights[f"flight {worst}"] = pilot.fly(pilot.sample(worst))
+    if results.flyable:
+        pilot = results.pilot
+        with suppress(ControllerError):
+            flights["unchanged"] = pilot.fly_unchanged()
+        with suppress(ControllerError):
+            flights[f"flight {worst}"] = pilot.fly(pilot.sample(worst))
     return {
         "time": _packed(time),
         "signals": [
@@ -150,7 +154,7 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
             }
             for i, signal in enumerate(SIGNALS)
         ],
-        "flight_time": _packed(windows * pilot.period),
+        "flight_time": _packed(windows * plant.period),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,12 @@ import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
+from hsv.campaign.pilot import Pilot
 from hsv.campaign.store import read_campaign
 from hsv.campaign.table import ENVELOPE, OUTCOMES, schema
+from hsv.control.controllers import names_code
 from hsv.errors import CampaignError
+from hsv.simulation.trust import require_trust
 
 CONFIDENCE = 0.95
 
@@ -54,15 +58,20 @@ class WorstFlight:
 
 
 class Results:
-    """The result file of a campaign, read back."""
+    """The result file of a campaign, read back; only :attr:`pilot` loads a controller."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, trust: bool = False) -> None:
         """Read ``path``.
+
+        Args:
+            path: The result file.
+            trust: Whether code that the file names may run, see :mod:`hsv.simulation.trust`.
 
         Raises:
             CampaignError: The file is missing, not the result of a campaign, or that of another version.
         """
         self.path = path
+        self.trust = trust
         self.campaign: Campaign = read_campaign(path)
         found = pq.read_metadata(path)
         for name in schema(self.campaign).names:
@@ -73,6 +82,21 @@ class Results:
             """The envelope of all flights."""
         except (KeyError, ValueError) as error:
             raise self._foreign("has no envelope of this version's curves") from error
+
+    @property
+    def flyable(self) -> bool:
+        """Whether flights may be flown again: the controller is registered here, or the file is trusted."""
+        return self.trust or not names_code(self.campaign.scenario.controller)
+
+    @cached_property
+    def pilot(self) -> Pilot:
+        """Who flies the campaign's flights again; with the first use, the controller is loaded.
+
+        Raises:
+            ParameterError: The file names the controller's code, and is not trusted.
+        """
+        require_trust(self.campaign.scenario.controller, self.path, self.trust)
+        return Pilot(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
+from hsv.cli.options import JsonOption, ScenarioArgument, TrustOption, UnitsOption
 from hsv.cli.output import Units, console, errors, print_json, to_json
 from hsv.cli.targets import check_target
 
@@ -106,13 +106,15 @@ def fly(
     except KeyboardInterrupt:
         errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
         raise
-    show(Results(out), units, json, page, flown)
+    # The campaign in the file is the one that was asked for: its code is that of the user's own scenario.
+    show(Results(out, trust=True), units, json, page, flown)
 
 
 @montecarlo.command()
 def summary(
     result: ResultArgument,
     page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
+    trust: TrustOption = False,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
@@ -123,7 +125,7 @@ def summary(
     from hsv.campaign.summary import Results
     from hsv.cli.campaign_summary import show
 
-    show(Results(result), units, json, page)
+    show(Results(result, trust=trust), units, json, page)
 
 
 @montecarlo.command()
@@ -132,6 +134,7 @@ def replay(
     flight: Annotated[int, typer.Option(help="Number of the flight.")],
     over_dds: Annotated[bool, typer.Option("--over-dds", help="Fly it with the graph of node processes.")] = False,
     bag: Annotated[Path | None, typer.Option(help="With --over-dds: bag to write; default: bags/<flight>.")] = None,
+    trust: TrustOption = False,
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
@@ -147,7 +150,7 @@ def replay(
     from hsv.cli.progress import stages
     from hsv.errors import RunError
 
-    results = Results(result)
+    results = Results(result, trust=trust)
     if over_dds:
         target = bag or Path("bags", f"{result.stem}_flight_{flight}")
         with stages() as bar:

@@ -41,4 +41,5 @@ SuppliedDesignOption = Annotated[
 SuppliedScenarioOption = Annotated[
     str | None, typer.Option("--scenario", help="Scenario (name or TOML file) flown, for a bag without attachments.")
 ]
+TrustOption = Annotated[bool, typer.Option("--trust", help="Run code that the file names, as a controller's class.")]
 FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]

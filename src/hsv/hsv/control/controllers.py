@@ -54,6 +54,11 @@ def controller_names() -> list[str]:
     return sorted({*SHIPPED_CONTROLLERS, *(entry.name for entry in entry_points(group=GROUP))})
 
 
+def names_code(controller: str) -> bool:
+    """Tell whether a controller is named by its code, not as what is registered here under a name."""
+    return ":" in controller
+
+
 def controller_class(name: str) -> ControllerClass:
     """Return the class of a controller, a registered one, ``package.module:Class`` or ``path/lib.so:symbol``.
 

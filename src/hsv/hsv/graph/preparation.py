@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from hsv.control.controllers import NODE
-from hsv.control.design_file import DESIGN_PARAMETERS, NO_DESIGN, digest, find_design, read_parameters
+from hsv.control.design_file import DESIGN_PARAMETERS, NO_DESIGN, digest, find_design, read_design_parameters
 from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
 from hsv.graph.description import COMPOSED, CONTROLLER, NodeDescription, controller_node, graph
@@ -83,7 +83,7 @@ def prepare(
         scenario = scenario.model_copy(update={"controller": NODE, "own": {}})
     with blamed_on(scenario):
         design_file = find_design(scenario.design) if scenario.design else None
-        design = read_parameters(design_file) if design_file else {"design.name": NO_DESIGN}
+        design = read_design_parameters(design_file) if design_file else {"design.name": NO_DESIGN}
         nodes = _started(scenario.controller, composed)
         own = own_parameters(scenario)
         foreign = controller_node(scenario.controller).foreign

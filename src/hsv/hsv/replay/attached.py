@@ -18,6 +18,7 @@ from hsv.faults.actuator import FaultInjector
 from hsv.graph.description import (
     ACTUATOR,
     COMMAND,
+    CONTROLLERS,
     FAULT_INJECTOR,
     NOMINAL,
     PLANT,
@@ -28,7 +29,7 @@ from hsv.graph.description import (
 )
 from hsv.graph.exchange import fault_in
 from hsv.graph.parameter_sections import ParameterSections
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS
+from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.graph.preparation import design_files
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns
@@ -41,10 +42,10 @@ from hsv.simulation.scenario import parse_scenario, scenario_text
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 """Attachments: the parameters of the design and, over them, those of the scenario."""
 
-_OF_THE_RUN = {p.name for p in (*PACE_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)} - {
-    p.name for p in CONTROLLER_PARAMETERS
-}
-"""Parameters that say how and where the flight was made, such as its pace, and nothing of the flight itself."""
+_OF_THE_RUN = {
+    p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
+} - {p.name for p in CONTROLLER_PARAMETERS}
+"""Parameters that say how and where the flight was made, such as its pace and files, and nothing of the flight."""
 
 LEAST_ACTIVE_TIME = 10.0
 """Seconds of simulated time for which the controller must have done something."""
@@ -97,8 +98,8 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
                 f"{bag.path}: no attachment {name}: ros2 bag record and convert keep none, expected --scenario "
                 "NAME|FILE and, where the flight had another design than the scenario's, --design FILE"
             )
-    designed, scenario = (ParameterSections.parse(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO))
-    scenario = scenario.only(scenario.names - _OF_THE_RUN)
+    attached = (ParameterSections.parse(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO))
+    designed, scenario = (sections.only(sections.names - _OF_THE_RUN) for sections in attached)
     values = designed.overlaid(scenario)
     with expecting_fields(bag.path):
         try:
@@ -115,8 +116,15 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
 
 
 def controller_of(values: ParameterSections) -> str:
-    """Return the name of the controller node that these parameters choose."""
-    return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
+    """Return the name of the controller node that these parameters choose.
+
+    Raises:
+        ParameterError: It is none of the bench's own; nothing that a bag names is loaded.
+    """
+    name = str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
+    if name not in CONTROLLERS:
+        raise ParameterError(f"controller = {name!r}: expected one of {', '.join(CONTROLLERS)}, which can be replayed")
+    return name
 
 
 def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:

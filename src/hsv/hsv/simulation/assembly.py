@@ -79,10 +79,12 @@ def assemble(values: Mapping[str, Any]) -> Components:
 def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None) -> Components:
     """Return the components that fly ``scenario``, with its own design or with these parameters of one.
 
+    With parameters of a design, no file is read.
+
     Raises:
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
     """
-    with blamed_on(scenario):
+    with blamed_on(scenario, design_read=design is None):
         values = {**(design_parameters(scenario) if design is None else design), **scenario_parameters(scenario)}
         components = assemble(values)
         plant = components.plant
@@ -92,10 +94,10 @@ def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None)
 
 
 @contextmanager
-def blamed_on(scenario: Scenario) -> Iterator[None]:
+def blamed_on(scenario: Scenario, *, design_read: bool = True) -> Iterator[None]:
     """Turn errors of components into errors of ``scenario``, with its name and its names of the parameters.
 
-    What is wrong with the design by itself is said with its file.
+    What is wrong with a design that is read, by itself, is said with its file.
 
     Raises:
         ScenarioError: In place of any other error of the library.
@@ -103,7 +105,7 @@ def blamed_on(scenario: Scenario) -> Iterator[None]:
     try:
         yield
     except HsvError as error:
-        text = (isinstance(error, DesignError) and _wrong_in_file(scenario.design)) or str(error)
+        text = (design_read and isinstance(error, DesignError) and _wrong_in_file(scenario.design)) or str(error)
         for parameter, field in _FIELDS.items():
             text = re.sub(parameter, field, text)
         if isinstance(error, TrimError):

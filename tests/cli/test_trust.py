@@ -1,0 +1,119 @@
+"""Bags and campaigns are data: what they name does not run, and no path is followed, unless they are trusted."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from changed_bags import changed_bag
+from pyarrow import parquet
+
+from hsv.campaign.table import CAMPAIGN
+from hsv.recording.reader import Bag
+
+REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
+
+MODULE = """
+from pathlib import Path
+Path(__file__).with_name("loaded").touch()
+
+class Own:
+    PARAMETERS = ()
+    @classmethod
+    def from_parameters(cls, values, design):
+        return cls()
+    def reset(self):
+        pass
+    def step(self, inputs):
+        return inputs.reference_input
+"""
+
+
+@pytest.fixture
+def loaded(tmp_path, monkeypatch):
+    """Make a module with a controller; tell whether it has been imported since the last time one asked."""
+    folder = tmp_path / "modules"
+    folder.mkdir()
+    (folder / "marked.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(folder)
+
+    def since_last_asked():
+        sys.modules.pop("marked", None)
+        found = (folder / "loaded").exists()
+        (folder / "loaded").unlink(missing_ok=True)
+        return found
+
+    yield since_last_asked
+    since_last_asked()
+
+
+@pytest.fixture
+def campaign(hsv, loaded, tmp_path):
+    """Fly a campaign of a scenario that names its controller's code, which the user's own scenario may."""
+    text = 'extends = "case1"\ncontroller = "marked:Own"\ndesign = ""\nduration = "1 s"\nfault = []\n[limits]\n'
+    (tmp_path / "own.toml").write_text(text)
+    words = ("--samples", "4", "--workers", "1", "--out", "own.parquet", "--no-page")
+    assert hsv("montecarlo", "own.toml", *words).code == 0
+    assert loaded()
+    return "own.parquet"
+
+
+def test_a_campaign_is_summed_up_without_the_code_that_it_names(hsv, campaign, loaded, tmp_path):
+    shown = hsv("montecarlo", "summary", campaign)
+    assert shown.code == 0 and "4 of 4" in shown.out
+    assert "marked:Own, which runs only with --trust" in (tmp_path / "own.html").read_text()
+    assert not loaded()
+    assert hsv("montecarlo", "summary", campaign, "--trust").code == 0
+    assert "Solid: the scenario unchanged" in (tmp_path / "own.html").read_text()
+    assert loaded()
+
+
+@pytest.mark.parametrize("how", [(), ("--over-dds",)])
+def test_a_flight_of_a_campaign_is_repeated_only_if_its_code_is_trusted(hsv, campaign, loaded, how):
+    refused = hsv("montecarlo", "replay", campaign, "--flight", "1", *how)
+    assert refused.code == 2
+    assert refused.error == "own.parquet: controller = 'marked:Own': code that this file names, run only with --trust"
+    assert not loaded()
+
+
+def test_a_trusted_campaign_is_repeated_in_every_bit(hsv, campaign, loaded):
+    assert hsv("montecarlo", "replay", campaign, "--flight", "1", "--trust", "--json").json["identical"]
+    assert loaded()
+
+
+@pytest.mark.parametrize("path", ["/etc/design.yaml", "../design.yaml", "sub/../../design.yaml"])
+def test_no_path_of_a_campaign_leads_out_of_the_folder(hsv, tmp_path, path):
+    (tmp_path / "own.toml").write_text('extends = "case1"\nduration = "1 s"\nfault = []\n[limits]\n')
+    words = ("--samples", "4", "--workers", "1", "--out", "own.parquet", "--no-page")
+    assert hsv("montecarlo", "own.toml", *words).code == 0
+    table = parquet.read_table("own.parquet")
+    metadata = dict(parquet.read_metadata("own.parquet").metadata)
+    kept = json.loads(metadata[CAMPAIGN])
+    kept["scenario_text"] = f'design = "{path}"\n' + kept["scenario_text"].replace('design = "baseline"\n', "")
+    metadata[CAMPAIGN] = json.dumps(kept).encode()
+    del metadata[b"ARROW:schema"]
+    parquet.write_table(table.replace_schema_metadata(metadata), "own.parquet")
+    # The design is kept in the result: a flight in process needs no file.
+    assert hsv("montecarlo", "replay", "own.parquet", "--flight", "1").code == 0
+    refused = hsv("montecarlo", "replay", "own.parquet", "--flight", "1", "--over-dds")
+    assert refused.code == 2
+    assert refused.error.startswith(f"own.parquet: design = {path!r}: a path out of the folder")
+
+
+def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, tmp_path):
+    attached = Bag(REFERENCE)
+    parameters = yaml.safe_load(attached.text("scenario.yaml"))
+    parameters["/**"]["ros__parameters"]["controller"] = "marked:Own"
+    scenario = 'controller = "marked:Own"\n' + attached.text("scenario.toml")
+    files = {"scenario.yaml": yaml.safe_dump(parameters).encode(), "scenario.toml": scenario.encode()}
+    crafted = str(changed_bag(REFERENCE, tmp_path / "crafted", attachments=files))
+    assert hsv("info", crafted).code == 0
+    assert hsv("report", crafted, "--out", "report.html").code == 0
+    assert "marked:Own" in (tmp_path / "report.html").read_text()
+    assert hsv("conclude", crafted, "--no-report").code == 0
+    for words in ((), ("--rerun",), ("--over-dds",), ("--over-dds", "--rerun")):
+        refused = hsv("replay", crafted, *words)
+        assert refused.code == 2
+        assert "controller = 'marked:Own': expected one of tube_mpc, robust_mpc" in refused.error
+    assert not loaded()
