@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption
+from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
 from hsv.cli.output import console, print_json
 from hsv.cli.shortcomings import warn_of_shortcomings
 
@@ -28,6 +28,7 @@ def replay(
         bool, typer.Option("--rerun", help="Repeat the whole loop instead of one node after the other.")
     ] = False,
     over_dds: Annotated[bool, typer.Option("--over-dds", help="Run the real node processes.")] = False,
+    trust: TrustOption = False,
     json: JsonOption = False,
 ) -> None:
     """Feed every node's algorithm with its recorded inputs and compare what it does with what was recorded.
@@ -38,10 +39,12 @@ def replay(
     """
     from hsv.cli.progress import stages
     from hsv.errors import ParameterError, RunError
+    from hsv.graph.description import CONTROLLER, controller_node
     from hsv.recording.reader import Bag
     from hsv.replay import engine
     from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
     from hsv.replay.processes import processes as processes_of
+    from hsv.simulation.trust import require_trust
 
     opened = Bag(bag)
     supply(opened, design, scenario)
@@ -53,6 +56,13 @@ def replay(
         raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}")
     if node and rerun:
         raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
+    if controller_node(controller).foreign and rerun and over_dds:
+        raise ParameterError(
+            f"controller = {controller!r}: a node of its own, which a bag does not start: expected --rerun without "
+            "--over-dds, with its recorded commands"
+        )
+    if rerun or node in ("", CONTROLLER.name):
+        require_trust(controller, bag, trust)
     failed = []
     report = []
     with stages() as progress:

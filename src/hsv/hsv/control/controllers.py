@@ -55,8 +55,8 @@ def controller_names() -> list[str]:
 
 
 def names_code(controller: str) -> bool:
-    """Tell whether a controller is named by its code, not as what is registered here under a name."""
-    return ":" in controller
+    """Tell whether a controller is named by its code, not as what is registered here under a name, or as a node."""
+    return ":" in controller and not controller.startswith(NODE)
 
 
 def controller_class(name: str) -> ControllerClass:

@@ -13,6 +13,7 @@ from typing import Any
 
 from hsv.control.controllers import NODE
 from hsv.control.design_file import DESIGN_PARAMETERS, NO_DESIGN, digest, find_design, read_design_parameters
+from hsv.control.library import library_digest, library_record
 from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
 from hsv.graph.description import COMPOSED, CONTROLLER, NodeDescription, controller_node, graph
@@ -87,6 +88,7 @@ def prepare(
         nodes = _started(scenario.controller, composed)
         own = own_parameters(scenario)
         foreign = controller_node(scenario.controller).foreign
+        library = library_record(scenario.controller)
     wait = step_timeout or (FOREIGN_STEP_TIMEOUT if foreign else STEP_TIMEOUT)
     components = assemble_flight(scenario, design)
     now = datetime.datetime.now(datetime.UTC)
@@ -102,6 +104,8 @@ def prepare(
         "scenario.yaml": ParameterSections(scenario.parameters(), {CONTROLLER.name: own} if own else {}).to_yaml(),
         **(design_files(design_file) if design_file else {"design.yaml": ParameterSections(design).to_yaml()}),
     }
+    if library and library.source_name:
+        files[f"controller_{Path(library.source_name).name}"] = library.source.decode(errors="replace")
     for name, content in files.items():
         (folder / name).write_text(content, encoding="utf-8")
     default = f"{scenario.name}_{now:%Y%m%dT%H%M%SZ}"
@@ -152,9 +156,11 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
 
 def provenance(controller: str, name: str, design: Mapping[str, Any]) -> dict[str, str]:
     """Return what a bag says of where its flight comes from: controller, design with its ``name``, and when: now."""
+    library = library_digest(controller)
     return {
         "commit": commit(),
         "controller": controller,
+        **({"controller_sha256": library} if library else {}),
         "design": name,
         "design_hash": digest(design),
         "seed": "none",
