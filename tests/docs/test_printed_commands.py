@@ -74,7 +74,7 @@ FULL = {
     "ros2 launch hsv_bringup sil.launch.py -s",
     "ros2 launch hsv_bringup sil.launch.py scenario:=case2 real_time_factor:=1",
     "ros2 service call /hsv/inject_fault hsv_msgs/srv/InjectFault "
-    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, value: 0.8}}"',
+    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, parameter_names: [effectiveness], parameter_values: [0.8]}}"',
     'ros2 service call /hsv/clear_fault hsv_msgs/srv/ClearFault "{channel: elevator_deflection}"',
     'ros2 param set /tube_mpc feedback.tau "[0.9]"',
     "ros2 param dump /tube_mpc",
@@ -109,10 +109,14 @@ ELSEWHERE = {
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
     "ros2 bag record -s mcap": "a form",
     "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_own_controllers.py",
+    "cd examples/node": "tests/graph/test_own_controllers.py",
+    "python3 -m colcon build": "tests/graph/test_own_controllers.py",
+    "source install/local_setup.bash": "tests/graph/test_own_controllers.py",
+    "hsv run scenario.toml": "tests/graph/test_own_controllers.py",
+    "hsv run case1 --external": "tests/graph/test_own_controllers.py",
     "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
     "cd my_ws": "test_a_workspace_of_ones_own",
     "python3 -m colcon build --symlink-install": "test_a_workspace_of_ones_own",
-    "source install/local_setup.bash": "test_a_workspace_of_ones_own",
     "python3 -m colcon": "a form",
 }
 """Where what cannot be run as printed by a test is tried, in some form."""

@@ -31,7 +31,7 @@ SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
 def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """Build the example's node as a workspace of its own; return what an environment needs to find all examples."""
     folder = tmp_path_factory.mktemp("workspace")
-    shutil.copytree(EXAMPLES / "node", folder / "src")
+    shutil.copytree(EXAMPLES / "node", folder / "src", ignore=shutil.ignore_patterns("build", "install", "log"))
     words = ["colcon", "--log-base", "log", "build", "--base-paths", "src"]
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
     prefix = folder / "install" / "hsv_example_node"

@@ -9,6 +9,7 @@ from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
+from hsv.simulation.blocks import LOOP
 
 _HEADER = """# Parameters of the nodes
 Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A
@@ -24,12 +25,27 @@ then needs another `bag.directory`, and `bag.attachments` that are still there.
 messages only. ROS takes the time from `/clock`: in a namespace it needs `-r /clock:=/veh1/clock` besides.
 """
 
+_LOOP = """## The loop
+The blocks that a step passes through, in this order; each is stepped by the node of its name, the controller by that of
+its own. A signal `x` is the topic `hsv/x`.
+
+"""
+
 
 def reference() -> str:
-    """Return the page: one table a node."""
-    parts = [_HEADER, "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
+    """Return the page: the loop, and one table a node."""
+    parts = [_HEADER, _LOOP + _loop(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
     return "\n".join(parts)
+
+
+def _loop() -> str:
+    rows = ["| block | needs of the step | of the step before | gives |", "| --- | --- | --- | --- |"]
+    rows += [
+        f"| {block.name} | {' | '.join(', '.join(s) for s in (block.inputs, block.delayed, block.outputs))} |"
+        for block in LOOP
+    ]
+    return "\n".join(rows) + "\n"
 
 
 def _table(parameters: Iterable[Parameter]) -> str:
