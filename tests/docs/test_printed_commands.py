@@ -74,7 +74,8 @@ FULL = {
     "ros2 launch hsv_bringup sil.launch.py -s",
     "ros2 launch hsv_bringup sil.launch.py scenario:=case2 real_time_factor:=1",
     "ros2 service call /hsv/inject_fault hsv_msgs/srv/InjectFault "
-    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, parameter_names: [effectiveness], parameter_values: [0.8]}}"',
+    '"{fault: {channel: elevator_deflection, type: loss_of_effectiveness, parameter_names: [effectiveness], '
+    'parameter_values: [0.8]}}"',
     'ros2 service call /hsv/clear_fault hsv_msgs/srv/ClearFault "{channel: elevator_deflection}"',
     'ros2 param set /tube_mpc feedback.tau "[0.9]"',
     "ros2 param dump /tube_mpc",
