@@ -26,14 +26,32 @@ def test_a_study_is_plotted_and_printed_as_json(hsv, tmp_path):
     assert (tmp_path / "plots" / "notch.png").is_file()
 
 
+def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv, tmp_path):
+    (tmp_path / "mine.toml").write_text('extends = "case1_integral_heavy"\ntitle = "with integral action"\n')
+    ran = hsv("study", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")
+    assert ran.code == 0
+    assert "with integral action" in ran.json["strips"]["flights"]
+    assert ran.json["findings"][-1].startswith("with integral action: ")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (("weather",), "study = 'weather': expected one of coupling, sampling, notch, parameters"),
         (("coupling", "--coarseness", "0.1"), "coarseness = 0.1: expected 1 to 100"),
+        (
+            ("coupling", "--with", "case1"),
+            "with = 'case1': study coupling flies its own controllers, expected study fault",
+        ),
+        (("fault", "--with", "nowhere"), "scenario 'nowhere': expected a"),
+        (
+            ("fault", "--with", "none.toml"),
+            "scenario 'none.toml': fault: of nothing, expected one, of elevator_deflection",
+        ),
     ],
 )
-def test_a_study_that_is_none_is_named(hsv, words, message):
+def test_what_a_study_cannot_fly_is_named(hsv, tmp_path, words, message):
+    (tmp_path / "none.toml").write_text('extends = "case1"\nfault = []\n')
     ran = hsv("study", *words)
     assert ran.code == 2
     assert ran.error.startswith(message)

@@ -17,11 +17,14 @@ def study(
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of the study.")] = Path("study"),
     flights: FlightsOption = Path("bags/study"),
     coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,
+    beside: Annotated[
+        list[str], typer.Option("--with", help="Fly the controller of this scenario, too; may be repeated.")
+    ] = [],  # noqa: B006
     json: JsonOption = False,
 ) -> None:
     """Carry the results over what the paper leaves open, until each controller is lost; plot and say where.
 
-    Example: hsv study coupling --out study
+    Example: hsv study fault --with examples/lqr/scenario.toml --out study
     """
     import matplotlib
 
@@ -34,14 +37,21 @@ def study(
         raise QuantityError(f"study = {name!r}: expected one of {', '.join(STUDIES)}")
     if not 1.0 <= coarseness <= 100.0:
         raise QuantityError(f"coarseness = {coarseness}: expected 1 to 100")
+    chosen = STUDIES[name]
+    if beside and chosen.run_beside is None:
+        able = ", ".join(n for n, study in STUDIES.items() if study.run_beside)
+        raise QuantityError(f"with = {beside[0]!r}: study {name} flies its own controllers, expected study {able}")
     check_folder(out, "out")
     check_folder(flights, "flights")
     out.mkdir(parents=True, exist_ok=True)
     with stages() as progress, matplotlib.rc_context(RC):
-        outcome = STUDIES[name].run(coarseness, flights, progress)
+        if beside and chosen.run_beside:
+            outcome = chosen.run_beside(coarseness, flights, progress, beside)
+        else:
+            outcome = chosen.run(coarseness, flights, progress)
         written = save(outcome.figure, out / name)
     target = out / f"{name}.md"
-    target.write_text(page(STUDIES[name], outcome), encoding="utf-8")
+    target.write_text(page(chosen, outcome), encoding="utf-8")
     if json:
         print_json({"study": name, "findings": list(outcome.findings), "strips": outcome.strips})
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.linalg import hadamard
 from hsv.control.design_file import ControlDesign, find_design, read_parameters
 from hsv.control.notch_filter import NotchSection, flown_sections
 from hsv.design.region import Corner
+from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv.study.linear_loop import COUPLING_SCALES, critical_coupling, worst_growth
@@ -30,12 +32,14 @@ class Controller:
     color: str
     design: str = "baseline"
     changes: tuple[tuple[str, Any], ...] = ()
+    kept: bool = True
+    """Whether its flights are kept: they hang on nothing but parameters and this library"""
 
     def parameters(self) -> dict[str, Any]:
         """Flat parameters of the flight."""
         return {
-            **read_parameters(find_design(self.design)),
-            **load_scenario(self.scenario).parameters(),
+            **(read_parameters(find_design(self.design)) if self.design else {}),
+            **scenario_parameters(load_scenario(self.scenario)),
             **dict(self.changes),
         }
 
@@ -52,6 +56,23 @@ RMPC_WITH_NOTCH = Controller(
 RMPC_DECOUPLED = Controller("RMPC as the paper flies it, on the decoupled model", RMPC.scenario, RED)
 
 ALL = (WITH_NOTCH, WIDER_NOTCH, WITHOUT_NOTCH, RMPC, RMPC_WITH_NOTCH)
+
+_OTHER_COLORS = ("#008b8b", "#8c564b", "#c71585", "#556b2f")
+
+
+def of_scenarios(names: Sequence[str]) -> list[Controller]:
+    """Return the controllers of scenarios, labelled with their titles.
+
+    Raises:
+        ScenarioError: There is no such scenario, or it is not acceptable.
+    """
+    found = []
+    for name, color in zip(names, cycle(_OTHER_COLORS), strict=False):
+        scenario = load_scenario(name)
+        assemble_flight(scenario)
+        found.append(Controller(scenario.title, name, color, scenario.design, kept=False))
+    return found
+
 
 SAID_RMPC = "RMPC flies the fourth gain of the nominal family"
 """For the pages: which of the gains it is."""

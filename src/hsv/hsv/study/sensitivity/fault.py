@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from hsv.errors import ScenarioError
 from hsv.study.figures.style import GREY, new_figure
-from hsv.study.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, said_corners
+from hsv.study.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, of_scenarios, said_corners
 from hsv.study.sensitivity.flights_strip import LOSSES, draw_losses, finding
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
@@ -15,14 +17,31 @@ FLOWN = (*ALL, RMPC_DECOUPLED)
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Fly every controller with an elevator effectiveness from 1 down to 0.3."""
+    return run_beside(coarseness, folder, progress, ())
+
+
+def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: Sequence[str]) -> Outcome:
+    """Fly the controllers of ``scenarios``, too.
+
+    Raises:
+        ScenarioError: One of them is not acceptable, or has not one fault, of the elevator.
+    """
+    others = of_scenarios(scenarios)
+    for controller in others:
+        if (channels := controller.parameters().get("fault.channels", [])) != ["elevator_deflection"]:
+            raise ScenarioError(
+                f"scenario {controller.scenario!r}: fault: of {', '.join(channels) or 'nothing'}, expected one, of "
+                "elevator_deflection"
+            )
     shares = grid(0.3, 1.0, 0.025, coarseness)
     over = corners_of(1.0, coarseness)
-    along = {c: [Point(c.parameters() | {"fault.values": [float(left)]}, over) for left in shares] for c in FLOWN}
+    flown = (*FLOWN, *others)
+    along = {c: [Point(c.parameters() | {"fault.values": [float(left)]}, over) for left in shares] for c in flown}
     strips = sweep("fault", along, folder, progress)
 
     figure = new_figure(7.2)
     label = "elevator effectiveness after the fault (0.9: the paper's)"
-    axes = draw_losses(figure, shares, {c: strips[c] for c in ALL}, label)
+    axes = draw_losses(figure, shares, {c: strips[c] for c in (*ALL, *others)}, label)
     # Without a fault hardly anything moves: that end of the curves would take most of the axis.
     axes[1].set_ylim(bottom=0.05)
     axes[2].set_ylim(bottom=1.0)
@@ -38,4 +57,4 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     )
 
 
-STUDY = Study("fault", "Depth of the fault", run)
+STUDY = Study("fault", "Depth of the fault", run, run_beside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -25,11 +25,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Study:
-    """A study; ``run`` takes how coarse to be (1: as in the docs), a folder for designs, and a progress callback."""
+    """A study; ``run`` takes how coarse to be (1: as in the docs), a folder for designs, and a progress callback.
+
+    ``run_beside``, where there is one, flies others beside its own controllers: the scenarios that it takes last.
+    """
 
     name: str
     title: str
     run: Callable[[float, Path, Progress], Outcome]
+    run_beside: Callable[[float, Path, Progress, Sequence[str]], Outcome] | None = None
 
 
 def grid(low: float, high: float, step: float, coarseness: float) -> np.ndarray:

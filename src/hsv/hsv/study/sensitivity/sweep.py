@@ -53,7 +53,7 @@ def sweep(
     strips = {}
     for number, (controller, points) in enumerate(along.items()):
         path = folder / f"strip_{name}_{number}_{_digest(points)[:DIGITS]}.json"
-        if path.is_file():
+        if controller.kept and path.is_file():
             strips[controller] = json.loads(path.read_text(encoding="utf-8"))
         else:
             tables = []
@@ -63,7 +63,8 @@ def sweep(
                     fly_over(dict(point.values), point.over, _HALF_WIDTH, coupling_scale=point.coupling_scale)
                 )
             strips[controller] = strip(tables)
-            _keep(path, strips[controller])
+            if controller.kept:
+                _keep(path, strips[controller])
         done += len(points)
     progress(f"{name}, flights", total, total)
     return strips
