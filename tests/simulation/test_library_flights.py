@@ -1,6 +1,8 @@
 """Controllers in C in the loop: the same bits as in Python, and what they do wrong ends their own process only."""
 
+import re
 import shutil
+import subprocess
 import threading
 from pathlib import Path
 
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 from c_libraries import PROBE, build_probe
 
+from hsv.control.c_block import include_folder
 from hsv.control.controller import ControllerInput
 from hsv.control.library import library_digest, library_record
 from hsv.control.library_process import SharedMemory
@@ -241,3 +244,18 @@ def test_what_a_recorded_flight_keeps_is_the_library_s_hash_and_its_source(fligh
     (folder / "other.so").write_bytes((folder / "probe.so").read_bytes() + b"\0")
     assert library_digest(name.replace("probe.so", "other.so")) != before
     assert library_record("tube_mpc") is None and library_digest("package.module:Class") == ""
+
+
+def test_the_controller_in_the_header_s_comment_is_built_and_flies(tmp_path):
+    comment = (include_folder() / "hsv_block.h").read_text().partition("*/")[0]
+    lines = re.findall(r"^ \*     (.*)$|^ \*()$", comment, re.MULTILINE)
+    code = [line for line, _ in lines]
+    [command] = [line for line in code if line.startswith("cc ")]
+    (tmp_path / "trimmed.c").write_text("\n".join(code[: code.index(command)]))
+    subprocess.run(command, shell=True, check=True, cwd=tmp_path)
+    path = tmp_path / "mine.toml"
+    text = SCENARIO.format(settings="share = 0.5", controller="trimmed.so:trimmed", design="")
+    path.write_text(text.replace("[probe]", "[trimmed]"))
+    flown = fly(assemble_flight(load_scenario(str(path))))
+    assert np.allclose(flown.history.command, flown.reference_input * [1.0, 0.5], rtol=1e-15, atol=0.0)
+    assert library_record(load_scenario(str(path)).controller).source_name == "trimmed.c"
