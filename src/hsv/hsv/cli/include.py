@@ -6,9 +6,9 @@ import sys
 
 
 def include() -> None:
-    """Print the folder of hsv_block.h, for compilers: the header of controllers and other blocks in C.
+    """Print the folder of hsv_block.h, the header of controllers and other blocks in C, for a compiler's option -I.
 
-    Example: cc -O2 -ffp-contract=off -shared -fPIC -I"$(hsv include)" -o mine.so mine.c
+    Example: hsv include
     """
     from hsv.control.c_block import include_folder
 
