@@ -49,6 +49,7 @@ ON_THE_PATH = (
     "simulation/assembly.py",
     "simulation/closed_loop.py",
     "simulation/commands.py",
+    "simulation/distribution.py",
     "simulation/fields.py",
     "simulation/foreign.py",
     "simulation/scenario.py",

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from hsv.campaign.campaign import Campaign, plan
-from hsv.campaign.factors import flown_scenario, scenario_toml
 from hsv.campaign.sampling import Sampler
 from hsv.errors import CampaignError, ScenarioError
 from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_names
@@ -18,20 +17,22 @@ EVERYTHING = {
 def test_a_written_scenario_reads_as_the_flight_that_was_flown_in_every_bit(planned):
     campaign = planned(samples=50, **EVERYTHING)
     for sample in Sampler(campaign).draw(range(50))[0]:
-        flown = flown_scenario(campaign.scenario, campaign.factors, sample)
-        assert parse_scenario(scenario_toml(campaign.scenario, campaign.factors, sample), flown.name) == flown
+        flown = campaign.flown(sample)
+        assert parse_scenario(campaign.file(sample), flown.name) == flown
 
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_shipped_scenario_can_be_written(name):
-    scenario = load_scenario(name)
-    assert parse_scenario(scenario_toml(scenario, (), ()), name) == scenario
+    scenario, campaign = load_scenario(name), plan(name)
+    values = scenario.vehicle.perturbation
+    written = parse_scenario(campaign.file([values.get(factor.name, 0.0) for factor in campaign.factors]), name)
+    assert written.parameters() == {**campaign.flown([0.0] * 10).parameters(), **scenario.parameters()}
 
 
 def test_the_target_stays_where_it_is_when_the_start_moves(planned):
     campaign = planned(samples=50, **EVERYTHING)
     for sample in Sampler(campaign).draw(range(50))[0]:
-        flown = flown_scenario(campaign.scenario, campaign.factors, sample)
+        flown = campaign.flown(sample)
         assert flown.initial != campaign.scenario.initial
         for column, expected in zip(flown.commands, campaign.scenario.commands, strict=True):
             assert column == pytest.approx(expected, rel=1e-14)

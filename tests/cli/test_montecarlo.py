@@ -3,6 +3,8 @@ import json
 import pytest
 from node_processes import short_scenario
 
+from hsv.control.design_file import find_design
+
 
 @pytest.fixture
 def campaign(hsv, tmp_path):
@@ -52,3 +54,65 @@ def test_bad_settings_end_with_one_line_and_leave_nothing(campaign, tmp_path, wo
 
 def test_what_a_program_reads_is_json_only(campaign):
     assert json.loads(campaign("--json").out)["scenario"] == "short"
+
+
+DRAWN = """
+extends = "short.toml"
+[initial]
+velocity = { uniform = ["7890 ft/s", "7910 ft/s"] }
+[integral]
+rate = { normal = ["0.05 / s", "0.01 / s"] }
+"""
+
+
+@pytest.fixture
+def drawn(hsv, tmp_path):
+    """Fly a small campaign over distributions by the command."""
+    short_scenario(tmp_path, duration=3, fault=2)
+    (tmp_path / "drawn.toml").write_text(DRAWN)
+    words = ("--samples", "5", "--scale", "0", "--workers", "1", "--out", "drawn.parquet", "--no-page")
+    assert hsv("montecarlo", "drawn.toml", *words).code == 0
+    return "drawn.parquet"
+
+
+def test_a_flight_printed_as_a_scenario_flies_by_itself_with_its_fingerprint(drawn, hsv, tmp_path):
+    (tmp_path / "one.toml").write_text(hsv("montecarlo", "scenario", drawn, "--flight", "3").out)
+    replayed = hsv("montecarlo", "replay", drawn, "--flight", "3", "--json").json
+    assert replayed["identical"]
+    assert hsv("simulate", "one.toml", "--json").json["fingerprint"] == replayed["fingerprint"]
+
+
+def test_a_flight_keeps_the_design_that_was_flown(drawn, hsv, tmp_path, monkeypatch):
+    replayed = hsv("montecarlo", "replay", drawn, "--flight", "3", "--json").json
+    (tmp_path / "designs").mkdir()
+    other = find_design("baseline").read_text().replace("period: 0.02", "period: 0.01")
+    (tmp_path / "designs" / "baseline.yaml").write_text(other)
+    monkeypatch.setenv("HSV_DESIGN_PATH", str(tmp_path / "designs"))
+    refused = hsv("montecarlo", "scenario", drawn, "--flight", "3")
+    assert refused.code == 2 and "'baseline': not the one that the campaign flew" in refused.error
+    text = hsv("montecarlo", "scenario", drawn, "--flight", "3", "--design", "kept.yaml").out
+    (tmp_path / "one.toml").write_text(text)
+    assert hsv("simulate", "one.toml", "--json").json["fingerprint"] == replayed["fingerprint"]
+
+
+def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
+    assert "7910 ft/s" in hsv("scenarios", "--show", "drawn.toml").out
+    for command in ("simulate", "run"):
+        refused = hsv(command, "drawn.toml")
+        assert refused.code == 2
+        assert refused.error.startswith(
+            "scenario 'drawn': initial.velocity: a distribution, which hsv montecarlo draws"
+        )
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--flight", "5"), "flight = 5: expected 0 to 4"),
+        (("--flight", "1", "--design", "kept.toml"), "expected a file that ends in .yaml"),
+        (("--flight", "1", "--design", "nowhere/kept.yaml"), "design = 'nowhere/kept.yaml': cannot be written"),
+    ],
+)
+def test_what_cannot_be_printed_is_named(drawn, hsv, words, expected):
+    refused = hsv("montecarlo", "scenario", drawn, *words)
+    assert refused.code == 2 and expected in refused.error

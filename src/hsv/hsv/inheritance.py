@@ -19,6 +19,7 @@ def follow_extends(
     read: Callable[[str], Tables],
     refuse: Callable[[str, str], HsvError],
     replaced: Collection[str] = (),
+    values: Collection[str] = (),
 ) -> Tables:
     """Return the contents of a file with those of the files that it extends, one by one, under it.
 
@@ -29,6 +30,7 @@ def follow_extends(
         read: Returns the contents of a file by name or path.
         refuse: Returns the error for a file, by name or path, and what is wrong with it.
         replaced: Tables at the top that are replaced whole.
+        values: Keys of tables that stand for one value, and are replaced whole wherever they are.
 
     Raises:
         HsvError: That of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.
@@ -45,7 +47,9 @@ def follow_extends(
         layers.append(dict(read(chain[-1])))
     merged: Tables = {}
     for layer in reversed(layers):
-        merged = _merged({key: value for key, value in merged.items() if key not in {*replaced} & layer.keys()}, layer)
+        merged = _merged(
+            {key: value for key, value in merged.items() if key not in {*replaced} & layer.keys()}, layer, {*values}
+        )
     return merged
 
 
@@ -54,9 +58,9 @@ def is_path(name: str) -> bool:
     return "/" in name or name.endswith(".toml")
 
 
-def _merged(base: Tables, own: Tables) -> Tables:
+def _merged(base: Tables, own: Tables, values: set[str]) -> Tables:
     merged = dict(base)
     for key, value in own.items():
-        both = isinstance(value, dict) and isinstance(base.get(key), dict)
-        merged[key] = _merged(base[key], value) if both else value
+        both = isinstance(value, dict) and isinstance(base.get(key), dict) and not values & value.keys()
+        merged[key] = _merged(base[key], value, values) if both else value
     return merged

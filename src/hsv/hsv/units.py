@@ -80,6 +80,28 @@ def in_base_units(text: str) -> float:
     return _scaled(number, _squared(unit)[0])
 
 
+def si_unit_of(text: object) -> str:
+    """Return the SI unit of what a quantity is written in, ``"1"`` where there is no unit or no such quantity."""
+    import pint
+
+    try:
+        unit = _number_and_unit(text)[1] if isinstance(text, str) else ""
+        base = registry().Quantity(Fraction(1), unit).to_base_units()._units
+    except (ValueError, pint.UndefinedUnitError):
+        return "1"
+    powers = {registry().get_symbol(name): float(exponent) for name, exponent in base.items()}  # type: ignore[arg-type]
+    factors, divisors = (
+        [name + (f"^{abs(e):g}" if abs(e) != 1.0 else "") for name, e in powers.items() if sign * e > 0.0]
+        for sign in (1, -1)
+    )
+    return "/".join((" ".join(factors) or "1", *divisors))
+
+
+def written(value: float, unit: str) -> float | str:
+    """Return a number in ``unit`` as a file has it: a text, where it has a unit. No digit is lost."""
+    return value if unit == "1" else f"{value!r} {unit}"
+
+
 def parse_quantity(text: object, unit: str, field: str) -> float:
     """Return the quantity written in ``text`` as a number in ``unit``.
 

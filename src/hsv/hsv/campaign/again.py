@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from hsv.campaign.factors import scenario_toml
 from hsv.campaign.pilot import Outcome
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
@@ -43,9 +42,10 @@ def in_process(results: Results, flight: int) -> Repetition:
         CampaignError: No such flight.
         ParameterError: The results name code, and are not trusted.
     """
-    row, pilot = _row(results, flight), results.pilot
+    row, pilot = results.row(flight), results.pilot
     try:
-        repeated = pilot.outcome(pilot.fly(pilot.sample(flight)).data())
+        flown = pilot.fly(pilot.sample(flight))
+        repeated = pilot.outcome(flown.data(), flown.fingerprint)
     except ControllerError as error:
         repeated = pilot.crashed(error)
     return Repetition(flight, _outcome(row), repeated)
@@ -63,45 +63,53 @@ def over_dds(
         progress: Called with the step reached and the last step.
 
     Raises:
-        CampaignError: No such flight, or the design is not what it was.
+        CampaignError, DesignError: No such flight, or the design is not what it was.
         ParameterError: The results name code, or a design in another folder, and are not trusted.
         RunError: A process failed; its last words are in the message.
     """
     from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
-    from hsv.recording.flight import flight_data
+    from hsv.recording.flight import flight_data, flight_fingerprint
     from hsv.recording.reader import Bag
 
-    row, pilot = _row(results, flight), results.pilot
+    row, pilot = results.row(flight), results.pilot
     scenario = pilot.scenario
-    require_path_inside(scenario.design, "design", results.path, results.trust)
-    if read_parameters(find_design(scenario.design)) != results.campaign.design:
-        raise CampaignError(
-            f"design {scenario.design!r}: not the one that the campaign flew, expected the same to fly it over DDS"
-        )
+    require_design(results)
     with TemporaryDirectory(prefix="hsv_campaign_") as folder:
         path = Path(folder, f"{scenario.name}_flight_{flight}.toml")
-        path.write_text(scenario_toml(scenario, results.campaign.factors, pilot.sample(flight)), encoding="utf-8")
+        path.write_text(results.file(flight), encoding="utf-8")
         prepared = prepare(str(path), bag=bag)
     fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
-    repeated = pilot.outcome(replace(data, time=np.arange(len(data.time)) * pilot.period))
+    data = replace(data, time=np.arange(len(data.time)) * pilot.period)
+    repeated = pilot.outcome(data, flight_fingerprint(recorded))
     if repeated["tube_level"] is not None:
         # What the controller itself published, not what is computed from its messages.
         repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
     return Repetition(flight, _outcome(row), repeated, bag)
 
 
-def _row(results: Results, flight: int) -> dict[str, Any]:
-    if not 0 <= flight < results.campaign.samples:
-        raise CampaignError(f"flight = {flight}: expected 0 to {results.campaign.samples - 1}")
-    return results.row(flight)
+def require_design(results: Results) -> None:
+    """Refuse results whose design is not, by its name or path, the one that is kept in them.
+
+    Raises:
+        CampaignError, DesignError: It is not what it was, or is not there.
+        ParameterError: The results name one in another folder, and are not trusted.
+    """
+    name = results.campaign.scenario.design
+    if not name:
+        return
+    require_path_inside(name, "design", results.path, results.trust)
+    if read_parameters(find_design(name)) != results.campaign.design:
+        raise CampaignError(
+            f"design {name!r}: not the one that the campaign flew, which hsv montecarlo scenario --design writes"
+        )
 
 
 def _outcome(row: dict[str, Any]) -> Outcome:
-    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES)}
+    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES, "fingerprint")}
 
 
 def _same(a: float | bool | str | None, b: float | bool | str | None) -> bool:

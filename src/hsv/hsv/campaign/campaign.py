@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from hsv.campaign.factors import Factor, check_names, factors_of
+import tomli_w
+
+from hsv.campaign.factors import Factor, check_factors, factors_of, flown_scenario, flown_table
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError
-from hsv.simulation.assembly import blamed_on, design_parameters, scenario_parameters
-from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
+from hsv.simulation.assembly import assemble, blamed_on, design_parameters, scenario_parameters
+from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_text
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
@@ -43,10 +47,33 @@ class Campaign:
     library: str = ""
     """SHA-256 of the controller's library, for the same reason; empty where it is in none."""
 
-    @property
+    @cached_property
+    def table(self) -> dict[str, Any]:
+        """The scenario as written."""
+        return tomllib.loads(self.scenario_text)
+
+    @cached_property
     def scenario(self) -> Scenario:
-        """The scenario without any change."""
-        return parse_scenario(self.scenario_text, self.scenario_name)
+        """The scenario without any change, distributions at their means."""
+        return scenario_at_means(self.table, self.scenario_name)[0]
+
+    def flown(self, sample: Sequence[float]) -> Scenario:
+        """Return the scenario of the flight with a sample (one value a factor).
+
+        Raises:
+            ScenarioError: The scenario does not admit these values together.
+        """
+        return flown_scenario(self.table, self.scenario_name, self.factors, sample)
+
+    def file(self, sample: Sequence[float], design: str | None = None) -> str:
+        """Return the scenario of the flight with a sample as a file that every command takes, with errors as above.
+
+        Args:
+            sample: One value a factor.
+            design: Name or path to put in the place of the design's.
+        """
+        flown = flown_table(self.table, self.scenario_name, self.factors, sample)
+        return tomli_w.dumps(flown if design is None else {**flown, "design": design})
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -92,7 +119,7 @@ class Campaign:
             found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
             if found.method not in METHODS:
                 raise ValueError(f"method {found.method!r}")
-            check_names(factor.name for factor in found.factors)
+            check_factors(found.factors, found.table, found.scenario_name)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise CampaignError(
                 f"campaign written by commit {commit}, which this version does not read: {error}"
@@ -134,8 +161,9 @@ def plan(
         CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
     """
     text = scenario_text(scenario_name)
-    scenario = parse_scenario(text, Path(scenario_name).stem)
-    factors = factors_of(scenario, scale, ranges)
+    table, name = tomllib.loads(text), Path(scenario_name).stem
+    scenario, _ = scenario_at_means(table, name)
+    factors = factors_of(table, name, scale, ranges)
     if method not in METHODS:
         raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
     if method == "corners":
@@ -149,4 +177,17 @@ def plan(
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
     with blamed_on(scenario):
         design, library = design_parameters(scenario), library_digest(scenario.controller)
-    return Campaign(scenario.name, text, design, method, samples, seed, factors, commit, library)
+    campaign = Campaign(name, text, design, method, samples, seed, factors, commit, library)
+    _check_ends(campaign)
+    return campaign
+
+
+def _check_ends(campaign: Campaign) -> None:
+    """Refuse factors that the scenario does not admit at their ends, all at once or one by one, the others half-way."""
+    low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
+    for ends in (low, high):
+        flown = campaign.flown(ends)
+        with blamed_on(flown, design_read=False):
+            assemble({**campaign.design, **scenario_parameters(flown)})
+        for index, value in enumerate(ends):
+            campaign.flown([*mean[:index], value, *mean[index + 1 :]])

@@ -69,10 +69,12 @@ def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
     """Return what ``flights`` take on so many cores as fast as this one, measured on the scenario itself."""
     own = pilot(campaign.text)
     with suppress(ControllerError):
-        own.outcome(own.fly_unchanged().data())
+        flown = own.fly_unchanged()
+        own.outcome(flown.data(), flown.fingerprint)
     started = time.perf_counter()
     with suppress(ControllerError):
-        own.outcome(own.fly(own.sample(0)).data())
+        flown = own.fly(own.sample(0))
+        own.outcome(flown.data(), flown.fingerprint)
     seconds = time.perf_counter() - started
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
     rows = flights * 8 * len(schema(campaign))

@@ -2,139 +2,134 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-
-import tomli_w
+from typing import Any
 
 from hsv.errors import CampaignError
-from hsv.simulation.commands import CommandTable
-from hsv.simulation.metrics import METRICS
-from hsv.simulation.scenario import Scenario, parse_scenario
-from hsv.units import rounded
+from hsv.simulation.distribution import KINDS, Distribution
+from hsv.simulation.scenario import Scenario, scenario_at_means, set_field
+from hsv.units import rounded, written
 from hsv.vehicle.parameters import uncertainty_bounds
 
-OPTIONAL = {"fault_start": "s", "fault_value": "1", "initial_altitude": "m", "initial_velocity": "m/s"}
-"""Factors beside the uncertain parameters, with their SI units. The commanded target does not move with the start."""
+OPTIONAL = {
+    "fault_start": ("fault[0].start", "s"),
+    "fault_value": ("fault[0].value", "1"),
+    "initial_altitude": ("initial.altitude", "m"),
+    "initial_velocity": ("initial.velocity", "m/s"),
+}
+"""Factors of a campaign's own beside the uncertain parameters: field of the scenario, and SI unit.
+
+The commanded target does not move with the start.
+"""
+
+_PERTURBATION = "vehicle.perturbation."
 
 
-@dataclass(frozen=True)
-class Factor:
-    """A quantity that lies between ``low`` and ``high`` (SI); parameters are relative changes."""
+@dataclass(frozen=True, kw_only=True)
+class Factor(Distribution):
+    """What is drawn for one field of the scenario; uncertain parameters are relative changes."""
 
     name: str
-    unit: str
-    low: float
-    high: float
+    """Of an uncertain parameter, one of :data:`OPTIONAL`, or the field"""
+
+    @property
+    def field(self) -> str:
+        """The field of the scenario."""
+        if self.name in OPTIONAL:
+            return OPTIONAL[self.name][0]
+        return _PERTURBATION + self.name if self.name in uncertainty_bounds() else self.name
 
 
 def factors_of(
-    scenario: Scenario, scale: float, ranges: Mapping[str, tuple[float, float] | None]
+    table: Mapping[str, Any], name: str, scale: float, ranges: Mapping[str, tuple[float, float] | None]
 ) -> tuple[Factor, ...]:
-    """Return the factors of a campaign; arguments as for :func:`hsv.campaign.campaign.plan`.
+    """Return the factors of a campaign over the scenario in ``table``; other arguments as for ``plan``.
+
+    A distribution in the scenario takes the place of a parameter's bounds, and a range in ``ranges`` that of both.
 
     Raises:
         CampaignError, ScenarioError: A range that is empty or that the scenario does not admit.
     """
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
-    bounds = uncertainty_bounds() if scale else {}
-    factors = [Factor(name, "1", -rounded(scale * bound), rounded(scale * bound)) for name, bound in bounds.items()]
-    for name, limits in ranges.items():
-        if name not in OPTIONAL:
-            raise CampaignError(f"factor {name!r}: expected one of {', '.join(OPTIONAL)}")
+    scenario, drawn = scenario_at_means(dict(table), name)
+    bounds = {_PERTURBATION + parameter: rounded(scale * bound) for parameter, bound in uncertainty_bounds().items()}
+    found = {field: Distribution(unit="1", low=-bound, high=bound) for field, bound in bounds.items() if scale} | drawn
+    factors = {
+        field: Factor(name=field.removeprefix(_PERTURBATION), **vars(distribution))
+        for field, distribution in found.items()
+    }
+    for option, limits in ranges.items():
+        if option not in OPTIONAL:
+            raise CampaignError(f"factor {option!r}: expected one of {', '.join(OPTIONAL)}")
         if limits is None:
             continue
         if not limits[0] < limits[1]:
-            raise CampaignError(f"{name} from {limits[0]:.6g} to {limits[1]:.6g}: expected a range that increases")
-        if name.startswith("fault_") and len(scenario.fault) != 1:
-            raise CampaignError(f"{name}: the scenario has {len(scenario.fault)} faults, expected one")
-        factors.append(Factor(name, OPTIONAL[name], *map(rounded, limits)))
+            raise CampaignError(f"{option} from {limits[0]:.6g} to {limits[1]:.6g}: expected a range that increases")
+        if option.startswith("fault_") and len(scenario.fault) != 1:
+            raise CampaignError(f"{option}: the scenario has {len(scenario.fault)} faults, expected one")
+        field, unit = OPTIONAL[option]
+        factors[field] = Factor(name=option, unit=unit, low=rounded(limits[0]), high=rounded(limits[1]))
     if not factors:
-        raise CampaignError("scale = 0 and no other factor: expected something that varies")
-    for ends in ([f.low for f in factors], [f.high for f in factors]):
-        parse_scenario(scenario_toml(scenario, factors, ends), scenario.name)
-    return tuple(factors)
+        raise CampaignError("scale = 0, no other factor and no distribution: expected something that varies")
+    return tuple(factors.values())
 
 
-def check_names(names: Iterable[str]) -> None:
-    """Refuse a factor that this version does not know.
+def check_factors(factors: Iterable[Factor], table: Mapping[str, Any], name: str) -> None:
+    """Refuse a factor that this version does not know, or that the scenario in ``table`` does not have.
 
     Raises:
-        CampaignError: Names it.
+        CampaignError, ScenarioError: Names it.
     """
-    known = (*uncertainty_bounds(), *OPTIONAL)
-    for name in names:
-        if name not in known:
-            raise CampaignError(f"factor {name!r}: expected one of {', '.join(known)}")
+    known = (*uncertainty_bounds(), *OPTIONAL, *scenario_at_means(dict(table), name)[1])
+    for factor in factors:
+        if factor.name not in known:
+            raise CampaignError(f"factor {factor.name!r}: expected one of {', '.join(known)}")
+        if factor.kind not in KINDS:
+            raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected one of {', '.join(KINDS)}")
 
 
-def flown_scenario(base: Scenario, factors: Sequence[Factor], sample: Sequence[float]) -> Scenario:
-    """Return the scenario of a flight: ``base`` with the values (one a factor, SI) of its sample."""
-    values = {factor.name: float(value) for factor, value in zip(factors, sample, strict=True)}
-    changes = {name: value for name, value in values.items() if name not in OPTIONAL}
-    update: dict[str, object] = {}
-    if changes:
-        update["vehicle"] = base.vehicle.model_copy(update={"perturbation": {**base.vehicle.perturbation, **changes}})
-    initial = {name: values[f"initial_{name}"] for name in ("altitude", "velocity") if f"initial_{name}" in values}
-    if initial:
-        update["initial"] = base.initial.model_copy(update=initial)
-        update["command"] = _to_the_same_goals(base, initial)
-    fault = {name: values[f"fault_{name}"] for name in ("start", "value") if f"fault_{name}" in values}
-    if fault:
-        update["fault"] = (base.fault[0].model_copy(update=fault),)
-    return base.model_copy(update=update)
+def flown_table(
+    table: Mapping[str, Any], name: str, factors: Sequence[Factor], sample: Sequence[float]
+) -> dict[str, Any]:
+    """Return the scenario of a flight as a file has it: ``table`` with the values (one a factor) of its sample.
+
+    Raises:
+        ScenarioError: The scenario does not admit them together.
+    """
+    flown = copy.deepcopy(dict(table))
+    starts = {}
+    for factor, value in zip(factors, sample, strict=True):
+        set_field(flown, factor.field, written(float(value), factor.unit), name)
+        if factor.name.startswith("initial_"):
+            starts[factor.field.removeprefix("initial.")] = float(value)
+    if starts:
+        flown["command"] = _to_the_same_goals({**flown, "initial": table["initial"]}, name, starts)
+    return flown
 
 
-def _to_the_same_goals(base: Scenario, initial: Mapping[str, float]) -> tuple[CommandTable, ...]:
-    """Return the commands that lead from another start to what ``base`` commands: its step at t = 0 changes."""
-    reference, steps = base.commands, [command for command in base.command if command.end == 0.0]
-    goals = {"altitude": reference.altitudes[0], "velocity": reference.velocities[0]}
-    changes = {f"{axis}_change": sum(getattr(step, f"{axis}_change") for step in steps) for axis in goals}
-    changes |= {f"{axis}_change": rounded(goals[axis] - start) for axis, start in initial.items()}
-    return (CommandTable().model_copy(update=changes), *(c for c in base.command if c.end > 0.0))
+def _to_the_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the commands that lead from other ``starts`` (SI, by axis) to what ``table`` commands from its own.
+
+    The step at t = 0 changes.
+    """
+    scenario, _ = scenario_at_means(table, name)
+    steps = [command for command in scenario.command if command.end == 0.0]
+    goals = {"altitude": scenario.commands.altitudes[0], "velocity": scenario.commands.velocities[0]}
+    changes = {axis: sum(getattr(step, f"{axis}_change") for step in steps) for axis in goals}
+    changes |= {axis: rounded(goals[axis] - start) for axis, start in starts.items()}
+    units = {"altitude": "m", "velocity": "m/s"}
+    step = {f"{axis}_change": written(change, units[axis]) for axis, change in changes.items()}
+    later = [given for given, command in zip(table.get("command", ()), scenario.command, strict=True) if command.end]
+    return [step, *later]
 
 
-def scenario_toml(base: Scenario, factors: Sequence[Factor], sample: Sequence[float]) -> str:
-    """Return :func:`flown_scenario` as a file that ``hsv run`` takes; no digit is lost on the way."""
-    flown = flown_scenario(base, factors, sample)
-    table = {**flown.model_dump(exclude={"name", "limits", "own"}, exclude_defaults=True), **flown.own}
-    for path, unit in _UNITS.items():
-        *tables, key = path.split(".")
-        for place in _places(table, tables):
-            if key in place:
-                place[key] = _quantity(place[key], unit)
-    if flown.limits:
-        table["limits"] = {name: _quantity(limit, METRICS[name].unit) for name, limit in flown.limits.items()}
-    return tomli_w.dumps(table)
+def flown_scenario(table: Mapping[str, Any], name: str, factors: Sequence[Factor], sample: Sequence[float]) -> Scenario:
+    """Return the scenario of a flight, called ``name``: :func:`flown_table`, read.
 
-
-def _quantity(value: object, unit: str) -> object:
-    if isinstance(value, list | tuple):
-        return [_quantity(entry, unit) for entry in value]
-    return value if unit == "1" else f"{value!r} {unit}"
-
-
-_UNITS = {
-    "duration": "s",
-    "initial.altitude": "m",
-    "initial.velocity": "m/s",
-    "command.altitude_change": "m",
-    "command.velocity_change": "m/s",
-    "command.start": "s",
-    "command.end": "s",
-    "tube.change.start": "s",
-    "fault.start": "s",
-    "integral.rate": "1/s",
-    "notch.zero_frequency": "rad/s",
-    "notch.pole_frequency": "rad/s",
-}
-"""Fields that a scenario file writes with a unit."""
-
-
-def _places(table: dict[str, object], path: Sequence[str]) -> list[dict[str, object]]:
-    places: list[object] = [table]
-    for key in path:
-        found = [place[key] for place in places if isinstance(place, dict) and key in place]
-        places = [entry for value in found for entry in (value if isinstance(value, list | tuple) else [value])]
-    return [place for place in places if isinstance(place, dict)]
+    Raises:
+        ScenarioError: The scenario does not admit these values together.
+    """
+    return scenario_at_means(flown_table(table, name, factors, sample), name)[0]

@@ -7,21 +7,24 @@ from dataclasses import replace
 from functools import lru_cache
 
 from hsv.campaign.campaign import Campaign
-from hsv.campaign.factors import flown_scenario
 from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.controller import Controller
+from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
 from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.errors import CampaignError, ControllerError
 from hsv.faults.actuator import FaultInjector
-from hsv.simulation.assembly import assemble_flight, scenario_parameters
+from hsv.simulation.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Flight, fly
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.plant import Plant
 
 Outcome = dict[str, float | bool | str | None]
+
+_NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
+"""Beginnings of parameters on which the bench's own controllers do not depend."""
 
 
 class Pilot:
@@ -39,23 +42,27 @@ class Pilot:
         self._nominal = campaign.parameters
         self._parts = assemble_flight(self.scenario, campaign.design)
         self._levels = TubeLevels(self._nominal)
+        self._kept_for = _NOT_OF_SHIPPED if self.scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
         self.period = self._parts.plant.period
         """Control period, s."""
         self.steps = self._parts.plant.steps
         """Control periods of a flight that does not end early."""
 
     def sample(self, flight: int) -> list[float]:
-        """Return the sample of a flight (one value a factor, SI)."""
+        """Return the sample of a flight (one value a factor)."""
         [sample], _ = self.sampler.draw(range(flight, flight + 1))
         return list(sample.tolist())
 
     def fly(self, sample: Sequence[float]) -> Flight:
-        """Fly a sample (one value a factor, SI)."""
+        """Fly a sample (one value a factor)."""
         parts = self._parts
-        flown = flown_scenario(self.scenario, self.campaign.factors, sample)
-        values = {**self.campaign.design, **scenario_parameters(flown)}
+        values = {**self.campaign.design, **scenario_parameters(self.campaign.flown(sample))}
+        names = values.keys() | self._nominal.keys()
+        changed = [name for name in names if values.get(name) != self._nominal.get(name)]
+        if not all(name.startswith(self._kept_for) for name in changed):
+            return fly(assemble(values))
         trajectory = parts.nominal_trajectory
-        if any(values[name] != self._nominal[name] for name in self._nominal if name.startswith("reference.")):
+        if any(name.startswith("reference.") for name in changed):
             trajectory = NominalTrajectory.from_parameters(values)
         return fly(
             replace(
@@ -75,14 +82,15 @@ class Pilot:
         """The controller that flies."""
         return self._parts.controller
 
-    def outcome(self, flight: FlightData) -> Outcome:
-        """Return what a campaign keeps of a flight: whether and when it ended early, worst tube level, metrics (SI)."""
+    def outcome(self, flight: FlightData, fingerprint: str | None) -> Outcome:
+        """Return what a campaign keeps of a flight: its end, worst tube level, metrics (SI), ``fingerprint``."""
         return {
             "diverged": not in_model_range(flight.state[-1]),
             "end_time": float(flight.time[-1]),
             "tube_level": self._levels.worst(flight),
             **flight_metrics(flight),
             "crashed": None,
+            "fingerprint": fingerprint,
         }
 
     def crashed(self, error: ControllerError) -> Outcome:

@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 
 from hsv.campaign.campaign import Campaign
-from hsv.units import rounded
 
 
 class Sampler:
@@ -15,21 +14,19 @@ class Sampler:
 
     def __init__(self, campaign: Campaign) -> None:
         self._campaign = campaign
-        self._low = np.array([factor.low for factor in campaign.factors])
-        self._high = np.array([factor.high for factor in campaign.factors])
+        self._factors = campaign.factors
 
     def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
-        """Return the samples (flights, factors), SI, and the seed (flights) that each was drawn from.
+        """Return the samples (flights, factors), in the factors' units, and the seed (flights) that each is drawn from.
 
         Uniform samples have a seed each, so that any can be drawn alone; the other methods draw from the campaign's.
         """
-        unit, seeds = self._unit_samples(flights)
-        values = np.where(unit == 1.0, self._high, self._low + (self._high - self._low) * unit)
-        # As many digits as a scenario file keeps: a flight is then the same whichever way it is asked for.
-        return np.vectorize(rounded, otypes=[float])(values), seeds
+        shares, seeds = self._shares(flights)
+        return np.column_stack([f.quantiles(column) for f, column in zip(self._factors, shares.T, strict=True)]), seeds
 
-    def _unit_samples(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
-        method, seed, d = self._campaign.method, self._campaign.seed, len(self._low)
+    def _shares(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
+        """Return the shares of the distributions (flights, factors) below the samples, 0 to 1, and the seeds."""
+        method, seed, d = self._campaign.method, self._campaign.seed, len(self._factors)
         if method == "uniform":
             keys = (np.random.SeedSequence(seed, spawn_key=(flight,)) for flight in flights)
             seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], np.uint64)
@@ -52,5 +49,5 @@ class Sampler:
         """All samples: where one lies in its factor's strata is settled by a shuffle of all."""
         from scipy.stats import qmc
 
-        engine = qmc.LatinHypercube(len(self._low), seed=self._campaign.seed)
+        engine = qmc.LatinHypercube(len(self._factors), seed=self._campaign.seed)
         return np.asarray(engine.random(self._campaign.samples))

@@ -109,15 +109,35 @@ class Results:
 
     @property
     def samples(self) -> np.ndarray:
-        """The samples (flights, factors), SI."""
+        """The samples (flights, factors)."""
         return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
 
     def row(self, flight: int) -> dict[str, Any]:
-        """Return the row of a flight."""
+        """Return the row of a flight.
+
+        Raises:
+            CampaignError: There is no such flight.
+        """
+        if not 0 <= flight < self.campaign.samples:
+            raise CampaignError(f"flight = {flight}: expected 0 to {self.campaign.samples - 1}")
         rows = self._read(filters=[("flight", "==", flight)]).to_pylist()
         if len(rows) != 1:
             raise CampaignError(f"{self.path}: has {len(rows)} rows of flight {flight}, expected one")
         return dict(rows[0])
+
+    def sample(self, flight: int) -> dict[str, float]:
+        """Return the recorded sample of a flight, by factor; errors as :meth:`row`."""
+        row = self.row(flight)
+        return {factor.name: row[f"sample_{factor.name}"] for factor in self.campaign.factors}
+
+    def file(self, flight: int, design: str | None = None) -> str:
+        """Return the scenario of a flight as a file that every command takes; errors as :meth:`row`.
+
+        Args:
+            flight: Number of the flight.
+            design: Name or path to put in the place of the design's.
+        """
+        return self.campaign.file(list(self.sample(flight).values()), design)
 
     def _read(self, **what: Any) -> pa.Table:
         try:

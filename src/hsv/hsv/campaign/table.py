@@ -14,7 +14,7 @@ from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.pilot import pilot
 from hsv.control.library import LibraryController
-from hsv.errors import ControllerError
+from hsv.errors import ControllerError, ScenarioError
 from hsv.simulation.closed_loop import watched
 from hsv.simulation.metrics import METRICS
 
@@ -28,12 +28,12 @@ COMPRESSION = "zstd"
 
 
 def schema(campaign: Campaign) -> pa.Schema:
-    """Return the columns: flight, seed, the sample, what became of it."""
+    """Return the columns: flight, seed, the sample, what became of it, its fingerprint."""
     samples = [_number(f"sample_{factor.name}", factor.unit) for factor in campaign.factors]
     outcomes = [_number(name, unit) for name, unit in OUTCOMES.items()]
     fixed = [pa.field("flight", pa.int64(), False), pa.field("seed", pa.uint64(), False)]
     ended = [pa.field("diverged", pa.bool_(), False), pa.field("crashed", pa.string())]
-    return pa.schema([*fixed, *samples, *ended, *outcomes])
+    return pa.schema([*fixed, *samples, *ended, *outcomes, pa.field("fingerprint", pa.string())])
 
 
 def _number(name: str, unit: str) -> pa.Field:
@@ -41,7 +41,11 @@ def _number(name: str, unit: str) -> pa.Field:
 
 
 def fly_batch(text: str, batch: int) -> bytes:
-    """Fly a batch of the campaign written in ``text``; return its rows and envelope as a Parquet file."""
+    """Fly a batch of the campaign written in ``text``; return its rows and envelope as a Parquet file.
+
+    Raises:
+        ScenarioError: The scenario does not admit the values of a flight together; it is named.
+    """
     own = pilot(text)
     if isinstance(own.controller, LibraryController):
         # Whole batches in the library's process, and one by one only where a flight makes it crash.
@@ -56,11 +60,14 @@ def _flown_here(text: str, batch: int) -> bytes:
     flights = campaign.flights(batch)
     for flight, sample, seed in zip(flights, *own.sampler.draw(flights), strict=True):
         try:
-            data = own.fly(sample).data()
+            flown = own.fly(sample)
+            data = flown.data()
             envelope.add(data, own.steps)
-            outcome = own.outcome(data)
+            outcome = own.outcome(data, flown.fingerprint)
         except ControllerError as error:
             outcome = own.crashed(error)
+        except ScenarioError as error:
+            raise ScenarioError(f"flight {flight}: {error}") from error
         rows.append(row(sample, flight, int(seed), campaign, outcome))
     return encode(campaign, rows, envelope)
 

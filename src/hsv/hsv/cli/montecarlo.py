@@ -157,7 +157,7 @@ def replay(
             repeated = again.over_dds(results, flight, target, lambda step, steps: bar("over DDS", step, steps))
     else:
         repeated = again.in_process(results, flight)
-    sample = {factor.name: results.row(flight)[f"sample_{factor.name}"] for factor in results.campaign.factors}
+    sample = results.sample(flight)
     quantities = {
         name: (float(value), unit)
         for name, unit in OUTCOMES.items()
@@ -174,6 +174,7 @@ def replay(
                 "crashed": repeated.repeated["crashed"],
                 "sample_si": sample,
                 "outcome": to_json(quantities, units),
+                "fingerprint": repeated.repeated.get("fingerprint"),
                 "bag": str(repeated.bag) if repeated.bag else None,
             }
         )
@@ -182,6 +183,8 @@ def replay(
         console.print("sample  " + sample_words(sample), soft_wrap=True)
         if crashed := repeated.repeated["crashed"]:
             console.print(f"crashed {crashed}", soft_wrap=True, markup=False)
+        else:
+            console.print(f"fingerprint {repeated.repeated['fingerprint']}", soft_wrap=True)
         if repeated.bag:
             console.print(f"bag     {repeated.bag}", soft_wrap=True)
         if not differing:
@@ -192,6 +195,38 @@ def replay(
             f"flight {flight}: {name} is {repeated.repeated.get(name)!r}, the campaign recorded "
             f"{repeated.recorded[name]!r} ({len(differing)} outcomes differ)"
         )
+
+
+@montecarlo.command()
+def scenario(
+    result: ResultArgument,
+    flight: Annotated[int, typer.Option(help="Number of the flight.")],
+    design: Annotated[
+        Path | None, typer.Option(help="Also write the design that was flown to this file (.yaml), and name it.")
+    ] = None,
+    trust: TrustOption = False,
+) -> None:
+    """Print the scenario of one flight of a campaign: a file to fly by itself, with the same fingerprint.
+
+    Example: hsv montecarlo scenario campaigns/case1_corners.parquet --flight 17 > worst.toml
+    """
+    from hsv.campaign.again import require_design
+    from hsv.campaign.summary import Results
+    from hsv.cli.targets import writing
+    from hsv.errors import CampaignError
+    from hsv.graph.parameter_sections import ParameterSections
+
+    results = Results(result, trust=trust)
+    if design is None:
+        require_design(results)
+    elif design.suffix != ".yaml":
+        raise CampaignError(f"design = {str(design)!r}: expected a file that ends in .yaml")
+    text = results.file(flight, str(design) if design else None)
+    if design:
+        check_target(design, "design")
+        with writing(design, "design"):
+            design.write_text(ParameterSections(dict(results.campaign.design)).to_yaml(), encoding="utf-8")
+    print(text, end="")
 
 
 def _range(words: Range | None, unit: str, field: str) -> tuple[float, float] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -21,13 +22,14 @@ def scenarios(
     """
     import tomllib
 
-    from hsv.simulation.scenario import load_scenario, scenario_names, scenario_text
+    from hsv.simulation.scenario import load_scenario, scenario_at_means, scenario_names, scenario_text
 
     if show:
-        load_scenario(show)
         text = scenario_text(show)
+        table = tomllib.loads(text)
+        scenario_at_means(table, Path(show).stem)
         if json:
-            print_json(tomllib.loads(text))
+            print_json(table)
         else:
             print(text, end="")
         return

@@ -34,6 +34,9 @@ GROUP = "hsv.controllers"
 SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
 """The classes of this library's by name, which a source tree knows as well; others are entry points."""
 
+NOT_TOLD = ("vehicle.perturbation.", "fault.")
+"""Beginnings of parameters that a controller of one's own is not told: how the vehicle really is, what will fail."""
+
 _DEFAULT = "tube_mpc"
 
 NODE = "node:"
@@ -141,7 +144,10 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
         return ElsewhereController(name)
     kind = controller_class(name)
     try:
-        built = kind.from_parameters(values, design)
+        told = values
+        if name not in SHIPPED_CONTROLLERS:
+            told = {parameter: value for parameter, value in values.items() if not parameter.startswith(NOT_TOLD)}
+        built = kind.from_parameters(told, design)
     except HsvError:
         raise
     except Exception as error:

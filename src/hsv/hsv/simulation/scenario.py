@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -20,9 +20,10 @@ from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.inheritance import follow_extends, is_path
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
+from hsv.simulation.distribution import KINDS, Distribution, read_distribution
 from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
 from hsv.simulation.metrics import METRICS
-from hsv.units import parse_quantity
+from hsv.units import parse_quantity, si_unit_of, written
 from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
 from hsv.vehicle.parameters import uncertainty_bounds
 
@@ -190,7 +191,9 @@ def scenario_text(name: str) -> str:
     """
     text = _own_text(name)
     own = _table(text, name)
-    whole = follow_extends(name, lambda other: _located(_table(_own_text(other), other), other), _refused, REPLACED)
+    whole = follow_extends(
+        name, lambda other: _located(_table(_own_text(other), other), other), _refused, REPLACED, KINDS
+    )
     return text if whole == own else tomli_w.dumps(whole)
 
 
@@ -242,12 +245,17 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
     if changes:
         table = _table(text, name)
         for field, value in changes.items():
-            _set(table, field, value, name)
+            set_field(table, field, value, name)
         text = tomli_w.dumps(_located(table, name) if "controller" in changes else table)
     return parse_scenario(text, Path(name).stem)
 
 
-def _set(table: dict[str, Any], field: str, value: object, name: str) -> None:
+def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
+    """Put a value, as a file has it, in the place of a ``field`` of the scenario in ``table``.
+
+    Raises:
+        ScenarioError: There is no such place in the scenario, which is called ``name``.
+    """
     *path, key = (int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", field))
     place: Any = table
     for part in path:
@@ -264,7 +272,23 @@ def _set(table: dict[str, Any], field: str, value: object, name: str) -> None:
 
 def parse_scenario(text: str, name: str) -> Scenario:
     """Return the scenario written in ``text``, as :func:`scenario_text` returns it; errors as :func:`load_scenario`."""
-    table = _table(text, name)
+    scenario, drawn = scenario_at_means(_table(text, name), name)
+    if drawn:
+        field = next(iter(drawn))
+        raise ScenarioError(
+            f"scenario {name!r}: {field}: a distribution, which hsv montecarlo draws; expected a number"
+        )
+    return scenario
+
+
+def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[str, Distribution]]:
+    """Return the scenario in ``table`` with the mean of each distribution in its place, and these by field.
+
+    Raises:
+        ScenarioError: As :func:`load_scenario`.
+    """
+    found: dict[int, Distribution] = {}
+    whole = table
     for key in ("name", "own"):
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
@@ -272,14 +296,41 @@ def parse_scenario(text: str, name: str) -> Scenario:
     own = _own_tables(table)
     table = {key: value for key, value in table.items() if key not in own}
     try:
+        own = {key: {k: _own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
         given = {**table, "name": name, "own": own, "limits": _limits(table.get("limits", {}))}
-        scenario = Scenario.model_validate(given)
+        scenario = Scenario.model_validate(given, context=found)
         _check(scenario)
     except ValidationError as error:
         raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
     except HsvError as error:
         raise ScenarioError(f"scenario {name!r}: {error}") from error
-    return scenario
+    return scenario, {field: found[id(place)] for field, place in _tables_in(whole) if id(place) in found}
+
+
+def _tables_in(value: object, field: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield every table in ``value``, with its place as a field is called."""
+    if isinstance(value, dict):
+        yield field, value
+        for key, entry in value.items():
+            yield from _tables_in(entry, f"{field}.{key}" if field else key)
+    elif isinstance(value, list):
+        for index, entry in enumerate(value):
+            yield from _tables_in(entry, f"{field}[{index}]")
+
+
+def _own_value(field: str, value: object, found: dict[int, Distribution]) -> object:
+    """Return an entry of a controller's own table with means in the place of distributions, which go to ``found``.
+
+    Which unit is due only the controller's class knows: it is taken from their first value.
+    """
+    if isinstance(value, list):
+        return [_own_value(field, entry, found) for entry in value]
+    if not isinstance(value, dict):
+        return value
+    pair = next(iter(value.values()), None)
+    first = pair[0] if isinstance(pair, list) and pair else None
+    drawn = found[id(value)] = read_distribution(value, si_unit_of(first), field)
+    return written(drawn.middle, drawn.unit)
 
 
 def _shipped() -> Any:

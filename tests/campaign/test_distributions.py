@@ -1,0 +1,131 @@
+"""Campaigns over the distributions of a scenario, and their flights flown by themselves."""
+
+import numpy as np
+import pytest
+
+from hsv.campaign import again
+from hsv.campaign.campaign import METHODS, Campaign, plan
+from hsv.campaign.conduct import conduct
+from hsv.campaign.fleet import OwnProcess
+from hsv.campaign.sampling import Sampler
+from hsv.campaign.store import Store
+from hsv.campaign.summary import Results
+from hsv.errors import ScenarioError
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import parse_scenario
+
+SCENARIO = """
+extends = "case1"
+duration = "3 s"
+[[command]]
+altitude_change = { normal = ["60 ft", "5 ft"] }
+start = { uniform = ["0.5 s", "1 s"] }
+[initial]
+velocity = { uniform = ["7890 ft/s", "7910 ft/s"] }
+[integral]
+rate = { uniform = ["0 / s", "0.1 / s"] }
+[vehicle.perturbation]
+mass = { normal = ["0 %", "2 %"] }
+[notch]
+zero_damping = { uniform = [0.04, 0.06] }
+[[fault]]
+channel = "elevator_deflection"
+type = "loss_of_effectiveness"
+value = { uniform = [0.8, 1.0] }
+start = "2 s"
+[limits]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "drawn.toml"
+    path.write_text(SCENARIO)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def flown(scenario, tmp_path_factory):
+    campaign = plan(scenario, samples=20, seed=5, scale=0.0)
+    out = tmp_path_factory.mktemp("campaign") / "drawn.parquet"
+    conduct(campaign, Store(out, campaign), OwnProcess())
+    return Results(out)
+
+
+def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
+    own = {"initial.velocity", "command[0].altitude_change", "command[0].start", "integral.rate", "notch.zero_damping"}
+    assert {f.name for f in plan(scenario, scale=0.0).factors} == own | {"mass", "fault[0].value"}
+    everything = {f.name: f for f in plan(scenario, fault_value=(0.9, 1.0)).factors}
+    assert len(everything) == 10 + len(own) + 1
+    # What the file says of a parameter comes before the bounds of all, what the command says before both.
+    assert (everything["mass"].kind, everything["mass"].high) == ("normal", 0.06)
+    assert everything["fault_value"].low == 0.9 and "fault[0].value" not in everything
+
+
+@pytest.mark.parametrize("flight", [0, 7, 19])
+def test_a_flight_written_as_a_scenario_flies_by_itself_as_recorded_in_every_bit(flown, flight):
+    alone = fly(assemble_flight(parse_scenario(flown.file(flight), "alone")))
+    assert alone.fingerprint == flown.row(flight)["fingerprint"]
+    assert again.in_process(flown, flight).differing == []
+
+
+def test_every_number_drawn_is_flown(flown):
+    for flight in range(3):
+        sample, scenario = flown.sample(flight), parse_scenario(flown.file(flight), "alone")
+        assert scenario.initial.velocity == sample["initial.velocity"]
+        assert scenario.command[0].altitude_change == sample["command[0].altitude_change"]
+        assert scenario.command[0].start == scenario.command[0].end == sample["command[0].start"]
+        assert scenario.integral.rate == sample["integral.rate"]
+        assert scenario.vehicle.perturbation == {"mass": sample["mass"]}
+        assert scenario.notch.zero_damping == (sample["notch.zero_damping"],)
+        assert scenario.fault[0].value == sample["fault[0].value"]
+    assert len(set(flown.column("fingerprint").tolist())) == 20
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_samples_lie_within_the_ends_and_can_be_drawn_alone(scenario, method):
+    campaign = plan(scenario, samples=64, seed=2, scale=0.0, method=method)
+    samples, _ = Sampler(campaign).draw(range(campaign.samples))
+    assert np.all(samples >= [f.low for f in campaign.factors]) and np.all(
+        samples <= [f.high for f in campaign.factors]
+    )
+    one, _ = Sampler(campaign).draw(range(40, 41))
+    assert np.array_equal(one[0], samples[40])
+    if method != "corners":
+        # Two thirds of a normal distribution lie within a standard deviation, a third of a uniform one as long.
+        normal = [i for i, f in enumerate(campaign.factors) if f.kind == "normal"]
+        mean = np.array([f.middle for f in campaign.factors])
+        third = np.array([(f.high - f.low) / 6.0 for f in campaign.factors])
+        within = np.mean(np.abs(samples - mean) < third, axis=0)
+        assert np.all(within[normal] > 0.5) and np.all(np.delete(within, normal) < 0.5)
+
+
+def test_a_campaign_with_distributions_reads_back_as_it_was_written(scenario):
+    campaign = plan(scenario)
+    assert Campaign.from_text(campaign.text) == campaign
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"end": '{ uniform = ["0.2 s", "3 s"] }'}, r"command\[0\].end = 0.2 s: expected no time before start"),
+        ({"altitude_change": '{ uniform = ["0 ft", "2000 ft"] }'}, r"command\[0\].altitude_change leads to 87500 ft"),
+    ],
+)
+def test_ends_that_a_scenario_does_not_admit_are_refused_before_anything_flies(tmp_path, changes, message):
+    path = tmp_path / "drawn.toml"
+    lines = [line for line in SCENARIO.splitlines() if line.partition(" = ")[0] not in changes]
+    at = lines.index("[[command]]") + 1
+    path.write_text("\n".join([*lines[:at], *(f"{key} = {value}" for key, value in changes.items()), *lines[at:]]))
+    with pytest.raises(ScenarioError, match=message):
+        plan(str(path))
+
+
+def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out):
+    path = tmp_path / "drawn.toml"
+    ends = 'end = { uniform = ["0.8 s", "1.4 s"] }\naltitude_change'
+    path.write_text(SCENARIO.replace("altitude_change", ends, 1))
+    campaign = plan(str(path), samples=40, scale=0.0)
+    with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
+        conduct(campaign, Store(out, campaign), OwnProcess())
