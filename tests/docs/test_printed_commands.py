@@ -115,6 +115,7 @@ ELSEWHERE = {
     "source install/local_setup.bash": "tests/graph/test_own_controllers.py",
     "hsv run scenario.toml": "tests/graph/test_own_controllers.py",
     "hsv run case1 --external": "tests/graph/test_own_controllers.py",
+    "hsv check lqr": "tests/examples/test_own_controllers.py",
     "mkdir -p my_ws/src": "test_a_workspace_of_ones_own",
     "cd my_ws": "test_a_workspace_of_ones_own",
     "python3 -m colcon build --symlink-install": "test_a_workspace_of_ones_own",

@@ -75,6 +75,13 @@ def test_a_campaign_flies_it(hsv, example):
     assert ended["within"] == 100
 
 
+@pytest.mark.parametrize("part", ["lqr", str(EXAMPLES / "compiled" / "scenario.toml")])
+def test_it_flies_the_same_bytes_every_time(hsv, part):
+    ran = hsv("check", part, "--json")
+    assert ran.returncode == 0, ran.stderr
+    assert all(check["same"] and check["flights"] >= 2 for check in json.loads(ran.stdout)["checks"])
+
+
 def test_what_an_example_refuses_is_said_in_a_line(hsv, tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(f'extends = "{EXAMPLES / "compiled" / "scenario.toml"}"\n[scheduled]\nlow_velocity = "8200 ft/s"\n')

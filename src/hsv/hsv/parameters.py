@@ -62,10 +62,9 @@ class Parameter:
         Raises:
             ParameterError: Wrong type (an integer is not a double), not finite, outside the range or the choices.
         """
-        wrong = self.refusal(value)
         if self.kind.endswith("_array"):
             if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
-                raise wrong
+                raise self.refusal(value)
             element = str if self.kind == "string_array" else float
             values = list(cast(Iterable[Any], value))
             for index, entry in enumerate(values):
@@ -76,12 +75,12 @@ class Parameter:
             return values
         expected = {"bool": bool, "integer": int, "double": float, "string": str}[self.kind]
         if not isinstance(value, expected) or (expected is int and isinstance(value, bool)):
-            raise wrong
+            raise self.refusal(value)
         if isinstance(value, str):
             if self.choices and value not in self.choices:
-                raise wrong
+                raise self.refusal(value)
         elif not isinstance(value, bool) and not self._in_range(value):
-            raise wrong
+            raise self.refusal(value)
         return value
 
     def refusal(self, value: object) -> ParameterError:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from fractions import Fraction
-from functools import cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
 
 from hsv.errors import QuantityError
@@ -128,12 +128,11 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
     if not any(map(str.isdigit, text)):
         raise QuantityError(f"{field} = {text!r}: no number, {expected}")
     try:
-        number, written = _number_and_unit(text)
-        (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
-        if dimension != wanted:
-            problem = "wrong unit" if written else "the unit is missing"
+        value = _converted(text, unit)
+        if value is None:
+            problem = "wrong unit" if _number_and_unit(text)[1] else "the unit is missing"
             raise QuantityError(f"{field} = {text!r}: {problem}, {expected}")
-        return _scaled(number, square / wanted_square)
+        return value
     except QuantityError:
         raise
     except OverflowError as error:
@@ -142,6 +141,14 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
     except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
         raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
+
+
+@lru_cache(maxsize=4096)
+def _converted(text: str, unit: str) -> float | None:
+    """Return a quantity in ``unit``, ``None`` where its own is of another dimension; campaigns read the same often."""
+    number, written = _number_and_unit(text)
+    (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
+    return _scaled(number, square / wanted_square) if dimension == wanted else None
 
 
 def _number_and_unit(text: str) -> tuple[Fraction, str]:

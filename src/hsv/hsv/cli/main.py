@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from hsv.cli.bench import bench
+from hsv.cli.check import check
 from hsv.cli.claims import claims
 from hsv.cli.conclude import conclude
 from hsv.cli.design import design
@@ -58,6 +59,7 @@ for command in (
     linearise,
     design,
     verify,
+    check,
     scenarios,
     simulate,
     run,

@@ -20,6 +20,7 @@ A controller of one's own is a class with four names, here the whole of one that
 
 from __future__ import annotations
 
+import copy
 import ctypes
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -137,6 +138,10 @@ class Controller(ABC):
     def step(self, inputs: ControllerInput) -> ControllerResult:
         """Return the input of this step; called once a step, in order."""
 
+    def copied(self) -> Controller:
+        """Return a controller of its own that goes on from the state of this one."""
+        return copy.deepcopy(self)
+
 
 class ControllerClass(Protocol):
     """The class of a controller: its parameters, and how it is built from them.
@@ -192,6 +197,14 @@ class ForeignController(Controller):
             self._controller.reset()
         else:
             self._state = self.kernel.state.copy()
+
+    def copied(self) -> ForeignController:
+        """Return a controller of its own that goes on from the state of this one; of a compiled one, all is in it."""
+        if self.kernel is None:
+            return ForeignController(self._name, copy.deepcopy(self._controller))
+        made = ForeignController(self._name, self._controller)
+        made._state = self._state.copy()
+        return made
 
     def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
         """Return the input of this step as the controller wants it, not limited, finite or not.

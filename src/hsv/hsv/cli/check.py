@@ -1,0 +1,50 @@
+"""The command ``hsv check``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from hsv.cli.options import JsonOption
+from hsv.cli.output import console, print_json, report_error
+
+
+def check(
+    part: Annotated[
+        str,
+        typer.Argument(metavar="PART", help="A controller as a scenario names it, flown in case1, or a scenario."),
+    ],
+    json: JsonOption = False,
+) -> None:
+    """Fly a controller twice, after a reset, from a copied state and under load, and compare every byte.
+
+    Exit code 1 if any differs: it is told what differs first, and from which step on.
+
+    Example: hsv check tube_mpc
+    """
+    from hsv.cli.progress import stages
+    from hsv.simulation.repeatability import findings, scenario_of
+
+    scenario = scenario_of(part)
+    found = []
+    with stages() as progress:
+        for finding in findings(scenario):
+            found.append(finding)
+            progress(scenario.controller, len(found), 4)
+    failing = [finding for finding in found if finding.difference]
+    if json:
+        checks = [vars(finding) | {"same": not finding.difference} for finding in found]
+        print_json({"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks})
+    else:
+        table = Table(title=f"{scenario.controller} in {scenario.name}", title_justify="left", box=None, pad_edge=False)
+        for name in ("check", "flights", "bytes"):
+            table.add_column(name, justify="right" if name == "flights" else "left", overflow="fold")
+        for finding in found:
+            style = "bold red" if finding.difference else None
+            table.add_row(finding.check, str(finding.flights), finding.difference or "the same", style=style)
+        console.print(table)
+    if failing:
+        report_error(f"{scenario.controller}, {failing[0].check}: {failing[0].difference}")
+        raise typer.Exit(1)
