@@ -19,6 +19,7 @@ from hsv.parameters import Parameter
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.library_child import LoadedLibrary
+from hsv.simulation.repeatability import from_copied_state
 from hsv.simulation.scenario import load_scenario, scenario_text
 
 SCENARIO = """
@@ -103,6 +104,10 @@ def test_c_and_python_answer_the_same_stepwise(flight):
             answers = [parts.controller.step(given).input.tolist() for parts in (ours, other)]
             assert answers[0] == answers[1]
             assert (answers[0][1] == 0.2) == (k == 0)
+
+
+def test_a_copy_goes_on_from_the_state_of_the_first(flight):
+    assert from_copied_state(flight(), fly(flight())) == ""
 
 
 def test_flights_in_threads_share_no_state(flight):

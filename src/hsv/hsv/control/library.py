@@ -179,6 +179,12 @@ class LibraryController(ForeignController):
         """Start a new run."""
         self._state = np.zeros_like(self._state)
 
+    def copied(self) -> LibraryController:
+        """Return a controller of its own that goes on from the state of this one."""
+        made = LibraryController(self.name, self.path, self.symbol, len(self._state), self.parameters)
+        made._state = self._state.copy()
+        return made
+
     def _answer(self, inputs: ControllerInput) -> Any:
         call = self.symbol, inputs.step, flat_input(inputs), self._state, self.parameters
         try:
