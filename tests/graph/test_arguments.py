@@ -39,7 +39,7 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
         (PLANT, "-r __ns:=//veh", ["namespace = '//veh'", "/veh1"]),
         (PLANT, "-r __ns:=veh1", ["__ns:=veh1", "leading slash"]),
         (PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
-        (PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of tube_mpc, robust_mpc"]),
+        (PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
         (TUBE_MPC, "-p controller:=robust_mpc", ["controller = 'robust_mpc'", "expected tube_mpc"]),
         (PLANT, "-r hsv/state", ["'-r hsv/state'"]),
         (PLANT, "-p duration", ["'-p duration'"]),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from flown_bags import flown_bag
 from injected_fault import last_line
 from node_processes import Processes
 from ros_domain import own_environment
@@ -78,7 +79,9 @@ def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: s
     for words in ((), ("--rerun",), ("--over-dds", "--node", "controller")):
         replayed = processes.run("hsv", "replay", bag.folder, "--trust", *words)
         assert replayed.returncode == 0 and "identical in every byte" in replayed.stdout, replayed.stdout
-    reported = processes.run("hsv", "report", bag.folder, "--out", processes.folder / "page.html")
+    # Beside the Tube-MPC controller on one page.
+    tube = flown_bag(processes.folder / "tube", duration=11.0, fault=5.0)
+    reported = processes.run("hsv", "report", bag.folder, tube, "--out", processes.folder / "page.html")
     assert reported.returncode == 0, reported.stdout
 
 

@@ -10,6 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run, VehicleState
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 
+from hsv.control.controllers import class_place
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
@@ -39,6 +40,7 @@ class LockstepNode(ProcessNode):
 
     Raises:
         RunError: Another node of this machine publishes its topics in the same domain and namespace.
+        ParameterError: A wrong parameter, named; such as a ``controller`` that nobody knows.
     """
 
     def __init__(self, role: NodeDescription, task: str = "") -> None:
@@ -58,6 +60,8 @@ class LockstepNode(ProcessNode):
             refuse_unknown(self, role.name, self.of_others)
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
+        if not description.controller_node(self.controller).foreign:
+            class_place(self.controller)
         self._inputs: dict[str, Any] = {}
         self._outputs: dict[str, Any] = {}
         self._diagnostics = self.create_publisher(DiagnosticArray, description.DIAGNOSTICS, STEP)
