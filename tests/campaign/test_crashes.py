@@ -41,7 +41,7 @@ def fly(tmp_path_factory):
         campaign = plan(str(folder / f"{name}.toml"), samples=samples, scale=0.0, initial_altitude=altitudes)
         out = folder / f"{name}.parquet"
         conduct(campaign, Store(out, campaign), OwnProcess())
-        return Results(out)
+        return Results(out, trust=True)
 
     return fly
 

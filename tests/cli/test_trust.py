@@ -2,17 +2,14 @@
 
 import json
 import sys
-from pathlib import Path
 
 import pytest
 import yaml
 from changed_bags import changed_bag
 from pyarrow import parquet
+from recorded_flight import record_flight
 
 from hsv.campaign.table import CAMPAIGN
-from hsv.recording.reader import Bag
-
-REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"
 
 MODULE = """
 from pathlib import Path
@@ -101,19 +98,44 @@ def test_no_path_of_a_campaign_leads_out_of_the_folder(hsv, tmp_path, path):
     assert refused.error.startswith(f"own.parquet: design = {path!r}: a path out of the folder")
 
 
-def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, tmp_path):
-    attached = Bag(REFERENCE)
-    parameters = yaml.safe_load(attached.text("scenario.yaml"))
-    parameters["/**"]["ros__parameters"]["controller"] = "marked:Own"
-    scenario = 'controller = "marked:Own"\n' + attached.text("scenario.toml")
-    files = {"scenario.yaml": yaml.safe_dump(parameters).encode(), "scenario.toml": scenario.encode()}
-    crafted = str(changed_bag(REFERENCE, tmp_path / "crafted", attachments=files))
-    assert hsv("info", crafted).code == 0
-    assert hsv("report", crafted, "--out", "report.html").code == 0
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    return record_flight(tmp_path_factory.mktemp("flown") / "bag", duration=12.0, fault=11.0)
+
+
+@pytest.fixture
+def crafted(flown, tmp_path):
+    """Return a copy of a bag whose attachments name a controller by its code, for one section of the nodes."""
+
+    def make(section):
+        parameters = yaml.safe_load(flown.text("scenario.yaml"))
+        own = parameters.setdefault(section, {"ros__parameters": {}})
+        own["ros__parameters"]["controller"] = "marked:Own"
+        scenario = 'controller = "marked:Own"\n' + flown.text("scenario.toml")
+        files = {"scenario.yaml": yaml.safe_dump(parameters).encode(), "scenario.toml": scenario.encode()}
+        return str(changed_bag(flown.path, tmp_path / "crafted", attachments=files))
+
+    return make
+
+
+def test_no_reader_of_bags_loads_what_a_bag_names(hsv, loaded, crafted, tmp_path):
+    bag = crafted("/**")
+    assert hsv("info", bag, "--json").code == 0
+    assert hsv("report", bag, "--out", "report.html").code == 0
     assert "marked:Own" in (tmp_path / "report.html").read_text()
-    assert hsv("conclude", crafted, "--no-report").code == 0
-    for words in ((), ("--rerun",), ("--over-dds",), ("--over-dds", "--rerun")):
-        refused = hsv("replay", crafted, *words)
+    assert hsv("conclude", bag, "--no-report").code == 0
+    for words in ((), ("--rerun",), ("--node", "controller"), ("--over-dds",), ("--over-dds", "--rerun")):
+        refused = hsv("replay", bag, *words)
         assert refused.code == 2
-        assert "controller = 'marked:Own': expected one of tube_mpc, robust_mpc" in refused.error
+        assert refused.error == f"{bag}: controller = 'marked:Own': code that this file names, run only with --trust"
+    assert hsv("replay", bag, "--node", "notch_filter").code == 0
+    assert not loaded()
+    assert hsv("replay", bag, "--node", "controller", "--trust").code == 1  # it does not answer as the tube law did
+    assert loaded()
+
+
+def test_a_section_of_one_node_brings_no_code(hsv, loaded, crafted):
+    bag = crafted("/tube_mpc")
+    for words in ((), ("--rerun",), ("--node", "tube_mpc"), ("--trust",)):
+        assert hsv("replay", bag, *words).code == 0
     assert not loaded()

@@ -14,7 +14,7 @@ from typing import Any, Self
 import tomli_w
 
 from hsv.campaign.factors import Factor, check_factors, factors_of, flown_scenario, flown_table
-from hsv.control.library import library_digest
+from hsv.control.library import library_digest, seen_from
 from hsv.errors import CampaignError
 from hsv.simulation.assembly import assemble, blamed_on, design_parameters, scenario_parameters
 from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_text
@@ -66,14 +66,15 @@ class Campaign:
         return flown_scenario(self.table, self.scenario_name, self.factors, sample)
 
     def file(self, sample: Sequence[float], design: str | None = None) -> str:
-        """Return the scenario of the flight with a sample as a file that every command takes, with errors as above.
+        """Return the scenario of the flight with a sample as a file for this folder, with errors as above.
 
         Args:
             sample: One value a factor.
             design: Name or path to put in the place of the design's.
         """
         flown = flown_table(self.table, self.scenario_name, self.factors, sample)
-        return tomli_w.dumps(flown if design is None else {**flown, "design": design})
+        named = {"controller": seen_from(self.scenario.controller, Path())} if "controller" in flown else {}
+        return tomli_w.dumps({**flown, **named, **({} if design is None else {"design": design})})
 
     @property
     def parameters(self) -> dict[str, Any]:

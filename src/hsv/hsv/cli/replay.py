@@ -51,6 +51,8 @@ def replay(
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)
     controller = controller_of(values)
+    # Of all nodes: a section of one node in the bag's parameters brings no other, unseen.
+    values = values.updated({"controller": controller})
     processes = processes_of(controller)
     if node and node not in processes:
         raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}")

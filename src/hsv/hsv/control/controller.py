@@ -201,8 +201,8 @@ class ForeignController(Controller):
     def copied(self) -> ForeignController:
         """Return a controller of its own that goes on from the state of this one; of a compiled one, all is in it."""
         if self.kernel is None:
-            return ForeignController(self.name, copy.deepcopy(self._controller))
-        made = ForeignController(self.name, self._controller)
+            return copy.deepcopy(self)
+        made = copy.copy(self)
         made._state = self._state.copy()
         return made
 

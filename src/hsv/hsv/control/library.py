@@ -54,6 +54,14 @@ def inside(controller: str, folder: Path) -> str:
     return f"{found}:{symbol}"
 
 
+def seen_from(controller: str, folder: Path) -> str:
+    """Return the ``controller`` as a scenario in ``folder`` names it; a library elsewhere keeps its absolute path."""
+    place = library_place(controller)
+    if place is None or not place[0].is_relative_to(folder.resolve()):
+        return controller
+    return f"./{place[0].relative_to(folder.resolve())}:{place[1]}"
+
+
 @dataclass(frozen=True)
 class LibraryRecord:
     """What a recorded flight keeps of the library that it was flown with."""
@@ -178,12 +186,6 @@ class LibraryController(ForeignController):
     def reset(self) -> None:
         """Start a new run."""
         self._state = np.zeros_like(self._state)
-
-    def copied(self) -> LibraryController:
-        """Return a controller of its own that goes on from the state of this one."""
-        made = LibraryController(self.name, self.path, self.symbol, len(self._state), self.parameters)
-        made._state = self._state.copy()
-        return made
 
     def _answer(self, inputs: ControllerInput) -> Any:
         call = self.symbol, inputs.step, flat_input(inputs), self._state, self.parameters
