@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -73,12 +72,8 @@ def over_dds(
     from hsv.recording.reader import Bag
 
     row, pilot = results.row(flight), results.pilot
-    scenario = pilot.scenario
     require_design(results)
-    with TemporaryDirectory(prefix="hsv_campaign_") as folder:
-        path = Path(folder, f"{scenario.name}_flight_{flight}.toml")
-        path.write_text(results.file(flight), encoding="utf-8")
-        prepared = prepare(str(path), bag=bag)
+    prepared = prepare(f"{results.campaign.scenario_name}_flight_{flight}", text=results.file(flight), bag=bag)
     fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)
     data = flight_data(recorded)

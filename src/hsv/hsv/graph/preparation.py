@@ -46,6 +46,7 @@ class PreparedRun:
 def prepare(
     scenario_name: str,
     *,
+    text: str = "",
     bags: Path = Path("bags"),
     bag: Path | None = None,
     real_time_factor: float = 0.0,
@@ -60,6 +61,7 @@ def prepare(
 
     Args:
         scenario_name: Name or path of the scenario.
+        text: The scenario, as :func:`hsv.simulation.scenario.scenario_text` returns it; empty: that of this name.
         bags: Where the bag is made if ``bag`` is not given, named by scenario and time.
         bag: Bag to record to, a new directory.
         real_time_factor: Simulated over wall time; 0: as fast as possible.
@@ -78,7 +80,7 @@ def prepare(
         raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
     if step_timeout is not None and not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
-    text = scenario_text(scenario_name)
+    text = text or scenario_text(scenario_name)
     scenario = parse_scenario(text, Path(scenario_name).stem)
     if external:
         scenario = scenario.model_copy(update={"controller": NODE, "own": {}})

@@ -126,20 +126,23 @@ class LoopArrays(NamedTuple):
     memory: np.ndarray
 
 
-_NAMES = (*(signal.name for signal in CONTROLLER_INPUTS), "filter_state")
 _ENDS = tuple(accumulate(signal.size for signal in CONTROLLER_INPUTS))
-_CUTS = [slice(start, end) for start, end in zip((0, *_ENDS), (*_ENDS, None), strict=True)]
+_CUTS = {
+    name: slice(start, end)
+    for name, start, end in zip(
+        (*(signal.name for signal in CONTROLLER_INPUTS), "filter_state"), (0, *_ENDS), (*_ENDS, None), strict=True
+    )
+}
+"""Where what a compiled controller is given lies in its one array."""
+_FIELDS = [_CUTS[name] for name in ControllerInput._fields[1:]]
+_FILTERED = ControllerInput._fields[1:].index("filtered_pitch_rate")
 _ONE_AT_A_TIME = threading.Lock()
-
-
-def _cut(given: np.ndarray) -> dict[str, np.ndarray]:
-    """Return by name what is in the one array that a compiled controller is given."""
-    return {name: given[cut] for name, cut in zip(_NAMES, _CUTS, strict=True)}
 
 
 def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, LoopArrays]:
     given = np.zeros(_ENDS[-1] + filter_states)
-    return given, LoopArrays(**_cut(given), wanted=np.zeros(N_INPUTS), gain_index=np.zeros(1), memory=memory)
+    views = {name: given[cut] for name, cut in _CUTS.items()}
+    return given, LoopArrays(**views, wanted=np.zeros(N_INPUTS), gain_index=np.zeros(1), memory=memory)
 
 
 @njit(cache=True, nogil=True)
@@ -393,9 +396,10 @@ def _solving(law: NominalLaw, arrays: LoopArrays) -> Callback:
 def _controlling(controller: ForeignController, given: np.ndarray, arrays: LoopArrays) -> Callback:
     def control(step: int) -> None:
         # A copy: a controller may keep what it was given.
-        now: dict[str, Any] = _cut(given.copy())
-        now["filtered_pitch_rate"] = now["filtered_pitch_rate"].item()
-        arrays.wanted[0], arrays.wanted[1] = controller.wanted(ControllerInput(step, **now))
+        now = given.copy()
+        fields: list[Any] = [now[cut] for cut in _FIELDS]
+        fields[_FILTERED] = float(fields[_FILTERED][0])
+        arrays.wanted[0], arrays.wanted[1] = controller.wanted(ControllerInput(step, *fields))
 
     return Callback(control)
 
