@@ -19,7 +19,7 @@ from hsv.parameters import Parameter
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.library_child import LoadedLibrary
-from hsv.simulation.repeatability import from_copied_state
+from hsv.simulation.repeatability import findings, from_copied_state
 from hsv.simulation.scenario import load_scenario, scenario_text
 
 SCENARIO = """
@@ -120,6 +120,14 @@ def test_flights_in_threads_share_no_state(flight):
     for thread in threads:
         thread.join()
     assert found == [alone] * 3
+
+
+def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
+    path = tmp_path / "static.toml"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    build_probe(tmp_path, "-DSTATIC")
+    found = next(findings(load_scenario(str(path))))
+    assert found.check == "flown twice" and found.difference.startswith("u_unsaturated from step 0 on")
 
 
 @pytest.mark.parametrize(

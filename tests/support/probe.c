@@ -57,6 +57,11 @@ static int32_t step(int64_t k, const double *in, double *out, double *state, con
         return 0;
     out[HSV_FUEL_EQUIVALENCE_RATIO] = in[HSV_REFERENCE_INPUT + HSV_FUEL_EQUIVALENCE_RATIO];
     out[HSV_ELEVATOR_DEFLECTION] = in[HSV_REFERENCE_INPUT + HSV_ELEVATOR_DEFLECTION] + par[0] * state[0];
+#ifdef STATIC
+    static double kept;
+    out[HSV_ELEVATOR_DEFLECTION] += kept;
+    kept = 1e-6;
+#endif
     state[0] += par[1] * (in[HSV_STATE + HSV_PITCH_ANGLE] - in[HSV_REFERENCE + HSV_PITCH_ANGLE] - par[2] * state[0]);
     return 0;
 }
