@@ -1,5 +1,6 @@
 """Controllers in C in the loop: the same bits as in Python, and what they do wrong ends their own process only."""
 
+import multiprocessing
 import re
 import shutil
 import subprocess
@@ -108,6 +109,18 @@ def test_c_and_python_answer_the_same_stepwise(flight):
 
 def test_a_copy_goes_on_from_the_state_of_the_first(flight):
     assert from_copied_state(flight(), fly(flight())) == ""
+
+
+def _fingerprint(parts):
+    return fly(parts).fingerprint
+
+
+def test_a_forked_process_has_a_child_of_its_own(flight):
+    parts = flight()
+    alone = fly(parts).fingerprint
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply(_fingerprint, (parts,)) == alone
+    assert fly(parts).fingerprint == alone
 
 
 def test_flights_in_threads_share_no_state(flight):

@@ -17,7 +17,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import cache
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
 from typing import Any, Protocol
@@ -37,8 +36,9 @@ _POLL = 0.5
 class SharedMemory:
     """Memory behind a file descriptor, which two processes have."""
 
-    def __init__(self, descriptor: int) -> None:
-        self.descriptor = descriptor
+    def __init__(self, descriptor: int | None = None) -> None:
+        """Take the memory behind a ``descriptor``, new memory where none is given."""
+        self.descriptor = os.memfd_create("hsv_library") if descriptor is None else descriptor
         self._mapped = np.empty(0)
 
     def numbers(self, count: int) -> np.ndarray:
@@ -61,8 +61,7 @@ class LibraryProcess:
         self._connection: Connection[Any, Any]
         self._file: tuple[int, ...] = ()
         self._blocks: dict[str, Block] = {}
-        self._memory = SharedMemory(os.memfd_create("hsv_library"))
-        atexit.register(self.end)
+        self._memory = SharedMemory()
 
     def describe(self, symbol: str) -> Block:
         """Return the block under a symbol of the library.
@@ -189,9 +188,17 @@ class LibraryUser(Protocol):
         """As :meth:`LibraryProcess.sharing`."""
 
 
-_child_of = cache(LibraryProcess)
-# A forked process has the lock and the connection of its parent's child, but no child.
-os.register_at_fork(after_in_child=_child_of.cache_clear)
+_children: dict[Path, LibraryProcess] = {}
+
+
+@atexit.register
+def _end_children() -> None:
+    for child in _children.values():
+        child.end()
+
+
+# A forked process has the connections to its parent's children, but no children.
+os.register_at_fork(after_in_child=_children.clear)
 
 _in_this_process: Callable[[Path], LibraryUser] | None = None
 
@@ -204,4 +211,6 @@ def use_in_this_process(user: Callable[[Path], LibraryUser]) -> None:
 
 def library_user(path: Path) -> LibraryUser:
     """Return what uses the library at a path: this process's child, or this process where it is the child."""
-    return (_in_this_process or _child_of)(path)
+    if _in_this_process:
+        return _in_this_process(path)
+    return _children.get(path) or _children.setdefault(path, LibraryProcess(path))

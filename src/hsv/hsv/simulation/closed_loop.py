@@ -317,7 +317,8 @@ def watched(controller: LibraryController, rows: int) -> Iterator[tuple[History,
 
     Flights are given up when they stand still; an error says in which step.
     """
-    with controller.library.sharing(rows * History.numbers()) as memory:
+    library = controller.library
+    with library.sharing(rows * History.numbers()) as memory:
         history = History.over(memory, rows)
 
         def begun() -> int:
@@ -326,7 +327,7 @@ def watched(controller: LibraryController, rows: int) -> Iterator[tuple[History,
 
         history.filtered_pitch_rate[:] = np.nan
         try:
-            yield history, partial(controller.library.request, begun=begun)
+            yield history, partial(library.request, begun=begun)
         except ProcessError as error:
             where = f", step {begun() - 1}" if begun() else ""
             raise ControllerError(f"{controller.name}{where}: {error}") from error
