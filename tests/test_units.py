@@ -9,7 +9,7 @@ from hsv.errors import QuantityError
 from hsv.simulation.metrics import METRICS
 from hsv.units import PAPER_UNITS, factor, parse_quantity, rounded, to_paper
 from hsv.vehicle.dynamics import INPUT_UNITS, STATE_UNITS
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
+from hsv.vehicle.vehicle import load_vehicle
 
 
 @pytest.mark.parametrize(
@@ -76,9 +76,9 @@ def test_what_is_not_such_a_quantity_is_refused_by_name(text, unit, problem):
 
 def test_bounds_of_the_envelope_are_exact():
     bounds = (parse_quantity("85000 ft", "m", "h"), parse_quantity("86500 ft", "m", "h"))
-    assert bounds == ALTITUDE_RANGE
+    assert bounds == load_vehicle().altitude_range
     bounds = (parse_quantity("7700 ft/s", "m/s", "V"), parse_quantity("8300 ft/s", "m/s", "V"))
-    assert bounds == VELOCITY_RANGE
+    assert bounds == load_vehicle().velocity_range
 
 
 @settings(max_examples=100)

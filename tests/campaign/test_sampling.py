@@ -8,14 +8,14 @@ from scipy.stats import qmc
 from hsv.campaign.campaign import METHODS, plan
 from hsv.campaign.sampling import Sampler
 from hsv.errors import CampaignError
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.vehicle import load_vehicle
 
 
 def draw(campaign):
     return Sampler(campaign).draw(range(campaign.samples))
 
 
-BOUNDS = np.array(list(uncertainty_bounds().values()))
+BOUNDS = np.array(list(load_vehicle().uncertainty.values()))
 
 
 def test_uniform_samples_lie_within_the_bounds_and_fill_them(planned):

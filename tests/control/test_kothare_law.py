@@ -10,12 +10,12 @@ from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.design.nominal import nominal_gain
 from hsv.design.nominal_problem import NominalProblem
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 DESIGN = read_design(find_design("baseline"))
 DATA = nominal_data(DESIGN)
-START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
+START, REFERENCE = trim(load_vehicle().coupled(), 26060.4, 2407.92), trim(load_vehicle().coupled(), 26243.28, 2484.12)
 TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period)
 STEP = START.state - REFERENCE.state
 

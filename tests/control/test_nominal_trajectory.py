@@ -7,12 +7,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
 from hsv.errors import ParameterError
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 VALUES = read_parameters(find_design("baseline"))
 DESIGN = read_design(find_design("baseline"))
-START = trim(vehicle_parameters(), 26060.4, 2407.92)
+START = trim(load_vehicle().coupled(), 26060.4, 2407.92)
 TARGET = {"reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
 
 
@@ -28,7 +28,7 @@ def smallest(deviation):
 
 def test_reference_is_the_trim_of_the_command():
     result = nominal().step(START.state)
-    expected = trim(vehicle_parameters(), 26243.28, 2484.12)
+    expected = trim(load_vehicle().coupled(), 26243.28, 2484.12)
     assert_allclose(result.reference, expected.state, rtol=1e-12)
     assert_allclose(result.reference_input, expected.input, rtol=1e-12)
 

@@ -14,13 +14,13 @@ from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.qp_law import BLOCKS, NEAR_BLOCKS, QpLaw
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import DesignError, ParameterError
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 PATH = find_design("baseline")
 VALUES, DESIGN = read_parameters(PATH), read_design(PATH)
 DATA = nominal_data(DESIGN)
-START, REFERENCE = trim(vehicle_parameters(), 26060.4, 2407.92), trim(vehicle_parameters(), 26243.28, 2484.12)
+START, REFERENCE = trim(load_vehicle().coupled(), 26060.4, 2407.92), trim(load_vehicle().coupled(), 26243.28, 2484.12)
 TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period)
 STEP = START.state - REFERENCE.state
 BOUNDS = DESIGN.plan_bounds

@@ -8,10 +8,10 @@ from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import ParameterError, TrimError
 from hsv.vehicle.dynamics import derivative
 from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
-VEHICLE, PERIOD = vehicle_parameters("decoupled"), 0.02
+VEHICLE, PERIOD = load_vehicle().decoupled, 0.02
 LOW, HIGH = (26060.4, 2407.92), (26243.28, 2484.12)
 RAMP = ((20.0, 80.0), (LOW[0], HIGH[0]), (LOW[1], HIGH[1]), PERIOD)
 

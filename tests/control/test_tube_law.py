@@ -10,7 +10,9 @@ from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.errors import ParameterError
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 DESIGN = read_design(find_design("baseline"))
 REFERENCE = np.array([26243.28, 2484.12, 0.028, 0.028, 0.0, 0.98, 0.0, 0.8, 0.0])
@@ -46,7 +48,10 @@ def test_law_is_equation_36(tau):
         feedback = tau * DESIGN.feedback_gain @ (measured - REFERENCE - deviation)
         assert_allclose(result.u_feedback, feedback, rtol=1e-9, atol=1e-12)
         assert_allclose(result.u_unsaturated, feedback + u_n + REFERENCE_INPUT, rtol=1e-9)
-        assert_array_equal(result.input, np.clip(result.u_unsaturated, INPUT_MINIMUM, INPUT_MAXIMUM))
+        assert_array_equal(
+            result.input,
+            np.clip(result.u_unsaturated, LIMITS.input_minimum, LIMITS.input_maximum),
+        )
         assert result.tau.tolist() == [tau]
 
 
@@ -72,7 +77,7 @@ def test_absurd_states_stay_within_the_limits_and_are_told(component, value):
     state[component] = value
     result = step(TubeLaw(DESIGN), state, rate=state[4])
     finite = np.isfinite(result.u_unsaturated)
-    assert np.all((result.input >= INPUT_MINIMUM) & (result.input <= INPUT_MAXIMUM))
+    assert np.all((result.input >= LIMITS.input_minimum) & (result.input <= LIMITS.input_maximum))
     assert_array_equal(result.saturated, result.input != result.u_unsaturated)
     if component < 4 and math.isfinite(value):
         assert np.any(result.saturated)
@@ -92,7 +97,7 @@ def test_a_state_that_is_no_number_is_told(component):
 
 def test_absurd_nominal_inputs_are_limited():
     result = step(TubeLaw(DESIGN), nominal_input=np.array([1e9, -1e9]))
-    assert_array_equal(result.input, [INPUT_MAXIMUM[0], INPUT_MINIMUM[1]])
+    assert_array_equal(result.input, [LIMITS.input_maximum[0], LIMITS.input_minimum[1]])
     assert_array_equal(result.saturated, [True, True])
 
 

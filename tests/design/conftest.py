@@ -7,7 +7,7 @@ from hsv.design.inputs import read_inputs
 from hsv.design.model import polytopic_model
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
@@ -19,7 +19,7 @@ def inputs():
 
 @pytest.fixture(scope="session")
 def model(inputs):
-    return polytopic_model(inputs.model, vehicle_parameters("decoupled"))
+    return polytopic_model(inputs.model, load_vehicle())
 
 
 @pytest.fixture(scope="session")

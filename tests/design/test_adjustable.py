@@ -24,7 +24,7 @@ from hsv.design.verification.factor import factor_claims
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject, verify
 from hsv.errors import DesignError
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
@@ -50,7 +50,7 @@ def test_every_claim_holds(subject):
 def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
     assert incomplete_share(subject.inputs) == 0.8
     assert_allclose(region_parameters(subject.inputs, 0.8)["fault.values"], [0.92])
-    bounds = uncertainty_bounds()
+    bounds = load_vehicle().uncertainty
     assert_allclose([abs(change) for change in corners(0.8)[1].values()], [0.8 * b for b in bounds.values()])
     assert incomplete_share(with_tau(subject.inputs, [0.8, 0.7, 1.0, 1.0, 0.9])) == 1.0
 

@@ -10,7 +10,6 @@ from hsv.design.baseline import initial_deviation, nominal_problem
 from hsv.design.centring import GAP, Unknown, minimise
 from hsv.design.nominal import nominal_gain
 from hsv.errors import DesignError
-from hsv.vehicle.parameters import vehicle_parameters
 
 
 def test_the_cost_is_above_its_optimum_by_the_gap():
@@ -44,7 +43,7 @@ def test_what_has_no_solution_is_refused_by_name():
 def test_nominal_gain_hardly_moves_with_the_rounding_of_vertices(inputs, model):
     # The optimum itself is so flat that entries of the gain moved by 88 % between two processors.
     problem = nominal_problem(inputs, model.polytope, inputs.nominal.input_bound.array())
-    state = 0.2 * initial_deviation(inputs, vehicle_parameters("decoupled"))
+    state = 0.2 * initial_deviation(inputs)
     noise = np.random.default_rng(1).uniform(-1e-10, 1e-10, problem.A.shape)
     scale = problem.state_scale
     moved = dataclasses.replace(problem, A=problem.A + noise * scale[:, None] / scale)

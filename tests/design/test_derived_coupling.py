@@ -6,7 +6,7 @@ import pytest
 from hsv.control.design_file import find_design, read_design
 from hsv.design.region import corners
 from hsv.study.linear_loop import sampled_loop
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 WORST = 764
 """Index of the corner with the least moment of inertia, the largest mass and the strongest elevator."""
@@ -15,13 +15,13 @@ WORST = 764
 def elastic_damping(name, corner, coupling="derived", effectiveness=1.0):
     """Return the largest real part (1/s) of the elastic modes of the sampled loop where Case 1 ends."""
     design = read_design(find_design(name))
-    vehicle = vehicle_parameters(coupling).perturbed(corner)
+    vehicle = load_vehicle().coupled(coupling).perturbed(corner)
     loop = sampled_loop(vehicle, design.feedback_gain, design.notch, design.period, effectiveness=effectiveness)
     return loop.poles[np.abs(loop.poles.imag) > 8.0].real.max()
 
 
 def test_the_baseline_s_notch_leaves_a_corner_of_the_derived_coupling_without_damping():
-    corner = corners()[WORST]
+    corner = corners(load_vehicle().uncertainty)[WORST]
     signs = {name: np.sign(change) for name, change in corner.items()}
     assert (signs["moment_of_inertia"], signs["mass"], signs["moment_elevator"]) == (-1.0, 1.0, 1.0)
     assert elastic_damping("baseline", corner) == pytest.approx(0.034, abs=2e-3)
@@ -31,7 +31,9 @@ def test_the_baseline_s_notch_leaves_a_corner_of_the_derived_coupling_without_da
 
 
 def test_the_derived_design_damps_that_corner_and_others():
-    worst = max(elastic_damping("baseline_derived", corner) for corner in corners()[WORST::-61])
+    worst = max(
+        elastic_damping("baseline_derived", corner) for corner in corners(load_vehicle().uncertainty)[WORST::-61]
+    )
     assert worst < -0.17
     assert elastic_damping("baseline_derived", {}) == pytest.approx(-0.186, abs=2e-3)
 

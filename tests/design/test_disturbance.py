@@ -8,14 +8,14 @@ from hsv.design.disturbance import DisturbanceSet, inflated
 from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, corners, fraction, record
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.vehicle import load_vehicle
 
 
 @pytest.fixture(scope="module")
 def flight(subject):
     inputs = subject.inputs
     short = inputs.disturbance.model_copy(update={"duration": 104.0})
-    worst = dict(uncertainty_bounds())
+    worst = dict(load_vehicle().uncertainty)
     return Region(subject.design, inputs.model_copy(update={"disturbance": short}), 1.0).fly(worst)
 
 
@@ -56,10 +56,10 @@ def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
 
 
 def test_fraction_is_balanced(found):
-    rows = fraction()
+    rows = fraction(load_vehicle().uncertainty)
     assert len(rows) == 257
     assert rows[0] == {}
-    assert len(corners()) == 1025
+    assert len(corners(load_vehicle().uncertainty)) == 1025
     signs = np.array([[np.sign(v) for v in row.values()] for row in rows[1:]])
     assert_allclose(signs.T @ signs, 256 * np.eye(10))
 

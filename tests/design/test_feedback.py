@@ -6,7 +6,6 @@ from hsv.design.baseline import disturbance_columns
 from hsv.design.feedback import feedback_gain
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.errors import DesignError
-from hsv.vehicle.parameters import vehicle_parameters
 
 FOOT = 0.3048
 
@@ -52,7 +51,7 @@ def test_residual_refuses_an_unstable_vertex(design, result):
 
 def test_pure_feasibility_gives_a_certified_but_unusable_gain(design, inputs):
     A, B = rigid(design)
-    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    columns = disturbance_columns(inputs)
     scales = inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array()
     literal = feedback_gain(A, B, columns, *scales, method="feasibility")
     assert literal.residuals.min() > 0.0
@@ -62,7 +61,7 @@ def test_pure_feasibility_gives_a_certified_but_unusable_gain(design, inputs):
 
 def test_the_same_input_gives_the_same_bits(design, inputs):
     A, B = rigid(design)
-    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    columns = disturbance_columns(inputs)
     again = feedback_gain(A, B, columns, inputs.feedback.state_scale.array(), inputs.feedback.input_scale.array())
     assert np.array_equal(again.F, design.feedback_gain[:, :5])
 

@@ -9,14 +9,14 @@ from hsv.design.model import design_model, polytopic_model
 from hsv.errors import DesignError
 from hsv.lpv.hull import smallest_weight
 from hsv.vehicle.extended import Filter, from_true_rate
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 
 
 @pytest.fixture(scope="module")
 def model(inputs):
-    return design_model(inputs.model, vehicle_parameters("decoupled"))
+    return design_model(inputs.model, load_vehicle())
 
 
 def with_representation(inputs, **changes):
@@ -50,14 +50,14 @@ def test_vertices_have_the_unstable_pole_of_the_vehicle(model):
 
 def test_a_coarser_tolerance_keeps_six_vertices(inputs):
     coarse = inputs.model.tensor_product.model_copy(update={"tolerance": 1e-5})
-    model = design_model(with_representation(inputs, tensor_product=coarse), vehicle_parameters("decoupled"))
+    model = design_model(with_representation(inputs, tensor_product=coarse), load_vehicle())
     assert model.report["vertices"] == [2, 3]
     assert model.report["accuracy"]["relative_frobenius_error"] < 5e-5
     assert model.report["accuracy"]["bode_magnitude_error_db"] < 0.3
 
 
 def test_grid_is_the_simple_and_less_accurate_alternative(inputs):
-    model = design_model(with_representation(inputs, representation="grid"), vehicle_parameters("decoupled"))
+    model = design_model(with_representation(inputs, representation="grid"), load_vehicle())
     assert model.interpolation == "linear"
     assert model.report["vertices"] == [4, 5]
     assert 1e-6 < model.report["accuracy"]["relative_frobenius_error"] < 1e-4
@@ -70,7 +70,7 @@ def codesign():
 
 def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
     notch = sections(codesign)
-    model = design_model(codesign.model, vehicle_parameters("decoupled"), notch)
+    model = design_model(codesign.model, load_vehicle(), notch)
     accuracy = model.report["accuracy"]
     assert model.report["vertices"] == [2, 3]
     assert accuracy["relative_frobenius_error"] < 5e-5
@@ -83,13 +83,13 @@ def test_codesigned_model_keeps_six_vertices_and_agrees_with_the_ecm(codesign):
 def test_singular_functions_alone_miss_the_phase_at_an_antiresonance(codesign):
     options = codesign.model.tensor_product.model_copy(update={"functions": "singular"})
     inputs = codesign.model.model_copy(update={"tensor_product": options})
-    accuracy = design_model(inputs, vehicle_parameters("decoupled"), sections(codesign)).report["accuracy"]
+    accuracy = design_model(inputs, load_vehicle(), sections(codesign)).report["accuracy"]
     assert accuracy["bode_phase_error_deg"] > 1.5
 
 
 def test_codesigned_model_at_a_point_is_vehicle_and_filter_in_series(codesign):
     notch = sections(codesign)
-    model = polytopic_model(codesign.model, vehicle_parameters("decoupled"), notch)
+    model = polytopic_model(codesign.model, load_vehicle(), notch)
     T = from_true_rate(Filter(*series(continuous(notch))))
     A, _ = model.whole.at(26100.0, 2450.0)
     joined = np.linalg.solve(T, A @ T)
@@ -101,7 +101,7 @@ def test_scales_of_the_filter_are_asked_for(codesign):
     options = codesign.model.tensor_product.model_copy(update={"filter_scale": None})
     inputs = codesign.model.model_copy(update={"tensor_product": options})
     with pytest.raises(DesignError, match="filter_scale: missing"):
-        polytopic_model(inputs, vehicle_parameters("decoupled"), sections(codesign))
+        polytopic_model(inputs, load_vehicle(), sections(codesign))
 
 
 def sections(inputs):

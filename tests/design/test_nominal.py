@@ -8,8 +8,8 @@ from hsv.design.baseline import initial_deviation
 from hsv.design.nominal import nested_gains
 from hsv.design.nominal_problem import NominalProblem, certified_cost
 from hsv.errors import DesignError
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 
 @pytest.fixture(scope="module")
@@ -22,13 +22,13 @@ def problem(design, inputs):
 
 @pytest.fixture(scope="module")
 def state(inputs):
-    return initial_deviation(inputs, vehicle_parameters("decoupled"))
+    return initial_deviation(inputs)
 
 
 def simulate(design, problem, inputs, state, gains):
     """Fly x_n over 200 s, scheduled by the nominal point itself; return states (10001, 5), inputs and the cost (s)."""
     target = inputs.nominal.target
-    reference = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).state[:5]
+    reference = trim(load_vehicle().decoupled, target.altitude, target.velocity).state[:5]
     x, states, applied, cost = state.copy(), [state], [], 0.0
     for _ in range(10_000):
         inside = [i for i in range(gains) if x @ design.nominal_ellipsoids[i] @ x <= 1.0]

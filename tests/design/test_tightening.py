@@ -7,12 +7,14 @@ from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import _literal
 from hsv.design.tightening import check_plan, tighten
 from hsv.errors import DesignError
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 
 @pytest.fixture(scope="module")
 def bounds(found):
-    return tighten(found, INPUT_MINIMUM, INPUT_MAXIMUM)
+    return tighten(found, LIMITS.input_minimum, LIMITS.input_maximum)
 
 
 def test_extremes_of_the_tube_just_reach_the_limits(found, bounds):
@@ -22,8 +24,8 @@ def test_extremes_of_the_tube_just_reach_the_limits(found, bounds):
         direct = np.sort([system.F_d[i] * w.lower, system.F_d[i] * w.upper], axis=0).sum(axis=1)
         most = system.F[i] @ (found.centre + direction) + direct[1]
         least = system.F[i] @ (found.centre - direction) + direct[0]
-        assert bounds.upper[i] + most == pytest.approx(INPUT_MAXIMUM[i])
-        assert bounds.lower[i] + least == pytest.approx(INPUT_MINIMUM[i])
+        assert bounds.upper[i] + most == pytest.approx(LIMITS.input_maximum[i])
+        assert bounds.lower[i] + least == pytest.approx(LIMITS.input_minimum[i])
 
 
 def test_a_plan_that_does_not_fit_is_refused_with_the_amount(bounds):
@@ -34,7 +36,11 @@ def test_a_plan_that_does_not_fit_is_refused_with_the_amount(bounds):
 
 def test_a_tube_too_wide_for_the_inputs_is_refused(found):
     with pytest.raises(DesignError, match="more of fuel_equivalence_ratio than there is"):
-        tighten(dataclasses.replace(found, feedback=np.array([1.0, 0.1])), INPUT_MINIMUM, INPUT_MAXIMUM)
+        tighten(
+            dataclasses.replace(found, feedback=np.array([1.0, 0.1])),
+            LIMITS.input_minimum,
+            LIMITS.input_maximum,
+        )
 
 
 def test_the_literal_chain_leaves_less_than_the_design_uses(bounds, inputs):

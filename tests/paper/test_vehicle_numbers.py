@@ -8,10 +8,11 @@ import pytest
 
 from hsv.units import factor
 from hsv.vehicle.dynamics import jacobian
-from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
 from hsv.vehicle.modes import modes
-from hsv.vehicle.parameters import uncertainty_bounds, vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 FOOT = 0.3048
 ELASTIC = factor("kg^0.5 m", "slug^0.5 ft")
@@ -29,7 +30,7 @@ def lightly_damped(vehicle):
 
 
 def test_trim_of_the_curve_fit():
-    point = trim(vehicle_parameters(), ALTITUDE, VELOCITY)
+    point = trim(load_vehicle().coupled(), ALTITUDE, VELOCITY)
     assert round(math.degrees(point.state[2]), 4) == 1.6446
     assert round(point.input[0], 5) == 0.26809
     assert round(math.degrees(point.input[1]), 3) == 12.540
@@ -39,13 +40,13 @@ def test_trim_of_the_curve_fit():
 
 def test_elastic_trim_is_within_half_a_percent_of_the_full_model():
     # Parker et al.: eta 0.9700 and 0.7967 at this point, full model with canard.
-    point = trim(vehicle_parameters(), ALTITUDE, VELOCITY)
+    point = trim(load_vehicle().coupled(), ALTITUDE, VELOCITY)
     assert point.state[5] * ELASTIC == pytest.approx(0.9700, rel=5e-3)
     assert point.state[7] * ELASTIC == pytest.approx(0.7967, rel=5e-3)
 
 
 def test_trim_does_not_depend_on_inertial_coupling():
-    derived, decoupled = (trim(vehicle_parameters(name), ALTITUDE, VELOCITY) for name in ("derived", "decoupled"))
+    derived, decoupled = (trim(load_vehicle().coupled(name), ALTITUDE, VELOCITY) for name in ("derived", 0.0))
     np.testing.assert_array_equal(derived.state, decoupled.state)
     np.testing.assert_array_equal(derived.input, decoupled.input)
 
@@ -60,23 +61,23 @@ def test_trim_does_not_depend_on_inertial_coupling():
     ],
 )
 def test_coupled_poles(kappa, expected):
-    found = lightly_damped(vehicle_parameters().with_coupling_scale(kappa))
+    found = lightly_damped(load_vehicle().coupled().with_coupling_scale(kappa))
     assert [(round(frequency, 2), round(damping, 4)) for frequency, damping in found] == expected
 
 
 def test_named_sets_have_the_poles_of_their_scale():
-    assert [round(f, 2) for f, _ in lightly_damped(vehicle_parameters("paper_like"))] == [15.89, 19.47]
-    assert [round(f, 2) for f, _ in lightly_damped(vehicle_parameters("derived"))] == [13.73, 18.80]
+    assert [round(f, 2) for f, _ in lightly_damped(load_vehicle().coupled("paper_like"))] == [15.89, 19.47]
+    assert [round(f, 2) for f, _ in lightly_damped(load_vehicle().coupled("derived"))] == [13.73, 18.80]
 
 
 def test_paper_like_frequencies_are_almost_the_structural_ones():
     # The paper, on its Figure 4: "almost consistent with the natural frequencies of structural flexibility".
-    for (frequency, _), structural in zip(lightly_damped(vehicle_parameters()), (16.02, 19.58), strict=True):
+    for (frequency, _), structural in zip(lightly_damped(load_vehicle().coupled()), (16.02, 19.58), strict=True):
         assert frequency == pytest.approx(structural, rel=0.01)
 
 
 def test_decoupled_model_keeps_structural_modes_exactly_and_rigid_poles_nearly():
-    vehicle = vehicle_parameters("decoupled")
+    vehicle = load_vehicle().decoupled
     assert [f for f, _ in lightly_damped(vehicle)] == pytest.approx([16.02, 19.58], rel=1e-12)
     point = trim(vehicle, ALTITUDE, VELOCITY)
     poles = np.linalg.eigvals(jacobian(point.state, point.input, vehicle)[0])
@@ -86,7 +87,7 @@ def test_decoupled_model_keeps_structural_modes_exactly_and_rigid_poles_nearly()
 
 def test_coupled_model_has_the_seven_motion_modes_of_figure_4():
     # Five of the rigid body and two aeroelastic: a real pair, the phugoid pair, one at the origin; two pairs.
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     point = trim(vehicle, ALTITUDE, VELOCITY)
     poles = np.linalg.eigvals(jacobian(point.state, point.input, vehicle)[0])
     assert np.sum(poles.real > 0.1) == 1
@@ -97,10 +98,10 @@ def test_coupled_model_has_the_seven_motion_modes_of_figure_4():
 
 def test_unstable_pole_over_the_envelope():
     # Control study, section 1: 1.65 to 1.80.
-    vehicle = vehicle_parameters("decoupled")
+    vehicle = load_vehicle().decoupled
     found = []
-    for altitude in np.linspace(*ALTITUDE_RANGE, 4):
-        for velocity in np.linspace(*VELOCITY_RANGE, 5):
+    for altitude in np.linspace(*load_vehicle().altitude_range, 4):
+        for velocity in np.linspace(*load_vehicle().velocity_range, 5):
             point = trim(vehicle, altitude, velocity)
             found.append(np.linalg.eigvals(jacobian(point.state, point.input, vehicle)[0]).real.max())
     assert min(found) == pytest.approx(1.65, abs=0.005)
@@ -108,16 +109,16 @@ def test_unstable_pole_over_the_envelope():
 
 
 def test_first_mode_falls_with_coupling():
-    found = [lightly_damped(vehicle_parameters().with_coupling_scale(k))[0][0] for k in np.linspace(0, 1.25, 6)]
+    found = [lightly_damped(load_vehicle().coupled().with_coupling_scale(k))[0][0] for k in np.linspace(0, 1.25, 6)]
     assert all(stronger < weaker for weaker, stronger in pairwise(found))
 
 
 def test_conditions_of_section_5_1():
-    assert pytest.approx((85000 * FOOT, 86500 * FOOT)) == ALTITUDE_RANGE
-    assert pytest.approx((7700 * FOOT, 8300 * FOOT)) == VELOCITY_RANGE
-    assert [INPUT_MINIMUM[0], INPUT_MAXIMUM[0]] == [0.0, 1.5]
-    assert np.degrees([INPUT_MINIMUM[1], INPUT_MAXIMUM[1]]) == pytest.approx([-30.0, 30.0])
-    assert dict(uncertainty_bounds()) == pytest.approx(
+    assert pytest.approx((85000 * FOOT, 86500 * FOOT)) == load_vehicle().altitude_range
+    assert pytest.approx((7700 * FOOT, 8300 * FOOT)) == load_vehicle().velocity_range
+    assert [LIMITS.input_minimum[0], LIMITS.input_maximum[0]] == [0.0, 1.5]
+    assert np.degrees([LIMITS.input_minimum[1], LIMITS.input_maximum[1]]) == pytest.approx([-30.0, 30.0])
+    assert dict(load_vehicle().uncertainty) == pytest.approx(
         {
             "mass": 0.10,
             "moment_of_inertia": 0.10,
@@ -136,8 +137,8 @@ def test_conditions_of_section_5_1():
 def test_trim_elevator_makes_most_of_the_loss():
     # design.md, section 5: about 12 deg over the envelope, so that w needs the total input.
     found = [
-        math.degrees(trim(vehicle_parameters(), h, v).input[1])
-        for h in np.linspace(*ALTITUDE_RANGE, 3)
-        for v in np.linspace(*VELOCITY_RANGE, 3)
+        math.degrees(trim(load_vehicle().coupled(), h, v).input[1])
+        for h in np.linspace(*load_vehicle().altitude_range, 3)
+        for v in np.linspace(*load_vehicle().velocity_range, 3)
     ]
     assert 11.0 < min(found) < max(found) < 13.0

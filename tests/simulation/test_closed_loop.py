@@ -4,8 +4,10 @@ from flights import components, step_by_step
 from numpy.testing import assert_array_equal
 
 from hsv.simulation.closed_loop import fly
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 from hsv.vehicle.plant import FlightStatus
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 SHORT = {"duration": 6.0, "fault__starts": [3.0]}
 HISTORIES = (
@@ -107,7 +109,7 @@ def test_unstable_loop_ends_diverged_with_everything_finite_and_limited():
     assert flight.time[-1] == pytest.approx(17.6, abs=0.3)
     assert np.all(np.isfinite(flight.history.state[:-1]))
     command = flight.history.command
-    assert np.all((command >= INPUT_MINIMUM) & (command <= INPUT_MAXIMUM))
+    assert np.all((command >= LIMITS.input_minimum) & (command <= LIMITS.input_maximum))
     assert flight.data().saturated.any()
 
 

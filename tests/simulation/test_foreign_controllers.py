@@ -12,7 +12,9 @@ from hsv.parameters import Parameter, check_all
 from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import parse_scenario
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 SCENARIO = """
 title = "Case 1 by another controller"
@@ -134,7 +136,10 @@ def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
     monkeypatch.setattr(Late, "answer", (5.0, -3.0))
     flown = fly(flight("Late"))
     assert flown.history.u_unsaturated[20].tolist() == [5.0, -3.0]
-    assert flown.history.command[20].tolist() == [INPUT_MAXIMUM[0], INPUT_MINIMUM[1]]
+    assert flown.history.command[20].tolist() == [
+        LIMITS.input_maximum[0],
+        LIMITS.input_minimum[1],
+    ]
     assert flown.data().saturated[20].all() and not flown.data().saturated[19].any()
 
 

@@ -62,7 +62,7 @@ def test_metres_serve_as_well_as_feet():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of model, coupling"),
+        ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of name, definition, model"),
         ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
         ("value = 0.9", "value = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of channel, type"),
@@ -81,7 +81,7 @@ def test_metres_serve_as_well_as_feet():
         ('duration = "200 s"', 'duration = "-1 s"', "duration = '-1 s': expected a time from 0 s to 100000 s"),
         ('duration = "200 s"', "", "duration: missing"),
         ('"CM"', '"XM"', "vehicle.model = 'XM': input should be 'CM' or 'DM'"),
-        ('"paper_like"', '"strong"', "vehicle.coupling = 'strong': input should be 'paper_like' or 'derived'"),
+        ('"paper_like"', '"strong"', "vehicle.coupling = 'strong': expected one of paper_like, derived, or a "),
         ("value = 0.9", "value = nan", "fault[0].value = nan: expected a finite quantity"),
         ("value = 0.9", "value = 1.9", "fault[0].value = 1.9: expected 0 to 1 for loss_of_effectiveness"),
         ("value = 0.9", 'value = "9 deg"', "fault[0].value = '9 deg': wrong unit"),

@@ -16,6 +16,7 @@ from hsv.study.claims.claim import Finding, Judged, Reading, Verdict, shown
 from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.claims.page import page
 from hsv.study.claims.ranking import METRICS, Rank
+from hsv.vehicle.vehicle import load_vehicle
 
 CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
 
@@ -23,7 +24,7 @@ CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
 @pytest.fixture(scope="module")
 def evidence(tmp_path_factory):
     """On the nominal vehicle and two corners: one at which robust MPC is lost with each gain beyond the fourth."""
-    over = corners()
+    over = corners(load_vehicle().uncertainty)
     return Evidence(tmp_path_factory.mktemp("evidence"), over=[over[0], over[36], over[-1]])
 
 

@@ -6,7 +6,7 @@ import pytest
 from hsv.study.claims import controller, notch, notch_loop
 from hsv.study.claims.claim import Verdict
 from hsv.study.claims.evidence import Evidence
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 CORNERS = [
     {},
@@ -64,7 +64,7 @@ def test_the_notch_raises_the_smallest_margin_and_lowers_that_of_the_rigid_body(
 
 def test_a_loop_that_is_not_stable_has_no_margin(evidence):
     assert min(margin.phase for margin in notch_loop.margins(evidence, ())) > 0.0
-    assert max(margin.phase for margin in notch_loop.margins(evidence, (), vehicle_parameters("derived"))) < 0.0
+    assert max(margin.phase for margin in notch_loop.margins(evidence, (), load_vehicle().coupled("derived"))) < 0.0
 
 
 def test_the_modes_act_through_the_pitch_rate_and_are_not_acted_on_by_it(findings):

@@ -7,7 +7,7 @@ from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import fly_over
 from hsv.study.linear_loop import phase_margins, sampled_loop
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 HALF_WIDTH = np.ones(5)
 
@@ -17,7 +17,7 @@ def short(scenario):
 
 
 def test_a_table_has_a_row_for_every_vehicle_in_order():
-    over = corners()[:4]
+    over = corners(load_vehicle().uncertainty)[:4]
     table = fly_over(short("case1"), over, HALF_WIDTH)
     parts = assemble(short("case1"))
     for index, corner in enumerate(over):
@@ -39,7 +39,7 @@ def test_the_sampled_loop_agrees_with_the_flights_on_who_is_stable():
     flown = Design("baseline").flown
     growth = {
         (coupling, bool(notch)): sampled_loop(
-            vehicle_parameters(coupling), flown.feedback_gain, notch, flown.period
+            load_vehicle().coupled(coupling), flown.feedback_gain, notch, flown.period
         ).growth
         for coupling in ("paper_like", "derived")
         for notch in ((), flown.notch)

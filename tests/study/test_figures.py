@@ -16,7 +16,7 @@ from hsv.study.figures.readings import gain_switches, in_words
 from hsv.study.figures.style import RC, save
 from hsv.study.flights import Flights
 from hsv.units import to_paper
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.vehicle import load_vehicle
 
 PAGES = Path(__file__).parents[2] / "docs/figures"
 
@@ -100,7 +100,7 @@ def test_the_limits_of_the_inputs_are_drawn_where_they_are_near(draw):
 
 
 def test_the_conditions_of_case_1_are_those_flown():
-    scenario, bounds = load_scenario(case1.NOTCH[0]), uncertainty_bounds()
+    scenario, bounds = load_scenario(case1.NOTCH[0]), load_vehicle().uncertainty
     assert {name: abs(change) for name, change in scenario.vehicle.perturbation.items()} == pytest.approx(
         {name: 0.5 * bound for name, bound in bounds.items()}
     )

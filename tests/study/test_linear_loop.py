@@ -6,7 +6,7 @@ import pytest
 from hsv.control.design_file import find_design, read_design
 from hsv.study.linear_loop import critical_coupling, stability_limit
 from hsv.study.sensitivity.controllers import WITHOUT_NOTCH, growth
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 
 def test_the_limit_of_stability_is_the_first_zero_on_the_way():
@@ -22,7 +22,7 @@ def test_a_loop_lost_at_once_or_never_has_no_crossing():
 
 
 def test_the_loop_changes_its_stability_at_the_limit():
-    derived = vehicle_parameters("derived")
+    derived = load_vehicle().coupled("derived")
 
     def over_coupling(kappa: float) -> float:
         return growth(WITHOUT_NOTCH, derived.with_coupling_scale(kappa))

@@ -26,7 +26,7 @@ from hsv.study.sensitivity.strip import strip
 from hsv.study.sensitivity.study import grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.variations import BOUNDS, ELEVATOR, WEIGHTS, baseline_variations
-from hsv.vehicle.parameters import paper_like_scale, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 
 def quiet(what, done, total):
@@ -36,13 +36,13 @@ def quiet(what, done, total):
 def test_corners_meet_in_all_combinations_of_three_and_scale_with_the_bounds():
     nominal, *corners = corners_of(2.0)
     assert nominal == {}
-    signs = np.array([[np.sign(corner[name]) for name in uncertainty_bounds()] for corner in corners])
+    signs = np.array([[np.sign(corner[name]) for name in load_vehicle().uncertainty] for corner in corners])
     assert len({tuple(row) for row in signs}) == len(corners) == 32
     for i in range(10):
         for j in range(i):
             for k in range(j):
                 assert len({tuple(row) for row in signs[:, [i, j, k]]}) == 8
-    assert {abs(corner["mass"]) for corner in corners} == {2.0 * uncertainty_bounds()["mass"]}
+    assert {abs(corner["mass"]) for corner in corners} == {2.0 * load_vehicle().uncertainty["mass"]}
 
 
 def test_a_coarse_study_says_how_many_corners_are_left():
@@ -95,7 +95,7 @@ def test_labels_say_what_flies():
     ):
         assert bool(feedback(controller)[1]) is filtered
     assert [c.parameters()["vehicle.model"] for c in (*ALL, RMPC_DECOUPLED)] == ["CM"] * 5 + ["DM"]
-    assert paper_like_scale() == pytest.approx(0.25)
+    assert load_vehicle().coupling_scale("paper_like") == pytest.approx(0.25)
 
 
 @pytest.mark.parametrize(("controller", "near"), [(WITHOUT_NOTCH, 0.25), (RMPC, 0.68), (WITH_NOTCH, 1.10)])
@@ -104,7 +104,7 @@ def test_coupling_limits_bracket_the_change_of_sign(controller, near):
     limits = coupling_limits(*feedback(controller), over)
     assert limits.nominal == pytest.approx(near, abs=0.01)
     assert limits.worst < limits.nominal
-    derived = vehicle_parameters("derived")
+    derived = load_vehicle().coupled("derived")
     for limit, vehicles in ((limits.nominal, over[:1]), (limits.worst, over)):
 
         def worst(kappa, vehicles=vehicles):
@@ -115,7 +115,7 @@ def test_coupling_limits_bracket_the_change_of_sign(controller, near):
 
 
 def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
-    derived = vehicle_parameters("derived")
+    derived = load_vehicle().coupled("derived")
     assert growth(RMPC, derived) > 0.1
     assert growth(RMPC_WITH_NOTCH, derived) < 0.0
     limits = coupling_limits(*feedback(RMPC_WITH_NOTCH), corners_of(1.0, 16.0))

@@ -4,10 +4,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.vehicle.dynamics import derivative, forces, jacobian
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
-COUPLINGS = {"derived": published.DERIVED, "paper_like": published.PAPER_LIKE, "decoupled": published.DECOUPLED}
+COUPLINGS = {"derived": published.DERIVED, "paper_like": published.PAPER_LIKE, 0.0: published.DECOUPLED}
 INPUT_UNITS = np.ones(2)
 
 
@@ -27,7 +27,7 @@ def rates(x, u, vehicle):
 
 @pytest.mark.parametrize("coupling", COUPLINGS)
 def test_equations_agree_with_the_published_ones_in_their_own_units(coupling):
-    vehicle = vehicle_parameters(coupling)
+    vehicle = load_vehicle().coupled(coupling)
     for x, u in random_points():
         expected = published.derivative(x / published.STATE_UNITS, u, COUPLINGS[coupling]) * published.STATE_UNITS
         assert_allclose(rates(x, u, vehicle), expected.astype(float), rtol=1e-11, atol=1e-11)
@@ -36,7 +36,7 @@ def test_equations_agree_with_the_published_ones_in_their_own_units(coupling):
 def test_forces_agree_with_the_published_ones():
     pound = published.SLUG * published.FOOT
     for x, u in random_points():
-        lift, drag, thrust, moment, pressure = forces(x, u, vehicle_parameters())
+        lift, drag, thrust, moment, pressure = forces(x, u, load_vehicle().coupled())
         expected = published.forces(x / published.STATE_UNITS, u)
         assert_allclose([lift, drag, thrust], np.array(expected[:3], float) * pound, rtol=1e-11)
         assert moment == pytest.approx(float(expected[3]) * pound * published.FOOT, rel=1e-10)
@@ -46,7 +46,7 @@ def test_forces_agree_with_the_published_ones():
 @pytest.mark.parametrize("coupling", ["derived", "paper_like"])
 def test_elastic_accelerations_satisfy_both_printed_equations(coupling):
     # Equation (1), line by line, with what the solution of the 2x2 system gives for the other acceleration.
-    p = vehicle_parameters(coupling)
+    p = load_vehicle().coupled(coupling)
     psi_1, psi_2, inertia = p.inertial_coupling_1, p.inertial_coupling_2, p.moment_of_inertia
     for x, u in random_points():
         _, _, _, moment, _ = forces(x, u, p)
@@ -61,7 +61,7 @@ def test_elastic_accelerations_satisfy_both_printed_equations(coupling):
 @pytest.mark.parametrize("coupling", COUPLINGS)
 def test_energy_rate_is_power_of_thrust_minus_drag(coupling):
     # d(V^2 / 2 + g h) / dt = V (T cos a - D) / m: gravity does no net work, lift none at all.
-    p = vehicle_parameters(coupling)
+    p = load_vehicle().coupled(coupling)
     for x, u in random_points():
         _, drag, thrust, _, _ = forces(x, u, p)
         d = rates(x, u, p)
@@ -71,7 +71,7 @@ def test_energy_rate_is_power_of_thrust_minus_drag(coupling):
 
 def test_flight_path_turns_by_the_force_across_it():
     # m V d(gamma)/dt = L + T sin a - m g cos(gamma), gamma = theta - a: equation (1) in flight-path form.
-    p = vehicle_parameters()
+    p = load_vehicle().coupled()
     for x, u in random_points():
         lift, _, thrust, _, _ = forces(x, u, p)
         d = rates(x, u, p)
@@ -81,8 +81,8 @@ def test_flight_path_turns_by_the_force_across_it():
 
 def test_free_elastic_modes_lose_energy_by_damping_alone():
     # Without generalised forces and coupling: d(rate^2 / 2 + omega^2 eta^2 / 2) / dt = -2 zeta omega rate^2.
-    names = [n for n in vehicle_parameters()._fields if n.startswith("elastic_force")]
-    p = vehicle_parameters("decoupled")._replace(**dict.fromkeys(names, 0.0))
+    names = [n for n in load_vehicle().coupled()._fields if n.startswith("elastic_force")]
+    p = load_vehicle().decoupled._replace(**dict.fromkeys(names, 0.0))
     for x, u in random_points():
         d = rates(x, u, p)
         for coordinate, rate, omega, zeta in (
@@ -94,7 +94,7 @@ def test_free_elastic_modes_lose_energy_by_damping_alone():
 
 
 def test_decoupled_body_does_not_feel_its_elastic_states():
-    p = vehicle_parameters("decoupled")
+    p = load_vehicle().decoupled
     for x, u in random_points():
         still = x.copy()
         still[5:] = 0.0
@@ -102,7 +102,7 @@ def test_decoupled_body_does_not_feel_its_elastic_states():
 
 
 def test_density_halves_over_its_scale():
-    p = vehicle_parameters()
+    p = load_vehicle().coupled()
     x, u = random_points(1)[0]
     higher = x.copy()
     higher[0] += p.density_scale_height * np.log(2.0)
@@ -111,7 +111,7 @@ def test_density_halves_over_its_scale():
 
 @pytest.mark.parametrize("coupling", COUPLINGS)
 def test_jacobians_agree_with_extrapolated_differences_of_the_published_model(coupling):
-    vehicle = vehicle_parameters(coupling)
+    vehicle = load_vehicle().coupled(coupling)
     point = trim(vehicle, 25908.0, 2347.594)
     for x, u in [(point.state, point.input), *random_points(3)]:
         A, B = jacobian(x, u, vehicle)
@@ -126,7 +126,7 @@ def test_jacobians_agree_with_extrapolated_differences_of_the_published_model(co
 
 
 def test_jacobian_leaves_its_arguments_alone():
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     x, u = random_points(1)[0]
     before = x.copy(), u.copy()
     jacobian(x, u, vehicle)

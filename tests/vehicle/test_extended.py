@@ -7,8 +7,8 @@ from numpy.testing import assert_allclose
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.vehicle.dynamics import N_STATES, jacobian
 from hsv.vehicle.extended import Filter, extended_derivative, extended_jacobian, extended_state, from_true_rate
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 NOTCH = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5)])))
 TWO = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(19.0, 0.1, 25.0, 0.7)])))
@@ -16,7 +16,7 @@ TWO = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSecti
 
 @pytest.fixture(scope="module")
 def point():
-    return trim(vehicle_parameters("paper_like"), 26000.0, 2400.0)
+    return trim(load_vehicle().coupled("paper_like"), 26000.0, 2400.0)
 
 
 @pytest.mark.parametrize("notch", [NOTCH, TWO])
@@ -24,13 +24,13 @@ def test_equilibrium_of_the_vehicle_is_one_of_the_ecm(point, notch):
     state = extended_state(point.state, notch)
     rates = np.empty(len(state))
     for printed in (False, True):
-        extended_derivative(state, point.input, vehicle_parameters("paper_like"), notch, printed, rates)
+        extended_derivative(state, point.input, load_vehicle().coupled("paper_like"), notch, printed, rates)
         assert np.abs(rates).max() < 1e-10
 
 
 @pytest.mark.parametrize("notch", [NOTCH, TWO])
 def test_physical_reading_is_vehicle_and_filter_in_other_coordinates(point, notch):
-    vehicle = vehicle_parameters("paper_like")
+    vehicle = load_vehicle().coupled("paper_like")
     A, B = extended_jacobian(extended_state(point.state, notch), point.input, vehicle, notch, False)
     T = from_true_rate(notch)
     joined, inputs = np.linalg.solve(T, A @ T), np.linalg.solve(T, B)
@@ -43,7 +43,7 @@ def test_physical_reading_is_vehicle_and_filter_in_other_coordinates(point, notc
 
 
 def test_printed_reading_differs_in_the_kinematics_alone(point):
-    vehicle = vehicle_parameters("paper_like")
+    vehicle = load_vehicle().coupled("paper_like")
     state = extended_state(point.state, NOTCH)
     physical, _ = extended_jacobian(state, point.input, vehicle, NOTCH, False)
     printed, _ = extended_jacobian(state, point.input, vehicle, NOTCH, True)

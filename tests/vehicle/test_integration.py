@@ -5,10 +5,10 @@ from scipy.integrate import solve_ivp
 
 from hsv.vehicle.dynamics import derivative
 from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
-VEHICLE = vehicle_parameters("derived")
+VEHICLE = load_vehicle().coupled("derived")
 START = trim(VEHICLE, 26060.4, 2407.92)
 INPUT = START.input + np.array([0.1, 0.01])
 """Away from trim, so that everything moves."""

@@ -5,11 +5,12 @@ import pytest
 from published_model import DERIVED, FOOT, INERTIA, PAPER_LIKE, SLUG
 
 from hsv.errors import QuantityError
-from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import load_vehicle
 
 
 def test_table_is_converted_to_si():
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     assert vehicle.mass == pytest.approx(300 * SLUG, rel=1e-12)
     assert vehicle.moment_of_inertia == pytest.approx(INERTIA * SLUG * FOOT**2, rel=1e-12)
     assert vehicle.reference_area == pytest.approx(17 * FOOT**2, rel=1e-12)
@@ -21,11 +22,11 @@ def test_table_is_converted_to_si():
 
 def test_inertial_coupling_is_the_same_in_both_systems_of_units():
     for name, (psi_1, psi_2) in (("derived", DERIVED), ("paper_like", PAPER_LIKE)):
-        vehicle = vehicle_parameters(name)
+        vehicle = load_vehicle().coupled(name)
         inertia = vehicle.moment_of_inertia
         assert vehicle.inertial_coupling_1**2 / inertia == pytest.approx(psi_1**2 / INERTIA, rel=1e-12)
         assert vehicle.inertial_coupling_2**2 / inertia == pytest.approx(psi_2**2 / INERTIA, rel=1e-12)
-    derived = vehicle_parameters("derived")
+    derived = load_vehicle().coupled("derived")
     assert derived.inertial_coupling_1**2 / derived.moment_of_inertia == pytest.approx(0.3230, abs=5e-5)
 
 
@@ -37,14 +38,16 @@ def test_derived_coupling_is_the_uniform_double_cantilever():
 
 
 def test_coupling_scale_joins_the_named_sets():
-    vehicle = vehicle_parameters()
-    for kappa, name in ((0.0, "decoupled"), (0.25, "paper_like"), (1.0, "derived")):
-        assert vehicle.with_coupling_scale(kappa) == pytest.approx(vehicle_parameters(name), rel=1e-14)
-    assert vehicle.decoupled() == vehicle_parameters("decoupled")
+    vehicle = load_vehicle()
+    for kappa, name in ((0.25, "paper_like"), (1.0, "derived"), ("0.25", "paper_like")):
+        assert vehicle.coupled(kappa) == pytest.approx(vehicle.coupled(name), rel=1e-14)
+    assert vehicle.coupled(0.0) == vehicle.decoupled == vehicle.coupled("derived").decoupled()
+    assert vehicle.coupled(0.65).inertial_coupling_2 == pytest.approx(0.65 * DERIVED[1] * SLUG**0.5 * FOOT, rel=1e-12)
+    assert [vehicle.coupling_scale(name) for name in vehicle.couplings] == [0.25, 1.0]
 
 
 def test_perturbation_changes_what_it_names_and_nothing_else():
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     heavy = vehicle.perturbed({"mass": 0.1, "thrust_beta_7": -0.03})
     assert heavy.mass == 1.1 * vehicle.mass
     assert heavy.thrust_beta_7 == 0.97 * vehicle.thrust_beta_7
@@ -63,16 +66,19 @@ def test_perturbation_changes_what_it_names_and_nothing_else():
 )
 def test_a_wrong_perturbation_is_named(perturbation, message):
     with pytest.raises(QuantityError) as caught:
-        vehicle_parameters().perturbed(perturbation)
+        load_vehicle().coupled().perturbed(perturbation)
     assert str(caught.value).startswith(message)
 
 
-def test_an_unknown_coupling_set_is_named():
-    with pytest.raises(QuantityError, match=r"coupling = 'strong': expected one of paper_like, derived"):
-        vehicle_parameters("strong")
+@pytest.mark.parametrize("coupling", ["strong", "-0.1", "nan", "inf", -1.0, True, None])
+def test_a_coupling_that_is_no_set_and_no_multiple_is_refused(coupling):
+    with pytest.raises(QuantityError) as caught:
+        load_vehicle().coupled(coupling)
+    expected = f"coupling = {coupling!r}: expected one of paper_like, derived, or a multiple of derived such as 0.65"
+    assert str(caught.value) == expected
 
 
 def test_every_parameter_is_a_finite_number_and_every_bound_names_one():
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     assert np.all(np.isfinite(vehicle))
-    assert set(uncertainty_bounds()) <= set(VehicleParameters._fields)
+    assert set(load_vehicle().uncertainty) <= set(VehicleParameters._fields)

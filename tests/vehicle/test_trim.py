@@ -6,9 +6,10 @@ import pytest
 
 from hsv.errors import TrimError
 from hsv.vehicle.dynamics import derivative, forces
-from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
-from hsv.vehicle.parameters import COUPLING_SETS, uncertainty_bounds, vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
 
 
 def rates(point, vehicle):
@@ -17,21 +18,21 @@ def rates(point, vehicle):
     return out
 
 
-@pytest.mark.parametrize("coupling", [*COUPLING_SETS, "decoupled"])
+@pytest.mark.parametrize("coupling", [*load_vehicle().couplings, 0.0])
 def test_residual_is_rounding_all_over_the_envelope(coupling):
-    vehicle = vehicle_parameters(coupling)
-    for altitude in np.linspace(*ALTITUDE_RANGE, 4):
-        for velocity in np.linspace(*VELOCITY_RANGE, 4):
+    vehicle = load_vehicle().coupled(coupling)
+    for altitude in np.linspace(*load_vehicle().altitude_range, 4):
+        for velocity in np.linspace(*load_vehicle().velocity_range, 4):
             point = trim(vehicle, altitude, velocity)
             assert np.abs(rates(point, vehicle)).max() == point.residual < 1e-12
-            assert np.all(point.input > INPUT_MINIMUM)
-            assert np.all(point.input < INPUT_MAXIMUM)
+            assert np.all(point.input > LIMITS.input_minimum)
+            assert np.all(point.input < LIMITS.input_maximum)
             assert point.state[0] == altitude
             assert point.state[1] == velocity
 
 
 def test_level_flight_carries_its_weight_and_needs_no_moment():
-    vehicle = vehicle_parameters()
+    vehicle = load_vehicle().coupled()
     point = trim(vehicle, 25908.0, 2400.0)
     lift, drag, thrust, moment, _ = forces(point.state, point.input, vehicle)
     alpha = point.state[2]
@@ -43,18 +44,20 @@ def test_level_flight_carries_its_weight_and_needs_no_moment():
 
 def test_perturbed_vehicles_trim_too():
     rng = np.random.default_rng(2)
-    bounds = uncertainty_bounds()
+    bounds = load_vehicle().uncertainty
     for _ in range(20):
         signs = rng.choice([-1.0, 1.0], len(bounds))
-        vehicle = vehicle_parameters("derived").perturbed(
-            {name: sign * bound for sign, (name, bound) in zip(signs, bounds.items(), strict=True)}
+        vehicle = (
+            load_vehicle()
+            .coupled("derived")
+            .perturbed({name: sign * bound for sign, (name, bound) in zip(signs, bounds.items(), strict=True)})
         )
         point = trim(vehicle, 26243.28, 2484.12)
         assert np.abs(rates(point, vehicle)).max() < 1e-12
 
 
 def test_more_mass_takes_more_angle_of_attack_fuel_and_elevator():
-    nominal, heavy = (trim(vehicle_parameters().perturbed({"mass": m}), 26000.0, 2400.0) for m in (0.0, 0.1))
+    nominal, heavy = (trim(load_vehicle().coupled().perturbed({"mass": m}), 26000.0, 2400.0) for m in (0.0, 0.1))
     assert 0.2 < math.degrees(heavy.state[2] - nominal.state[2]) < 0.35
     assert np.all(heavy.input > nominal.input)
 
@@ -78,11 +81,11 @@ def test_where_there_is_no_trim_the_error_says_why(altitude, velocity, message):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         with pytest.raises(TrimError, match=message):
-            trim(vehicle_parameters(), altitude, velocity)
+            trim(load_vehicle().coupled(), altitude, velocity)
 
 
 def test_a_climbing_trim_climbs_and_accelerates_and_nothing_else():
-    vehicle = vehicle_parameters("decoupled")
+    vehicle = load_vehicle().decoupled
     point = trim(vehicle, 26100.0, 2420.0, 3.048, 1.27)
     np.testing.assert_allclose(rates(point, vehicle), [3.048, 1.27, 0, 0, 0, 0, 0, 0, 0], atol=1e-12)
     assert point.residual < 1e-12
@@ -102,4 +105,4 @@ def test_a_climbing_trim_climbs_and_accelerates_and_nothing_else():
 )
 def test_a_climb_that_is_not_flown_is_refused(climb_rate, acceleration, message):
     with pytest.raises(TrimError, match=message):
-        trim(vehicle_parameters(), 26100.0, 2420.0, climb_rate, acceleration)
+        trim(load_vehicle().coupled(), 26100.0, 2420.0, climb_rate, acceleration)

@@ -8,8 +8,8 @@ from hsv.control.controller import StepKernel
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import jacobian
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import Vehicle
 
 RIGID = 5  # altitude, velocity, angle of attack, pitch angle, pitch rate
 STATE_SCALE = np.array([100.0, 20.0, 0.01, 0.01, 0.05])  # m, m/s, rad, rad, rad/s: deviations that weigh equally
@@ -52,8 +52,9 @@ class Scheduled:
         speeds = [own[f"scheduled.{end}_velocity"] for end in ("low", "high")]
         if not speeds[0] < speeds[1]:
             raise ValueError(f"scheduled.high_velocity = {speeds[1]:g} m/s: expected more than low_velocity")
+        vehicle, period = Vehicle.from_parameters(values).decoupled, values.get("period", 0.02)
         gains = [
-            regulator(values["initial.altitude"], speed, own["scheduled.input_weight"], values.get("period", 0.02))
+            regulator(vehicle, values["initial.altitude"], speed, own["scheduled.input_weight"], period)
             for speed in speeds
         ]
         controller = cls()
@@ -61,9 +62,8 @@ class Scheduled:
         return controller
 
 
-def regulator(altitude, velocity, input_weight, period):
-    """Return the gain (2, 5) of a linear-quadratic regulator about the trim at an altitude (m) and velocity (m/s)."""
-    vehicle = vehicle_parameters("paper_like").decoupled()
+def regulator(vehicle, altitude, velocity, input_weight, period):
+    """Return the gain (2, 5) of a linear-quadratic regulator about a trim (m, m/s) of the rigid vehicle."""
     point = trim(vehicle, altitude, velocity)
     A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), period)
     A, B = A[:RIGID, :RIGID], B[:RIGID]

@@ -6,9 +6,8 @@ from scipy.linalg import solve_discrete_are
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import PITCH_RATE, jacobian
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import Vehicle
 
 RIGID = 5  # altitude, velocity, angle of attack, pitch angle, pitch rate
 STATE_SCALE = np.array([100.0, 20.0, 0.01, 0.01, 0.05])  # m, m/s, rad, rad, rad/s: deviations that weigh equally
@@ -28,7 +27,7 @@ class Lqr:
         """Compute the gain for the nominal rigid vehicle; no design of the bench is used."""
         own = check_all(cls.PARAMETERS, values)
         period = values.get("period", 0.02)
-        vehicle = vehicle_parameters("paper_like").decoupled()
+        vehicle = Vehicle.from_parameters(values).decoupled
         point = trim(vehicle, values["initial.altitude"], values["initial.velocity"])
         A, B = zero_order_hold(*jacobian(point.state, point.input, vehicle), period)
         A, B = A[:RIGID, :RIGID], B[:RIGID]
@@ -39,6 +38,7 @@ class Lqr:
         Q, R = np.diag(scale**-2.0), own["lqr.input_weight"] * np.diag(INPUT_SCALE**-2.0)
         P = solve_discrete_are(full, inputs, Q, R)
         lqr = cls()
+        lqr.minimum, lqr.maximum = vehicle.input_minimum, vehicle.input_maximum
         lqr.period, lqr.gain = period, np.linalg.solve(R + inputs.T @ P @ inputs, inputs.T @ P @ full)
         lqr.reset()
         return lqr
@@ -53,6 +53,6 @@ class Lqr:
         error[PITCH_RATE] = inputs.filtered_pitch_rate - inputs.reference[PITCH_RATE]
         wanted = inputs.reference_input - self.gain @ np.concatenate((error, self.integral))
         # The integral stands still while an input is limited: it would wind up.
-        if np.all((wanted >= INPUT_MINIMUM) & (wanted <= INPUT_MAXIMUM)):
+        if np.all((wanted >= self.minimum) & (wanted <= self.maximum)):
             self.integral += self.period * error[:2]
         return wanted

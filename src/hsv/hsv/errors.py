@@ -15,6 +15,10 @@ class TrimError(HsvError, ValueError):
     """No equilibrium with admissible inputs exists at the requested flight condition."""
 
 
+class VehicleError(HsvError, ValueError):
+    """A vehicle file that is missing or has a wrong field."""
+
+
 class ScenarioError(HsvError, ValueError):
     """A scenario file that is missing or has a wrong field."""
 

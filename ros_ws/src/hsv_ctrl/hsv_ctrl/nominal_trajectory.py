@@ -14,6 +14,7 @@ from hsv_ctrl.design import declare_design
 from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
+from hsv_node.parameters import declare_vehicle
 
 
 class NominalTrajectoryNode(BlockNode):
@@ -21,6 +22,7 @@ class NominalTrajectoryNode(BlockNode):
 
     def __init__(self) -> None:
         super().__init__(NOMINAL_TRAJECTORY, "trajectory")
+        declare_vehicle(self)
         self.component = NominalTrajectory.from_parameters(*declare_design(self, NominalTrajectory.PARAMETERS))
         self._times, self._failed = StepTimes(), False
 

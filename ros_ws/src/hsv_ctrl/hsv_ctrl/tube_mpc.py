@@ -33,6 +33,10 @@ class TubeMpcNode(TubeNode):
             self.get_logger().warning(
                 f"outside certified vehicle set: vehicle.coupling = {flown!r}, the tube is certified for {certified!r}"
             )
+        if values["vehicle.digest"] != design.vehicle:
+            self.get_logger().warning(
+                "vehicle.digest: not that of the design, the tube is certified for another vehicle"
+            )
         self.component = self._law = TubeLaw.from_parameters(values, design)
         self._changed = ""
         """Which change is being made, and from which step on it acts."""

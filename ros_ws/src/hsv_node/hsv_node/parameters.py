@@ -17,6 +17,7 @@ from hsv.errors import ParameterError
 from hsv.graph.description import CONTROLLER, CONTROLLERS
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS, named_parameters
 
 
 def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -61,6 +62,22 @@ def _declare_empty(node: Node, parameter: Parameter) -> Any:
     node.set_parameters([RosParameter(parameter.name, kind, [])])
     node.set_descriptor(parameter.name, _descriptor(parameter, kind))
     return []
+
+
+def declare_vehicle(node: Node) -> None:
+    """Declare the vehicle's parameters on ``node``.
+
+    Those that are not given are those of the vehicle that ``vehicle.name`` names.
+
+    Raises:
+        ParameterError, VehicleError: A wrong value, named, or no vehicle of that name.
+    """
+    # Of a vehicle that is given whole nothing is looked up: units take a moment to import.
+    if all(given(node, parameter.name) for parameter in VEHICLE_PARAMETERS):
+        declare(node, VEHICLE_PARAMETERS)
+        return
+    name = {name: node._parameter_overrides[name].value for name in ("vehicle.name",) if given(node, name)}
+    declare(node, VEHICLE_PARAMETERS, named_parameters(name))
 
 
 def given(node: Node, name: str) -> bool:

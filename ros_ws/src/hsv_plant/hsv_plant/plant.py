@@ -32,11 +32,11 @@ from hsv.graph.part_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES
-from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
+from hsv.vehicle.plant import FlightStatus, Plant
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
-from hsv_node.parameters import declare, refuse_sim_time
+from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
 
@@ -53,7 +53,8 @@ class PlantNode(LockstepNode):
     def __init__(self) -> None:
         super().__init__(PLANT, "flight")
         refuse_sim_time(self)
-        self.values = declare(self, (*PLANT_PARAMETERS, *PACE_PARAMETERS))
+        declare_vehicle(self)
+        self.values = declare(self, (*Plant.PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
         self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
         self._ready: set[str] = set()

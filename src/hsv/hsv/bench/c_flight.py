@@ -20,7 +20,6 @@ from hsv.control.tube_law import TubeLaw
 from hsv.errors import RunError
 from hsv.export.controller import SOURCE, controller_source
 from hsv.simulation.closed_loop import Components, History
-from hsv.vehicle.envelope import ANGLE_LIMIT
 
 FLAGS = ("-O3", "-ffp-contract=off")
 """No contraction: a fused multiply-add rounds once where the compiled loop rounds twice."""
@@ -82,7 +81,7 @@ class CFlight:
             ctypes.byref((c_double * len(plant.vehicle))(*plant.vehicle)),
             c_double(plant.period),
             c_int64(plant.substeps),
-            c_double(ANGLE_LIMIT),
+            c_double(plant.vehicle.angle_limit),
             c_int64(len(sections)),
             ctypes.byref(
                 _Tube(

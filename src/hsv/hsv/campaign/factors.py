@@ -11,7 +11,7 @@ from hsv.errors import CampaignError
 from hsv.simulation.distribution import KINDS, Distribution
 from hsv.simulation.scenario import Scenario, scenario_at_means, set_field
 from hsv.units import rounded, written
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
 OPTIONAL = {
     "fault_start": ("fault[0].start", "s"),
@@ -39,7 +39,7 @@ class Factor(Distribution):
         """The field of the scenario."""
         if self.name in OPTIONAL:
             return OPTIONAL[self.name][0]
-        return _PERTURBATION + self.name if self.name in uncertainty_bounds() else self.name
+        return _PERTURBATION + self.name if self.name in COEFFICIENT_UNITS else self.name
 
 
 def factors_of(
@@ -55,7 +55,8 @@ def factors_of(
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
     scenario, drawn = scenario_at_means(dict(table), name)
-    bounds = {_PERTURBATION + parameter: rounded(scale * bound) for parameter, bound in uncertainty_bounds().items()}
+    uncertainty = scenario.vehicle.described.uncertainty
+    bounds = {_PERTURBATION + parameter: rounded(scale * bound) for parameter, bound in uncertainty.items()}
     found = {field: Distribution(unit="1", low=-bound, high=bound) for field, bound in bounds.items() if scale} | drawn
     factors = {
         field: Factor(name=field.removeprefix(_PERTURBATION), **vars(distribution))
@@ -83,7 +84,8 @@ def check_factors(factors: Iterable[Factor], table: Mapping[str, Any], name: str
     Raises:
         CampaignError, ScenarioError: Names it.
     """
-    known = (*uncertainty_bounds(), *OPTIONAL, *scenario_at_means(dict(table), name)[1])
+    scenario, drawn = scenario_at_means(dict(table), name)
+    known = (*scenario.vehicle.described.uncertainty, *OPTIONAL, *drawn)
     for factor in factors:
         if factor.name not in known:
             raise CampaignError(f"factor {factor.name!r}: expected one of {', '.join(known)}")

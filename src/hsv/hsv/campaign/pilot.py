@@ -85,7 +85,7 @@ class Pilot:
     def outcome(self, flight: FlightData, fingerprint: str | None) -> Outcome:
         """Return what a campaign keeps of a flight: its end, worst tube level, metrics (SI), ``fingerprint``."""
         return {
-            "diverged": not in_model_range(flight.state[-1]),
+            "diverged": not in_model_range(flight.state[-1], self._parts.plant.vehicle.angle_limit),
             "end_time": float(flight.time[-1]),
             "tube_level": self._levels.worst(flight),
             **flight_metrics(flight),

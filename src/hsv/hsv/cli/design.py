@@ -190,7 +190,7 @@ def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInput
     from hsv.design.tube_problem import tube_problem
 
     disturbance = report["tube"]["disturbance"]
-    problem = tube_problem(design, DisturbanceSet.from_report(disturbance["channels"]))
+    problem = tube_problem(design, inputs.flown_vehicle, DisturbanceSet.from_report(disturbance["channels"]))
     delta = disturbance["boxes"]["delta"]
     return compare_sets(design, problem, delta, inputs.disturbance.inflation, inputs.invariant_set)
 

@@ -6,7 +6,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, UnitsOption, VelocityOption
+from hsv.cli.options import (
+    AltitudeOption,
+    CouplingOption,
+    JsonOption,
+    UnitsOption,
+    VehicleOption,
+    VelocityOption,
+)
 from hsv.cli.output import Units, console, print_json
 
 if TYPE_CHECKING:
@@ -23,7 +30,8 @@ UNIT_SYSTEMS = {Units.si: "SI", Units.paper: "ft, ft/s, deg, slug^0.5 ft"}
 def linearise(
     altitude: AltitudeOption = "85000 ft",
     velocity: VelocityOption = "7702.0808 ft/s",
-    coupling: CouplingOption = "paper_like",
+    vehicle: VehicleOption = "",
+    coupling: CouplingOption = "",
     model: Annotated[
         str, typer.Option(help="Coupled (CM) or decoupled (DM) model, or CM with the notch filter in it (ECM).")
     ] = "CM",
@@ -46,30 +54,31 @@ def linearise(
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
     from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
     from hsv.vehicle.modes import modes
-    from hsv.vehicle.parameters import MODELS, vehicle_parameters
+    from hsv.vehicle.parameters import MODELS
+    from hsv.vehicle.vehicle import DEFAULT_VEHICLE, load_vehicle
 
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
     if reading not in READINGS:
         raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
-    vehicle = vehicle_parameters(coupling)
+    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
     if model == "DM":
-        vehicle = vehicle.decoupled()
-    point = trim_at(vehicle, altitude, velocity)
+        parameters = parameters.decoupled()
+    point = trim_at(parameters, altitude, velocity)
     names: tuple[str, ...] = STATE_NAMES
     state_units: tuple[str, ...] = STATE_UNITS
     difference: list[Mode] = []
     if model == "ECM":
         notch = Filter(*series(continuous(default_sections())))
         state = extended_state(point.state, notch)
-        made = {name: extended_jacobian(state, point.input, vehicle, notch, name == "printed") for name in READINGS}
+        made = {name: extended_jacobian(state, point.input, parameters, notch, name == "printed") for name in READINGS}
         A, B = made[reading]
         difference = modes(next(made[name][0] for name in READINGS if name != reading))
         names = tuple("filtered_pitch_rate" if name == "pitch_rate" else name for name in STATE_NAMES)
         names += tuple(f"filter_{i + 1}" for i in range(len(notch.B)))
         state_units += FILTER_UNITS * (len(notch.B) // 2)
     else:
-        A, B = jacobian(point.state, point.input, vehicle)
+        A, B = jacobian(point.state, point.input, parameters)
     poles = modes(A)
     if units is Units.paper:
         state, inputs = (np.array([to_paper(1.0, unit)[0] for unit in row]) for row in (state_units, INPUT_UNITS))

@@ -16,7 +16,15 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every key 
 UnitsOption = Annotated[Units, typer.Option(help="Units of what is printed: SI, or the paper's ft, ft/s, deg.")]
 AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '85000 ft'.")]
 VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
-CouplingOption = Annotated[str, typer.Option(help="Set of inertial coupling: paper_like or derived.")]
+CouplingOption = Annotated[
+    str,
+    typer.Option(
+        help="Inertial coupling: a set of the vehicle, by default its first, or a multiple of derived, as 0.65."
+    ),
+]
+VehicleOption = Annotated[
+    str, typer.Option(help="Name of a vehicle (hsv vehicles), or path of a TOML file; default: the paper's.")
+]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
 RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
 StepTimeoutOption = Annotated[

@@ -7,7 +7,14 @@ from typing import Annotated
 import typer
 
 from hsv.cli.flight_point import AT_REST
-from hsv.cli.options import AltitudeOption, CouplingOption, JsonOption, UnitsOption, VelocityOption
+from hsv.cli.options import (
+    AltitudeOption,
+    CouplingOption,
+    JsonOption,
+    UnitsOption,
+    VehicleOption,
+    VelocityOption,
+)
 from hsv.cli.output import Units, print_json, print_table, to_json
 
 
@@ -16,7 +23,8 @@ def trim(
     velocity: VelocityOption = "7900 ft/s",
     climb_rate: Annotated[str, typer.Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
     acceleration: Annotated[str, typer.Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
-    coupling: CouplingOption = "paper_like",
+    vehicle: VehicleOption = "",
+    coupling: CouplingOption = "",
     units: UnitsOption = Units.si,
     json: JsonOption = False,
 ) -> None:
@@ -26,14 +34,14 @@ def trim(
     """
     from hsv.cli.flight_point import trim_at
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
-    from hsv.vehicle.parameters import vehicle_parameters
+    from hsv.vehicle.vehicle import DEFAULT_VEHICLE, load_vehicle
 
-    vehicle = vehicle_parameters(coupling)
-    result = trim_at(vehicle, altitude, velocity, climb_rate, acceleration)
+    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
+    result = trim_at(parameters, altitude, velocity, climb_rate, acceleration)
     state = zip(STATE_NAMES, zip(result.state.tolist(), STATE_UNITS, strict=True), strict=True)
     inputs = zip(INPUT_NAMES, zip(result.input.tolist(), INPUT_UNITS, strict=True), strict=True)
     force_units = {"lift": "N", "drag": "N", "thrust": "N", "pitching_moment": "N m", "dynamic_pressure": "Pa"}
-    values = forces(result.state, result.input, vehicle)
+    values = forces(result.state, result.input, parameters)
     quantities = {
         **dict(state),
         **dict(inputs),

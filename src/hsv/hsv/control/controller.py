@@ -32,7 +32,7 @@ import numpy as np
 from hsv.errors import ControllerError, ParameterError, RunError
 from hsv.parameters import Parameter
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, STATE_UNITS
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.parameters import VehicleParameters
 
 if TYPE_CHECKING:
     from hsv.control.design_file import ControlDesign
@@ -183,9 +183,10 @@ class ElsewhereController(Controller):
 class ForeignController(Controller):
     """A controller of one's own, in Python or compiled, with its answers checked and limited."""
 
-    def __init__(self, name: str, controller: Any) -> None:
-        """Call the ``controller`` by its ``name`` in errors."""
+    def __init__(self, name: str, controller: Any, vehicle: VehicleParameters) -> None:
+        """Call the ``controller`` by its ``name`` in errors, and keep to the input limits of ``vehicle``."""
         self.name = name
+        self._minimum, self._maximum = vehicle.input_minimum, vehicle.input_maximum
         self._controller = controller
         self.kernel: StepKernel | None = getattr(controller, "kernel", None)
         if self.kernel is not None:
@@ -235,7 +236,7 @@ class ForeignController(Controller):
         wanted = np.array(self.wanted(inputs))
         if not np.all(np.isfinite(wanted)):
             raise self.failure(inputs.step, f"answered {wanted.tolist()}")
-        return ControllerResult(np.minimum(np.maximum(wanted, INPUT_MINIMUM), INPUT_MAXIMUM), wanted)
+        return ControllerResult(np.minimum(np.maximum(wanted, self._minimum), self._maximum), wanted)
 
     def failure(self, step: int, what: str) -> ControllerError:
         """Return the error of a step whose answer cannot be flown, with ``what`` it did."""

@@ -24,6 +24,7 @@ from hsv.control.library import LibraryClass, library_place
 from hsv.errors import HsvError, ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.units import parse_quantity
+from hsv.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from hsv.control.design_file import ControlDesign
@@ -153,4 +154,6 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
     except Exception as error:
         words = " ".join(str(error).split())
         raise ParameterError(f"controller = {name!r}: cannot be built, {type(error).__name__}: {words}") from error
-    return built if isinstance(built, Controller) else ForeignController(name, built)
+    if isinstance(built, Controller):
+        return built
+    return ForeignController(name, built, Vehicle.from_parameters(values).decoupled)

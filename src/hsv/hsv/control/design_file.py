@@ -40,6 +40,7 @@ DESIGN_PARAMETERS = (
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
     Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
+    Parameter("design.vehicle", "", "digest of the vehicle that the design is for; empty: the default one"),
     Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
     Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),
     Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
@@ -83,6 +84,8 @@ class ControlDesign:
     notch: tuple[NotchSection, ...]
     coupling: str = ""
     """Set of inertial coupling that the tube is certified for, empty: the design carries no tube."""
+    vehicle: str = ""
+    """Digest of the vehicle that the design is for, empty: the default one."""
     tube: TubeSet | None = None
     """The invariant set of the tube error, ``None``: the design carries none."""
     plan_bounds: PlanBounds | None = None
@@ -131,6 +134,8 @@ class ControlDesign:
         values |= {name: compact(tau) for name, tau in adjustable.items() if np.any(tau != 1.0)}
         if self.filtered:
             values["nominal.filtered"] = True
+        if self.vehicle:
+            values["design.vehicle"] = self.vehicle
         if self.tube:
             tube = {"centre": self.tube.centre, "shape": self.tube.shape, "half_width": self.tube.half_width}
             values |= {"design.coupling": self.coupling} | {f"tube.{name}": value for name, value in tube.items()}
@@ -183,6 +188,7 @@ class ControlDesign:
             input_maximum=_shaped(v, "input.maximum", (N_INPUTS,)),
             notch=notch.sections,
             coupling=v["design.coupling"],
+            vehicle=v["design.vehicle"],
             tube=_tube(v, N_RIGID + 2 * len(notch.sections)),
             plan_bounds=_plan_bounds(v),
             tau=tau,

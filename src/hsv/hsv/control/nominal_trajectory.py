@@ -17,6 +17,7 @@ from hsv.errors import ParameterError
 from hsv.lpv.polytope import AxisWeights, PolytopeData, schedule
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 LAWS = ("family", "kothare_online", "qp")
 
@@ -78,7 +79,7 @@ class NominalResult:
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
-    PARAMETERS = NOMINAL_PARAMETERS
+    PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS)
 
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None

@@ -25,17 +25,17 @@ from hsv.elementary import arcsine
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES
-from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
 from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import CONVERGED, INITIAL_GUESS, balance, check_equilibrium
+from hsv.vehicle.vehicle import Vehicle
 
 TRIMS = ("climbing", "static")
 
 REFERENCE_PARAMETERS = (
     Parameter("reference.times", [0.0], "times of the commands, two equal ones: a step", "s", 0.0, 1e5),
-    Parameter("reference.altitudes", [26243.28], "commanded altitudes there, linear between", "m", *ALTITUDE_RANGE),
-    Parameter("reference.velocities", [2484.12], "commanded velocities there, linear between", "m/s", *VELOCITY_RANGE),
+    Parameter("reference.altitudes", [26243.28], "commanded altitudes there, linear between", "m"),
+    Parameter("reference.velocities", [2484.12], "commanded velocities there, linear between", "m/s"),
     Parameter("reference.trim", "climbing", "equilibrium of a ramp: climbing, or static as if it stood", choices=TRIMS),
 )
 
@@ -102,6 +102,7 @@ class ReferenceTrajectory:
         altitudes: Sequence[float],
         velocities: Sequence[float],
         period: float,
+        rigid: VehicleParameters,
         trim: str = "climbing",
     ) -> None:
         """Trim the nominal decoupled vehicle at all points of the commands.
@@ -111,6 +112,7 @@ class ReferenceTrajectory:
             altitudes: (b) in m.
             velocities: (b) in m/s.
             period: Control period, s.
+            rigid: Parameters of the nominal decoupled vehicle.
             trim: One of :data:`TRIMS`; ``"static"`` takes climb rate and acceleration of a ramp for zero.
 
         Raises:
@@ -128,10 +130,9 @@ class ReferenceTrajectory:
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
         size = np.full(rows, np.inf)
-        rigid = vehicle_parameters("decoupled")
         _, state, inputs, defect = self.data
         _trimmed(rigid, command, rate, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
-        good = (size < CONVERGED) & np.all((inputs >= INPUT_MINIMUM) & (inputs <= INPUT_MAXIMUM), axis=1)
+        good = (size < CONVERGED) & np.all((inputs >= rigid.input_minimum) & (inputs <= rigid.input_maximum), axis=1)
         for row in np.flatnonzero(~good)[:1]:
             climb, acceleration = rate[row]
             where = (
@@ -139,14 +140,16 @@ class ReferenceTrajectory:
                 f"velocity = {command[row, 1]:.6g} m/s, climb rate = {climb:.6g} m/s, "
                 f"acceleration = {acceleration:.6g} m/s^2"
             )
-            check_equilibrium(where, size[row], inputs[row])
+            check_equilibrium(where, size[row], inputs[row], rigid)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
-        """Build from :data:`REFERENCE_PARAMETERS` for a control ``period`` (s); errors as above."""
+        """Build from :data:`REFERENCE_PARAMETERS` and the vehicle's for a control ``period`` (s); errors as above."""
         v = check_all(REFERENCE_PARAMETERS, values)
+        vehicle = Vehicle.from_parameters(values)
+        vehicle.check_envelope(REFERENCE_PARAMETERS, v)
         times, altitudes, velocities = (v[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
-        return cls(times, altitudes, velocities, period, v["reference.trim"])
+        return cls(times, altitudes, velocities, period, vehicle.decoupled, v["reference.trim"])
 
     def row(self, step: int) -> int:
         """Return the row of :attr:`data` that holds ``step``."""

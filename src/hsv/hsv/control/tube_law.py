@@ -29,8 +29,8 @@ from hsv.control.notch_filter import (
 )
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
-from hsv.vehicle.parameters import COUPLING_SETS
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import COUPLING_PARAMETER
 
 
 class TubeStatusCode(IntEnum):
@@ -47,7 +47,8 @@ TUBE_PARAMETERS = (
     replace(TAU, read_only=False),
     *TAU_CHANGE_PARAMETERS,
     Parameter("integral.rate", 0.0, "k of the integral gain k F(:, [h V]); 0: no integral action", "1/s", 0.0, 1.0),
-    Parameter("vehicle.coupling", "paper_like", "set of inertial coupling of the vehicle flown", choices=COUPLING_SETS),
+    COUPLING_PARAMETER,
+    Parameter("vehicle.digest", "", "digest of the vehicle flown; empty: the default one"),
     *FLOWN_NOTCH_PARAMETERS,
 )
 """Of the tube law, beside those of the design."""
@@ -75,18 +76,19 @@ class TubeData(NamedTuple):
     period: float
 
 
-NO_TUBE = TubeData(
-    np.zeros((1, N_INPUTS, N_STATES)),
-    np.zeros(1, np.int64),
-    INPUT_MINIMUM,
-    INPUT_MAXIMUM,
-    False,
-    False,
-    discretise((), 1.0),
-    0.0,
-    1.0,
-)
-"""In place of a tube law, where another controller flies."""
+def no_tube(vehicle: VehicleParameters) -> TubeData:
+    """Return what stands in place of a tube law where another controller flies: the input limits of ``vehicle``."""
+    return TubeData(
+        np.zeros((1, N_INPUTS, N_STATES)),
+        np.zeros(1, np.int64),
+        vehicle.input_minimum,
+        vehicle.input_maximum,
+        False,
+        False,
+        discretise((), 1.0),
+        0.0,
+        1.0,
+    )
 
 
 def memory_of(data: TubeData) -> np.ndarray:
@@ -203,14 +205,16 @@ class TubeLaw(Controller):
         notch: tuple[NotchSection, ...] | None = None,
         changes: Sequence[tuple[int, np.ndarray]] = (),
         integral_rate: float = 0.0,
+        vehicle: str | None = None,
     ) -> None:
-        """Fly ``design`` on a vehicle with this set of inertial coupling, ``None``: the one it is certified for.
+        """Fly ``design`` on a ``vehicle``, by its digest, with this set of inertial coupling.
 
-        The set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes`` of
-        tau: first step and factors (5), in order. ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
+        ``None``: those that it is certified for. The tube's set is one of the error with the design's notch filter:
+        with another ``notch`` there is none. ``changes`` of tau: first step and factors (5), in order.
+        ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
         """
         self.design = design
-        self._certified = coupling in (None, design.coupling)
+        self._certified = coupling in (None, design.coupling) and vehicle in (None, design.vehicle)
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
         self._notch = discretise(flown, design.period)
@@ -232,7 +236,8 @@ class TubeLaw(Controller):
         v = check_all(TUBE_PARAMETERS, values)
         design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
-        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"])
+        vehicle = v["vehicle.digest"]
+        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"], vehicle)
 
     @property
     def gain(self) -> np.ndarray:

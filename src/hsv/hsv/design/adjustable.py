@@ -27,9 +27,9 @@ from hsv.design.inputs import AdjustableInputs, DesignInputs
 from hsv.design.nominal import nominal_gain
 from hsv.design.region import Region, incomplete_share
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
+from hsv.design.tube_problem import channel_model
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
 
 
@@ -53,28 +53,28 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
     """
     tau = _checked(inputs).array()
     tell = progress or (lambda stage, done, total: None)
-    gains = design_gains(inputs, tell)
+    gains, vehicle = design_gains(inputs, tell), inputs.flown_vehicle
     design = replace(gains.design, tau=tau, tau_minimum=tau, filtered=True)
 
     tell("common Lyapunov function", 0, 2)
-    loops = certified_loops(design, inputs.disturbance.elevator_effectiveness)
+    loops = certified_loops(design, vehicle, inputs.disturbance.elevator_effectiveness)
     lyapunov = common_lyapunov(loops, inputs.error_scale(), "F', common Lyapunov function")
     tell("common Lyapunov function", 1, 2)
-    columns = disturbance_columns(inputs, vehicle_parameters("decoupled"))
+    columns = disturbance_columns(inputs)
     full = full_state_report(inputs, design, gains.model.whole, columns)
     tell("common Lyapunov function", 2, 2)
 
     sets = _sets(design, inputs, tell)
     target = inputs.nominal.target
-    trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
+    trimmed = trim(vehicle.decoupled, target.altitude, target.velocity).input
     bound = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, sets.complete.bounds, sets.incomplete.bounds)
     problem = nominal_problem(inputs, design.polytope, bound)
     family = nominal_family(inputs, problem, tell)
-    single = nominal_gain(problem, initial_deviation(inputs, vehicle_parameters("decoupled")))
+    single = nominal_gain(problem, initial_deviation(inputs))
     design = with_family(design, problem, family)
 
     tube = design_tube(design, inputs, tell)
-    room = room_at_one(design, tube.report)
+    room = room_at_one(design, vehicle, tube.report)
     if room.min() < 0.0:
         raise DesignError(
             f"nominal plan at tau = 1: {room.tolist()} of room to U minus F' Z', expected none below zero"
@@ -126,7 +126,11 @@ def _report(
     beyond = tube.report["flights"]
     if share < 1.0:
         full = Region(design, inputs, 1.0)
-        beyond = flights_report(flights_in_tube(design, full, tube.found, lambda stage, done, total: None))
+        beyond = flights_report(
+            flights_in_tube(
+                channel_model(design, inputs.flown_vehicle), full, tube.found, lambda stage, done, total: None
+            )
+        )
     tau = np.append(design.tau, [design.tau[-1]] * (len(tube.found.half_width) - N_RIGID))
     complete = sets.complete.report()
     return {

@@ -25,8 +25,6 @@ from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.lpv.polytope import Polytope
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
-from hsv.vehicle.envelope import ALTITUDE_RANGE, INPUT_MAXIMUM, INPUT_MINIMUM, VELOCITY_RANGE
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
 from hsv.vehicle.trim import trim
 
 Progress = Callable[[str, int, int], None]
@@ -88,7 +86,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
     Arguments and errors as for :func:`design_baseline`.
     """
     tell = progress or (lambda stage, done, total: None)
-    vehicle = vehicle_parameters("decoupled")
+    vehicle = inputs.flown_vehicle
 
     tell("polytopic model", 0, 1)
     notch = tuple(NotchSection(**section.model_dump()) for section in inputs.notch)
@@ -102,7 +100,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
     feedback = feedback_gain(
         A,
         B,
-        disturbance_columns(inputs, vehicle),
+        disturbance_columns(inputs),
         inputs.feedback.state_scale.array(),
         inputs.feedback.input_scale.array(),
         inputs.feedback.method,
@@ -125,9 +123,10 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         nominal_state_scale=problem.state_scale,
         nominal_input_scale=problem.input_scale,
         nominal_input_bound=problem.input_bound,
-        input_minimum=INPUT_MINIMUM.copy(),
-        input_maximum=INPUT_MAXIMUM.copy(),
+        input_minimum=vehicle.decoupled.input_minimum,
+        input_maximum=vehicle.decoupled.input_maximum,
         notch=notch,
+        vehicle=vehicle.digest,
     )
     return DesignResult(design, model, _report(inputs, design, model, feedback, nominal))
 
@@ -146,7 +145,7 @@ def nominal_problem(inputs: DesignInputs, polytope: Polytope, input_bound: np.nd
 
 def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Progress) -> list[NominalGain]:
     """Return the nested nominal gains along the design's step; errors as for :func:`nested_gains`."""
-    deviation = initial_deviation(inputs, vehicle_parameters("decoupled"))
+    deviation = initial_deviation(inputs)
     return nested_gains(
         problem, deviation, inputs.nominal.scales, lambda done, total: progress("nominal gains", done, total)
     )
@@ -162,22 +161,22 @@ def with_family(design: ControlDesign, problem: NominalProblem, gains: list[Nomi
     )
 
 
-def initial_deviation(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
+def initial_deviation(inputs: DesignInputs) -> np.ndarray:
     """Return x_n(0) (5) of the design's step: trim at its start less trim at its target, SI."""
     start, target = inputs.nominal.start, inputs.nominal.target
     points = (start.altitude, start.velocity), (target.altitude, target.velocity)
-    return step_deviation(vehicle, *points)
+    return step_deviation(inputs.flown_vehicle.decoupled, *points)
 
 
-def disturbance_columns(inputs: DesignInputs, vehicle: VehicleParameters) -> np.ndarray:
+def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
     """Return the columns (5, 4) whose response F makes cheap, at mid-envelope, SI per period.
 
     The lost share of the trim elevator, and steady errors of the velocity, angle-of-attack and pitch-rate equations.
     """
-    altitude, velocity = float(np.mean(ALTITUDE_RANGE)), float(np.mean(VELOCITY_RANGE))
-    A, B = (matrix[:N_RIGID] for matrix in linearise(vehicle, altitude, velocity))
+    vehicle, centre = inputs.flown_vehicle.decoupled, inputs.flown_vehicle.centre
+    A, B = (matrix[:N_RIGID] for matrix in linearise(vehicle, *centre))
     d = inputs.feedback.disturbance
-    fault = B[:, 1:] * d.elevator_loss * trim(vehicle, altitude, velocity).input[1]
+    fault = B[:, 1:] * d.elevator_loss * trim(vehicle, *centre).input[1]
     channels = np.zeros((N_RIGID, 3))
     channels[[1, 2, 4], [0, 1, 2]] = d.acceleration, d.angle_of_attack_rate, d.pitch_acceleration
     return zero_order_hold(A[:, :N_RIGID], np.hstack((fault, channels)), inputs.model.period)[1]
@@ -186,7 +185,7 @@ def disturbance_columns(inputs: DesignInputs, vehicle: VehicleParameters) -> np.
 def _literal(inputs: DesignInputs, bounds: TightenedInputs) -> DesignInputs:
     """Return the inputs with the bounds of (35) that (30) leaves on both sides of the target's trim."""
     target = inputs.nominal.target
-    bound = bounds.symmetric(trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input)
+    bound = bounds.symmetric(trim(inputs.flown_vehicle.decoupled, target.altitude, target.velocity).input)
     if not bound.min() > 0.0:
         raise DesignError(f"literal chain (30) to (35): |u_n| at most {bound.tolist()}, expected above zero")
     values = {"fuel_equivalence_ratio": float(bound[0]), "elevator_deflection": float(bound[1])}

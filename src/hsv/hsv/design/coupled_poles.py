@@ -9,17 +9,18 @@ from hsv.control.notch_filter import continuous, series
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
 from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
-from hsv.vehicle.parameters import COUPLING_SETS, vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import Vehicle
 
 
 def largest_real_parts(
-    design: ControlDesign, full: np.ndarray, point: tuple[float, float]
+    design: ControlDesign, vehicle: Vehicle, full: np.ndarray, point: tuple[float, float]
 ) -> dict[str, dict[str, float]]:
     """Return the rightmost pole (1/s) of the sampled loop around the coupled ECM at a trim.
 
     Args:
         design: With the structured gain F', flown at its adjustable factor 1.
+        vehicle: That of the design.
         full: (2, 5 + k) the full-state gain on rigid states and filter.
         point: Altitude (m) and velocity (m/s) of the trim.
 
@@ -28,10 +29,10 @@ def largest_real_parts(
     """
     notch = Filter(*series(continuous(design.notch)))
     found: dict[str, dict[str, float]] = {"structured": {}, "full_state": {}}
-    for coupling in COUPLING_SETS:
-        vehicle = vehicle_parameters(coupling)
-        level = trim(vehicle, *point)
-        A, B = extended_jacobian(extended_state(level.state, notch), level.input, vehicle, notch, False)
+    for coupling in vehicle.couplings:
+        coupled = vehicle.coupled(coupling)
+        level = trim(coupled, *point)
+        A, B = extended_jacobian(extended_state(level.state, notch), level.input, coupled, notch, False)
         A, B = zero_order_hold(A, B, design.period)
         structured, whole = np.zeros((2, len(A))), np.zeros((2, len(A)))
         structured[:, :N_RIGID] = design.feedback_gain[:, :N_RIGID]

@@ -26,8 +26,7 @@ from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.lpv.polytope import Polytope, schedule
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
-from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import Vehicle
 
 
 class Channel(NamedTuple):
@@ -54,9 +53,9 @@ _ACCELERATED = (1, 2, 4)
 _REMAINING = (0, 3)
 
 
-def acceleration_channels(vehicle: VehicleParameters, period: float) -> np.ndarray:
+def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
     """Return the effect (5, 3) on the rigid states of unit accelerations held over ``period`` (s), at mid-envelope."""
-    A, _ = linearise(vehicle, float(np.mean(ALTITUDE_RANGE)), float(np.mean(VELOCITY_RANGE)))
+    A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
     unit[list(_ACCELERATED), [0, 1, 2]] = 1.0
     return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]

@@ -19,15 +19,16 @@ from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube_problem import channel_model, factors, tube_problem
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_RIGID
+from hsv.vehicle.vehicle import Vehicle
 
 
-def certified_loops(design: ControlDesign, effectiveness: float) -> np.ndarray:
+def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
     """Return the closed loops (r, n, n) of error and filter that are to share a Lyapunov function.
 
     Vertices x adjustable factors (the least, 1) x elevator effectiveness (1, ``effectiveness``).
     """
     return np.concatenate(
-        [_system(design, factor, share).A for factor in factors(design) for share in (1.0, effectiveness)]
+        [_system(design, vehicle, factor, share).A for factor in factors(design) for share in (1.0, effectiveness)]
     )
 
 
@@ -48,20 +49,20 @@ def relaxed_bound(
     return rounded(bound * after / before, 1.0, BOUND_DIGITS)
 
 
-def room_at_one(design: ControlDesign, tube: dict[str, Any]) -> np.ndarray:
+def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
     """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1.
 
     Raises:
         DesignError: The feedback leaves nothing of an input there.
     """
     one = replace(design, tau_minimum=np.ones(N_RIGID))
-    problem = tube_problem(one, DisturbanceSet.from_report(tube["disturbance"]["channels"]))
+    problem = tube_problem(one, vehicle, DisturbanceSet.from_report(tube["disturbance"]["channels"]))
     bounds = tighten(from_report(problem, tube["invariant_set"]), design.input_minimum, design.input_maximum)
     plan = tube["tightening"]["plan"]
     return np.asarray(bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"])).min(axis=1))
 
 
-def _system(design: ControlDesign, factor: np.ndarray, effectiveness: float) -> ErrorSystem:
-    polytope, model = design.polytope, channel_model(design)
+def _system(design: ControlDesign, vehicle: Vehicle, factor: np.ndarray, effectiveness: float) -> ErrorSystem:
+    polytope, model = design.polytope, channel_model(design, vehicle)
     gain = design.feedback_gain[:, :N_RIGID] * factor
     return error_system(polytope.A, polytope.B * np.array([1.0, effectiveness]), gain, model.notch, model.columns)

@@ -55,5 +55,7 @@ def full_state_report(
         "spectral_radii": found.radii.tolist(),
         "elevator_on_pitch_rate": float(on_true_rate[1, PITCH_RATE]),
         "structured_elevator_on_pitch_rate": float(design.feedback_gain[1, PITCH_RATE]),
-        "largest_real_part": largest_real_parts(design, found.F, (target.altitude, target.velocity)),
+        "largest_real_part": largest_real_parts(
+            design, inputs.flown_vehicle, found.F, (target.altitude, target.velocity)
+        ),
     }

@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from hsv.control.design_file import find_file
-from hsv.errors import DesignError
+from hsv.errors import DesignError, QuantityError
 from hsv.inheritance import follow_extends, is_path
 from hsv.units import parse_quantity
 from hsv.vehicle.dynamics import N_RIGID
+from hsv.vehicle.vehicle import Vehicle, load_vehicle
 
 _SI = "SI"
 """Validation context of tables that hold plain numbers in SI, as a certificate does."""
@@ -192,10 +203,19 @@ class RampInputs(_Table):
         return end
 
 
+def _coupling(value: Any) -> Any:
+    """Return a multiple of the derived coupling as its text, a name as it is."""
+    try:
+        return value if isinstance(value, bool) else repr(float(value))
+    except (TypeError, ValueError):
+        return value
+
+
 class DisturbanceInputs(_Table):
     """The region over which disturbances are measured (paper eq. 13 to eq. 19): the nominal step, every corner."""
 
-    coupling: Literal["paper_like", "derived"]
+    coupling: Annotated[str, BeforeValidator(_coupling)]
+    """A set of inertial coupling of the vehicle, or a multiple of the derived one"""
     duration: Duration = Positive
     elevator_effectiveness: Number = Field(gt=0.0, lt=1.0)
     fault_start: Duration = Positive
@@ -241,11 +261,29 @@ class AdjustableInputs(_Table):
         return np.full(N_RIGID, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
 
 
+def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
+    return vehicle.to_parameters() if vehicle else None
+
+
+def _vehicle(value: Any, info: ValidationInfo) -> Vehicle | None:
+    """Return the vehicle that a file names; nothing for the default one, which old designs do not name."""
+    if info.context == _SI:
+        return Vehicle.from_parameters(value)
+    if not isinstance(value, str):
+        raise ValueError(f"vehicle = {value!r}: expected a name or a path")
+    vehicle = load_vehicle(value)
+    return vehicle if vehicle.digest else None
+
+
 class DesignInputs(_Table):
     """All inputs of a design, SI after reading; with ``adjustable`` it is that of the paper's section 4."""
 
+    model_config = ConfigDict(arbitrary_types_allowed=True)
+
     name: str = Field(pattern=r"^[a-z][a-z0-9_]*$")
     description: str
+    vehicle: Annotated[Vehicle | None, BeforeValidator(_vehicle), PlainSerializer(_vehicle_values)] = None
+    """Registered name, or the path of a file; none: the default one"""
     model: ModelInputs
     notch: list[NotchInputs] = Field(min_length=1, max_length=4)
     feedback: FeedbackInputs
@@ -254,6 +292,19 @@ class DesignInputs(_Table):
     invariant_set: InvariantSetInputs
     tightening: TighteningInputs
     adjustable: AdjustableInputs | None = None
+
+    @model_validator(mode="after")
+    def _coupled(self) -> Self:
+        try:
+            self.flown_vehicle.coupling_name(self.disturbance.coupling)
+        except QuantityError as error:
+            raise ValueError(f"disturbance.{error}") from error
+        return self
+
+    @property
+    def flown_vehicle(self) -> Vehicle:
+        """The vehicle that the design is for."""
+        return self.vehicle or load_vehicle()
 
     def error_scale(self) -> np.ndarray:
         """Return sizes (5 + 2 s) of the errors of rigid states and s filter sections that count as equal, SI.
@@ -305,11 +356,15 @@ def read_inputs(path: Path) -> DesignInputs:
 def _read(name: str) -> dict[str, Any]:
     path = Path(name) if is_path(name) else find_inputs(name)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design input file") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DesignError(f"{path}: {error}, expected TOML") from error
+    vehicle = table.get("vehicle")
+    if isinstance(vehicle, str) and is_path(vehicle):
+        table["vehicle"] = str(path.parent / vehicle)
+    return table
 
 
 def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
@@ -337,8 +392,10 @@ def find_inputs(name: str) -> Path:
 
 def _first_line(error: ValidationError, table: dict[str, Any]) -> str:
     first = error.errors()[0]
-    *parents, leaf = (str(part) for part in first["loc"])
     cause = first.get("ctx", {}).get("error")
+    if not first["loc"]:
+        return str(cause)  # of the inputs as a whole: the field is named
+    *parents, leaf = (str(part) for part in first["loc"])
     if isinstance(cause, ValueError):  # parse_quantity has named the field, not the tables it is in
         return ".".join((*(parents[:-1] if leaf.isdigit() else parents), str(cause)))
     field = ".".join((*parents, leaf))

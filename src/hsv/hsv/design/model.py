@@ -19,9 +19,8 @@ from hsv.lpv.grid import Linearised, grid_polytope, linearise, linearise_extende
 from hsv.lpv.polytope import Polytope
 from hsv.lpv.tensor_product import tensor_product
 from hsv.vehicle.dynamics import N_STATES
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
 from hsv.vehicle.extended import Filter, from_true_rate
-from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import Vehicle
 
 _POINTS = 46
 """Altitudes, and velocities, at which the model is compared with the vehicle."""
@@ -46,11 +45,11 @@ class DesignModel:
     report: dict[str, Any]
 
 
-def linearised(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection]) -> Linearised:
+def linearised(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection]) -> Linearised:
     """Return the continuous-time model that ``inputs`` ask for, as a function of altitude (m) and velocity (m/s)."""
     if inputs.system == "DM":
-        return partial(linearise, vehicle)
-    return partial(linearise_extended, vehicle, Filter(*series(continuous(notch))))
+        return partial(linearise, vehicle.decoupled)
+    return partial(linearise_extended, vehicle.decoupled, Filter(*series(continuous(notch))))
 
 
 def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarray:
@@ -67,12 +66,12 @@ def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarra
     return np.concatenate((sizes.state_scale.array(), *[sizes.filter_scale.array()] * len(notch)))
 
 
-def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection] = ()) -> DesignModel:
+def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
     """Return the polytopic model of ``vehicle``, decoupled, over the envelope, as asked for (paper eq. 12, eq. 45).
 
     Args:
         inputs: What is asked for.
-        vehicle: Parameters; their inertial coupling is left out.
+        vehicle: Its inertial coupling is left out.
         notch: The filter that is a part of the ECM.
 
     Raises:
@@ -82,16 +81,16 @@ def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequ
     scales = state_scale(inputs, notch), inputs.tensor_product.input_scale.array()
     singular_values: tuple[np.ndarray, ...] = ()
     if inputs.representation == "grid":
-        altitudes = np.linspace(*ALTITUDE_RANGE, inputs.grid.altitude_vertices)
-        velocities = np.linspace(*VELOCITY_RANGE, inputs.grid.velocity_vertices)
+        altitudes = np.linspace(*vehicle.altitude_range, inputs.grid.altitude_vertices)
+        velocities = np.linspace(*vehicle.velocity_range, inputs.grid.velocity_vertices)
         whole = grid_polytope(model, altitudes, velocities, inputs.period)
         interpolation = "linear"
         altitude_samples = (altitudes, np.eye(len(altitudes)))
         velocity_samples = (velocities, np.eye(len(velocities)))
     else:
         options = inputs.tensor_product
-        altitudes = np.linspace(*ALTITUDE_RANGE, options.altitude_samples)
-        velocities = np.linspace(*VELOCITY_RANGE, options.velocity_samples)
+        altitudes = np.linspace(*vehicle.altitude_range, options.altitude_samples)
+        velocities = np.linspace(*vehicle.velocity_range, options.velocity_samples)
         samples = sample(model, altitudes, velocities, inputs.period)
         product = tensor_product(*samples, altitudes, velocities, *scales, options.tolerance, options.functions)
         whole, interpolation = product.polytope, "cubic"
@@ -109,7 +108,7 @@ def polytopic_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequ
     return DesignModel(polytope, whole, interpolation, altitude_samples, velocity_samples, report)
 
 
-def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequence[NotchSection] = ()) -> DesignModel:
+def design_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[NotchSection] = ()) -> DesignModel:
     """Return :func:`polytopic_model` with its accuracy between the samples in the report."""
     model = polytopic_model(inputs, vehicle, notch)
     continuous_model = linearised(inputs, vehicle, notch)
@@ -120,8 +119,8 @@ def design_model(inputs: ModelInputs, vehicle: VehicleParameters, notch: Sequenc
     accuracy = model_accuracy(
         model.whole,
         exact,
-        off_grid(*ALTITUDE_RANGE, _POINTS),
-        off_grid(*VELOCITY_RANGE, _POINTS),
+        off_grid(*vehicle.altitude_range, _POINTS),
+        off_grid(*vehicle.velocity_range, _POINTS),
         state_scale(inputs, notch),
         inputs.tensor_product.input_scale.array(),
         _FREQUENCIES[: np.searchsorted(_FREQUENCIES, 0.99 * np.pi / inputs.period)],

@@ -21,16 +21,20 @@ from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import Flight, fly
-from hsv.vehicle.parameters import uncertainty_bounds
 from hsv.vehicle.plant import FlightStatus
 
 Corner = Mapping[str, float]
 Result = TypeVar("Result")
 
+_FRACTIONED = 10
+"""Uncertain parameters from which on a quarter of the corners is enough to measure disturbances."""
 
-def corners(share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle (no change) and all corners of ``share`` of the parameter bounds, in a fixed order."""
-    bounds = uncertainty_bounds()
+
+def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
+    """Return the nominal vehicle (no change) and all corners of ``share`` of the parameter bounds, in a fixed order.
+
+    ``bounds``: relative ones of the uncertain parameters, :attr:`hsv.vehicle.vehicle.Vehicle.uncertainty`.
+    """
     signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
     return [
         {},
@@ -38,14 +42,16 @@ def corners(share: float = 1.0) -> list[dict[str, float]]:
     ]
 
 
-def fraction(share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle and a quarter of the corners, in a fixed order.
+def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
+    """Return the nominal vehicle and a quarter of the corners, in a fixed order; of fewer than ten parameters all.
 
     A regular fraction of resolution VI: two of ten signs are products of five others, so that every three parameters
     still meet in all their combinations.
     """
-    names = list(uncertainty_bounds())
-    nominal, *rows = corners(share)
+    names = list(bounds)
+    nominal, *rows = corners(bounds, share)
+    if len(names) < _FRACTIONED:
+        return [nominal, *rows]
     signs = np.array([[np.sign(row[name]) for name in names] for row in rows])
     kept = (signs[:, 8] == signs[:, :5].prod(axis=1)) & (signs[:, 9] == signs[:, [0, 1, 5, 6, 7]].prod(axis=1))
     return [nominal, *(row for row, keep in zip(rows, kept, strict=True) if keep)]
@@ -70,6 +76,7 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
         times, points = [region.ramp.start, region.ramp.end], [start, target]
     return {
         "duration": region.duration,
+        **inputs.flown_vehicle.to_parameters(),
         "vehicle.coupling": region.coupling,
         "initial.altitude": start.altitude,
         "initial.velocity": start.velocity,
@@ -89,14 +96,15 @@ class Region:
     def __init__(self, design: ControlDesign, inputs: DesignInputs, share: float) -> None:
         self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share)})
         self.share = share
+        self._bounds = inputs.flown_vehicle.uncertainty
 
     def corners(self) -> list[dict[str, float]]:
         """Return the nominal vehicle and every corner of the region."""
-        return corners(self.share)
+        return corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
         """Return the nominal vehicle and a quarter of the corners."""
-        return fraction(self.share)
+        return fraction(self._bounds, self.share)
 
     def fly(self, corner: Corner) -> Flight:
         """Fly one corner.

@@ -97,11 +97,13 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
     Raises:
         DesignError: No invariant set, or one that fails when recomputed, or leaves nothing of an input.
     """
-    seen = region.fraction()
-    measured = measure(region, channel_model(design), seen, lambda done: progress("disturbances", done, len(seen)))
+    seen, vehicle = region.fraction(), inputs.flown_vehicle
+    measured = measure(
+        region, channel_model(design, vehicle), seen, lambda done: progress("disturbances", done, len(seen))
+    )
     disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
     progress("invariant set", 0, 1)
-    found = invariant_set(tube_problem(design, disturbance), inputs.invariant_set)
+    found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set)
     certified = found.certify()
     progress("invariant set", 1, 1)
     bounds = tighten(found, design.input_minimum, design.input_maximum)
@@ -126,7 +128,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
         sampling = sample(found, SEQUENCES, STEPS, SEED)
         progress("random sequences", 1, 1)
 
-    flown = flights_in_tube(design, region, found, progress)
+    flown = flights_in_tube(channel_model(design, inputs.flown_vehicle), region, found, progress)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
     plan = check_plan(bounds, lowest[:2], highest[:2])
     allowed = plan_bounds(bounds, lowest, highest)
@@ -139,10 +141,10 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
 
 
 def flights_in_tube(
-    design: ControlDesign, region: Region, found: InvariantSet, progress: Progress
+    model: ChannelModel, region: Region, found: InvariantSet, progress: Progress
 ) -> list[FlightEvidence]:
-    """Fly ``design`` at all corners of ``region`` and return what each flight shows of the set."""
-    everyone, model = region.corners(), channel_model(design)
+    """Fly all corners of ``region`` and return what each flight shows of the set, disturbances by ``model``."""
+    everyone = region.corners()
     return region.map(
         lambda flight: flight_evidence(flight, found, found.problem.disturbance, model),
         everyone,

@@ -10,12 +10,12 @@ from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_ch
 from hsv.design.error_system import error_system, union
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import Vehicle
 
 
-def channel_model(design: ControlDesign) -> ChannelModel:
-    """Return how disturbances are measured against the model of ``design``."""
-    columns = acceleration_channels(vehicle_parameters("decoupled"), design.period)
+def channel_model(design: ControlDesign, vehicle: Vehicle) -> ChannelModel:
+    """Return how disturbances are measured against the model of ``design``, which is for ``vehicle``."""
+    columns = acceleration_channels(vehicle, design.period)
     return ChannelModel(design.polytope, discretise(design.notch, design.period), columns, design.filtered)
 
 
@@ -29,9 +29,9 @@ def factors(design: ControlDesign) -> list[np.ndarray]:
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
 
 
-def tube_problem(design: ControlDesign, disturbance: DisturbanceSet) -> TubeProblem:
+def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: DisturbanceSet) -> TubeProblem:
     """Return the error system of ``design``, for all its factors, under ``disturbance``."""
-    model, polytope = channel_model(design), design.polytope
+    model, polytope = channel_model(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [
         error_system(polytope.A, polytope.B, gain * factor, model.notch, model.columns) for factor in factors(design)

@@ -10,6 +10,7 @@ from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.simulation.blocks import LOOP
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 _HEADER = """# Parameters of the nodes
 Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A
@@ -49,12 +50,15 @@ def _loop() -> str:
 
 
 def _table(parameters: Iterable[Parameter]) -> str:
+    vehicle = {p.name for p in VEHICLE_PARAMETERS if p.name != "vehicle.name"}
     brought = {p.name for p in (*DESIGN_PARAMETERS, *NOMINAL_PARAMETERS)}
     rows = ["| parameter | default | expected | meaning | in flight |", "| --- | --- | --- | --- | --- |"]
     for p in parameters:
         default = {"[]": "from the design" if p.name in brought else "empty", "": "empty"}.get(
             str(p.default), f"`{p.default}`"
         )
+        if p.name in vehicle:
+            default = "from the vehicle"
         rows.append(f"| {p.name} | {default} | {p.constraint} | {p.description} | {'' if p.read_only else 'yes'} |")
     return "\n".join(rows) + "\n"
 

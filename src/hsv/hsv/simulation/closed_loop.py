@@ -26,7 +26,7 @@ from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.tube_law import NO_TUBE, TubeData, memory_of, tube_step
+from hsv.control.tube_law import TubeData, memory_of, no_tube, tube_step
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.actuator import FaultInjector, apply_faults
 from hsv.simulation.fingerprint import fingerprint
@@ -227,7 +227,7 @@ def _fly(
         apply_faults(faults, k, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
-        if not in_model_range(x):
+        if not in_model_range(x, vehicle.angle_limit):
             return k + 1
     return rows
 
@@ -342,7 +342,7 @@ def fly_into(history: History, components: Components) -> int:
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
     if isinstance(controller, ElsewhereController):
         raise controller.refusal()
-    tube = controller.kernel if isinstance(controller.kernel, TubeData) else NO_TUBE
+    tube = controller.kernel if isinstance(controller.kernel, TubeData) else no_tube(plant.vehicle)
     given, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
     arrays.state[:] = plant.initial.state
     nominal_call = controller_call = NO_CALL
@@ -407,7 +407,7 @@ def _controlling(controller: ForeignController, given: np.ndarray, arrays: LoopA
 
 def _flight(components: Components, history: History) -> Flight:
     plant = components.plant
-    diverged = not in_model_range(history.state[-1])
+    diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
     starts = components.fault_injector.schedule.start
     fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < len(history.state) else None

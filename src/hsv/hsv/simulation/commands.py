@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 from pydantic import ValidationInfo, field_validator, model_validator
 
 from hsv.errors import QuantityError, ScenarioError
-from hsv.simulation.fields import Table, Time, quantity
-from hsv.units import rounded
-from hsv.vehicle.envelope import ALTITUDE_RANGE, FOOT, VELOCITY_RANGE
+from hsv.simulation.fields import Table, Time, envelope, quantity
+from hsv.units import rounded, to_paper
+from hsv.vehicle.vehicle import Vehicle
 
 
 class CommandTable(Table):
@@ -69,23 +69,20 @@ def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTabl
     return Breakpoints(times, altitudes, velocities)
 
 
-def envelope(limits: tuple[float, float], unit: str) -> str:
-    """Return ``limits`` (SI) of the flight envelope in words, in feet."""
-    return f"{limits[0] / FOOT:.0f} {unit} to {limits[1] / FOOT:.0f} {unit}, the flight envelope"
-
-
-def check_envelope(reference: Breakpoints, commands: Sequence[CommandTable]) -> None:
-    """Refuse commands that lead out of the flight envelope.
+def check_envelope(reference: Breakpoints, commands: Sequence[CommandTable], vehicle: Vehicle) -> None:
+    """Refuse commands that lead out of the flight envelope of ``vehicle``.
 
     Raises:
         ScenarioError: Names the command that does.
     """
-    axes = zip(("altitude", "velocity"), reference[1:], (ALTITUDE_RANGE, VELOCITY_RANGE), ("ft", "ft/s"), strict=True)
+    ranges = vehicle.altitude_range, vehicle.velocity_range
+    axes = zip(("altitude", "velocity"), reference[1:], ranges, ("m", "m/s"), strict=True)
     for axis, goals, limits, unit in axes:
         for time, goal in zip(reference.times, goals, strict=True):
             if not limits[0] <= goal <= limits[1]:
                 acting = [i for i, c in enumerate(commands) if c.share(time) and getattr(c, f"{axis}_change")]
+                shown, paper = to_paper(goal, unit)
                 raise ScenarioError(
-                    f"command[{acting[-1]}].{axis}_change leads to {goal / FOOT:.0f} {unit} at {time:g} s: "
+                    f"command[{acting[-1]}].{axis}_change leads to {shown:.0f} {paper} at {time:g} s: "
                     f"expected {envelope(limits, unit)}"
                 )

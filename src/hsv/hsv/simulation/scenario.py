@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,32 +21,52 @@ from hsv.control.library import inside
 from hsv.errors import HsvError, ParameterError, ScenarioError
 from hsv.faults.actuator import Fault
 from hsv.inheritance import follow_extends, is_path
-from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope, envelope
+from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope
 from hsv.simulation.distribution import KINDS, Distribution, read_distribution
-from hsv.simulation.fields import Frequencies, Numbers, Table, Time, quantity
+from hsv.simulation.fields import Coupling, Frequencies, Numbers, Reading, Table, Time, enveloped, quantity
 from hsv.simulation.metrics import METRICS
 from hsv.units import parse_quantity, si_unit_of, written
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE
-from hsv.vehicle.parameters import uncertainty_bounds
+from hsv.vehicle.vehicle import (
+    DEFAULT_VEHICLE,
+    SHIPPED_VEHICLES,
+    Vehicle,
+    load_vehicle,
+    parse_vehicle,
+    vehicle_label,
+    vehicle_tables,
+)
 
-Altitude = Annotated[float, quantity("m", *ALTITUDE_RANGE, shown=envelope(ALTITUDE_RANGE, "ft"))]
-Velocity = Annotated[float, quantity("m/s", *VELOCITY_RANGE, shown=envelope(VELOCITY_RANGE, "ft/s"))]
 Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]
 
 
 class VehicleTable(Table):
-    """The simulated vehicle."""
+    """The simulated vehicle; ``vehicle = "glider"`` in place of the table gives the name alone."""
 
+    name: str = DEFAULT_VEHICLE
+    """Registered, or the path of a file; what ``definition`` is called where there is one"""
+    definition: dict[str, Any] = Field(default_factory=dict)
+    """The contents of the vehicle's file, which a scenario takes along wherever it goes; none of a shipped one"""
     model: Literal["CM", "DM"] = "CM"
-    coupling: Literal["paper_like", "derived"] = "paper_like"
+    coupling: Coupling = ""
     perturbation: dict[str, Change] = Field(default_factory=dict)
+
+    @cached_property
+    def described(self) -> Vehicle:
+        """The vehicle itself."""
+        return _defined(self.name, json.dumps(self.definition)) if self.definition else load_vehicle(self.name)
+
+
+@lru_cache(maxsize=8)
+def _defined(name: str, text: str) -> Vehicle:
+    # Every flight of a campaign reads its scenario anew.
+    return parse_vehicle(json.loads(text), name)
 
 
 class InitialTable(Table):
     """Where the flight starts, in trim."""
 
-    altitude: Altitude
-    velocity: Velocity
+    altitude: Annotated[float, enveloped("altitude", "m")]
+    velocity: Annotated[float, enveloped("velocity", "m/s")]
 
 
 class ReferenceTable(Table):
@@ -141,6 +163,8 @@ class Scenario(Table):
         """
         values: dict[str, Any] = {
             "duration": self.duration,
+            **self.vehicle.described.to_parameters(),
+            "vehicle.digest": self.vehicle.described.digest,
             "vehicle.model": self.vehicle.model,
             "vehicle.coupling": self.vehicle.coupling,
             "initial.altitude": self.initial.altitude,
@@ -184,28 +208,53 @@ def scenario_names() -> list[str]:
 def scenario_text(name: str) -> str:
     """Return the text of a shipped scenario (by name) or of a file (by path), which stands alone.
 
-    What it extends is written out, and the path of a library absolute.
+    What it extends is written out, and a vehicle that is not a shipped one; the path of a library is absolute.
 
     Raises:
-        ScenarioError: No such scenario or file, it cannot be read, or a path leads out of its folder.
+        ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
     """
     text = _own_text(name)
     own = _table(text, name)
     whole = follow_extends(
         name, lambda other: _located(_table(_own_text(other), other), other), _refused, REPLACED, KINDS
     )
+    whole = _with_definition(whole, name)
     return text if whole == own else tomli_w.dumps(whole)
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the table of a file with the path of a library absolute; that of a shipped one is from where we are."""
-    controller = table.get("controller")
-    if not isinstance(controller, str):
-        return table
-    try:
-        return {**table, "controller": inside(controller, Path(name).parent if is_path(name) else Path())}
-    except ParameterError as error:
-        raise _refused(name, error) from error
+    """Return the table of a file with the paths of library and vehicle from where we are, as those of a shipped one.
+
+    A vehicle that is named replaces the definition of the one that the scenario would take from another.
+    """
+    folder = Path(name).parent if is_path(name) else Path()
+    controller, vehicle = table.get("controller"), table.get("vehicle", {})
+    located = dict(table)
+    if "name" in vehicle and "definition" not in vehicle:
+        place = str(folder / vehicle["name"]) if is_path(vehicle["name"]) else vehicle["name"]
+        located["vehicle"] = {**vehicle, "name": place, "definition": None}
+    if isinstance(controller, str):
+        try:
+            located["controller"] = inside(controller, folder)
+        except ParameterError as error:
+            raise _refused(name, error) from error
+    return located
+
+
+def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a scenario with its vehicle written out, if it is not a shipped one.
+
+    Raises:
+        ScenarioError: There is no such vehicle.
+    """
+    vehicle = {key: value for key, value in table.get("vehicle", {}).items() if value is not None}
+    place = vehicle.get("name", DEFAULT_VEHICLE)
+    if "definition" not in vehicle and place not in SHIPPED_VEHICLES:
+        try:
+            vehicle |= {"name": vehicle_label(place), "definition": vehicle_tables(place)}
+        except HsvError as error:
+            raise _refused(name, error) from error
+    return {**table, "vehicle": vehicle} if vehicle else table
 
 
 def _refused(name: str, why: object) -> ScenarioError:
@@ -226,9 +275,22 @@ def _own_text(name: str) -> str:
 
 def _table(text: str, name: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise _refused(name, error) from error
+    return _with_named_vehicle(table, name)
+
+
+def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a scenario with a vehicle that is given by its name alone as a table."""
+    vehicle = table.get("vehicle", {})
+    if isinstance(vehicle, str):
+        vehicle = {"name": vehicle}
+    if not isinstance(vehicle, dict):
+        raise _refused(name, f"vehicle = {vehicle!r}: expected a name, a path, or a table")
+    if not isinstance(vehicle.get("name", ""), str):
+        raise _refused(name, f"vehicle.name = {vehicle['name']!r}: expected a name or a path")
+    return {**table, "vehicle": vehicle} if vehicle else table
 
 
 def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Scenario:
@@ -246,7 +308,11 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
         table = _table(text, name)
         for field, value in changes.items():
             set_field(table, field, value, name)
-        text = tomli_w.dumps(_located(table, name) if "controller" in changes else table)
+            if field == "vehicle.name":
+                table["vehicle"].pop("definition", None)
+        if changes.keys() & {"controller", "vehicle", "vehicle.name"}:
+            table = _with_definition(_located(table, name), name)
+        text = tomli_w.dumps(table)
     return parse_scenario(text, Path(name).stem)
 
 
@@ -287,18 +353,20 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     Raises:
         ScenarioError: As :func:`load_scenario`.
     """
-    found: dict[int, Distribution] = {}
     whole = table
     for key in ("name", "own"):
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
             raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
     own = _own_tables(table)
-    table = {key: value for key, value in table.items() if key not in own}
+    table = {key: value for key, value in _with_definition(table, name).items() if key not in own}
+    vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
+        reading = Reading(VehicleTable.model_construct(**vehicle).described)
+        found = reading.drawn
         own = {key: {k: _own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
-        given = {**table, "name": name, "own": own, "limits": _limits(table.get("limits", {}))}
-        scenario = Scenario.model_validate(given, context=found)
+        given = {**table, "name": name, "own": own, "limits": _limits(table.get("limits", {})), "vehicle": vehicle}
+        scenario = Scenario.model_validate(given, context=reading)
         _check(scenario)
     except ValidationError as error:
         raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
@@ -361,8 +429,8 @@ def _check(scenario: Scenario) -> None:
     if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
         raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
     for name, value in scenario.vehicle.perturbation.items():
-        if name not in uncertainty_bounds():
-            expected = ", ".join(uncertainty_bounds())
+        if name not in scenario.vehicle.described.uncertainty:
+            expected = ", ".join(scenario.vehicle.described.uncertainty)
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
     if scenario.controller != "tube_mpc" and (scenario.tube.tau or scenario.tube.change):
         field = "tube.tau" if scenario.tube.tau else "tube.change"
@@ -378,7 +446,7 @@ def _check(scenario: Scenario) -> None:
             Fault(fault.channel, fault.type, fault.value)
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
-    check_envelope(scenario.commands, scenario.command)
+    check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
     _check_starts(scenario)
 
 
@@ -425,4 +493,4 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
         if isinstance(part, str):
             annotation = model.model_fields[part].annotation
             model = annotation if isinstance(annotation, type) else annotation.__args__[0]
-    return [name for name in model.model_fields if name not in ("name", "own")]
+    return [name for name in model.model_fields if model is not Scenario or name not in ("name", "own")]

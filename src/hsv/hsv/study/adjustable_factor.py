@@ -22,8 +22,8 @@ from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
 from hsv.study.linear_loop import stability_limit, worst_growth
 from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.parameters import COUPLING_SETS, vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 Progress = Callable[[str, int, int], None]
 
@@ -104,7 +104,7 @@ def factor_study(
         rows.append(_row(gains, with_tau(inputs, [tau]), tau, complete))
     progress("factors", len(factors), len(factors))
     growths, limits = {}, {}
-    for coupling in COUPLING_SETS:
+    for coupling in load_vehicle().couplings:
         nominal, worst = (partial(growth, gains, coupling, vehicles) for vehicles in (over[:1], over))
         growths[coupling] = np.array([[loop(tau) for tau in FINE.tolist()] for loop in (nominal, worst)])
         limits[coupling] = (stability_limit(nominal, FINE[::-1].tolist()), stability_limit(worst, FINE[::-1].tolist()))
@@ -116,7 +116,7 @@ def _row(gains: ControlDesign, inputs: DesignInputs, tau: float, complete: Measu
     unrelaxed = _with(gains, tau)
     incomplete = _measured(unrelaxed, inputs, tau)
     target = inputs.nominal.target
-    trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
+    trimmed = trim(load_vehicle().decoupled, target.altitude, target.velocity).input
     given, design = inputs.nominal.input_bound.array(), unrelaxed
     room = incomplete.bounds.symmetric(trimmed) if incomplete else np.full(2, np.nan)
     if incomplete and room.min() > 0.0:
@@ -165,13 +165,13 @@ def _metrics(design: ControlDesign, inputs: DesignInputs, over: Sequence[Corner]
 
 def growth(gains: ControlDesign, coupling: str, over: Sequence[Corner], tau: float) -> float:
     """Return the rightmost pole (1/s) of the loops with ``tau`` around the vehicles ``over``, the worst of all."""
-    vehicle, gain = vehicle_parameters(coupling), tau * gains.feedback_gain
+    vehicle, gain = load_vehicle().coupled(coupling), tau * gains.feedback_gain
     return max(worst_growth(vehicle.perturbed(corner), gain, gains.notch, gains.period) for corner in over)
 
 
 def is_certified(gains: ControlDesign, inputs: DesignInputs, tau: float) -> bool:
     """Return whether one Lyapunov function is found for ``tau`` and everything up to 1, with the fault and without."""
-    loops = certified_loops(_with(gains, tau), inputs.disturbance.elevator_effectiveness)
+    loops = certified_loops(_with(gains, tau), inputs.flown_vehicle, inputs.disturbance.elevator_effectiveness)
     try:
         common_lyapunov(loops, inputs.error_scale(), f"tau = {tau:g}")
     except DesignError:

@@ -6,7 +6,6 @@ import json
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.study.measures import flight_measures
 from hsv.study.sources import DIGITS, digest_of, drop_older, file_bytes, flight_digest
-from hsv.vehicle.plant import FlightStatus, Plant
+from hsv.vehicle.plant import FlightStatus
 
 _MEASURING = ("study/corner_flights.py", "study/measures.py", "campaign/tube_levels.py")
 """What is measured hangs on these beside what the flight hangs on."""
@@ -35,7 +34,6 @@ def fly_over(
     over: Sequence[Corner],
     half_width: np.ndarray,
     progress: Callable[[int], None] = lambda done: None,
-    coupling_scale: float | None = None,
 ) -> Table:
     """Fly the flat parameters ``values`` with each of the vehicles in ``over``, in as many threads as processors.
 
@@ -44,13 +42,8 @@ def fly_over(
         over: Relative changes of the vehicle's parameters, one flight each.
         half_width: (5) as for :func:`hsv.study.measures.flight_measures`.
         progress: Called with the number of flights done.
-        coupling_scale: Times the derived inertial coupling, in place of a named set.
     """
     levels, parts = TubeLevels(values), assemble(values)
-    if coupling_scale is not None:
-        p = parts.plant
-        vehicle = p.vehicle.with_coupling_scale(coupling_scale)
-        parts = replace(parts, plant=Plant(vehicle, p.initial, p.period, p.steps, p.substeps))
 
     def job(corner: Corner) -> dict[str, float]:
         flight = fly(parts.perturbed(corner))

@@ -17,6 +17,7 @@ from hsv.design.tube_problem import channel_model
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
+from hsv.vehicle.vehicle import Vehicle
 
 
 def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.ndarray]:
@@ -28,7 +29,8 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
     """
     values = flight_parameters(load_scenario(scenario))
     sections = flown_sections(values) if values["notch.enabled"] else ()
-    model = channel_model(replace(ControlDesign.from_parameters(values), notch=sections))
+    design = replace(ControlDesign.from_parameters(values), notch=sections)
+    model = channel_model(design, Vehicle.from_parameters(values))
     parts = assemble(values)
 
     def largest(corner: Corner) -> np.ndarray:

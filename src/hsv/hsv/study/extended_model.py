@@ -9,19 +9,21 @@ from hsv.design.inputs import DesignInputs
 from hsv.design.model import polytopic_model
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 
-def extended_model(inputs: DesignInputs, coupling: str, point: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+def extended_model(
+    inputs: DesignInputs, coupling: str | float, point: tuple[float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return A (11, 11), B (11, 2) of the ECM under held inputs.
 
     Args:
         inputs: Of the co-design: its filter and period.
-        coupling: Name of the set, or ``decoupled``.
+        coupling: Name of the set, or a multiple of the derived.
         point: Altitude (m) and velocity (m/s) of the trim.
     """
-    vehicle, filter_ = vehicle_parameters(coupling), Filter(*series(continuous(_sections(inputs))))
+    vehicle, filter_ = load_vehicle().coupled(coupling), Filter(*series(continuous(_sections(inputs))))
     equilibrium = trim(vehicle, *point)
     state = extended_state(equilibrium.state, filter_)
     return zero_order_hold(*extended_jacobian(state, equilibrium.input, vehicle, filter_, False), inputs.model.period)
@@ -29,7 +31,7 @@ def extended_model(inputs: DesignInputs, coupling: str, point: tuple[float, floa
 
 def codesigned_model(inputs: DesignInputs, point: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
     """Return A (11, 11), B (11, 2) of the co-designed polytopic model; arguments as above."""
-    return polytopic_model(inputs.model, vehicle_parameters("decoupled"), _sections(inputs)).whole.at(*point)
+    return polytopic_model(inputs.model, load_vehicle(), _sections(inputs)).whole.at(*point)
 
 
 def _sections(inputs: DesignInputs) -> tuple[NotchSection, ...]:

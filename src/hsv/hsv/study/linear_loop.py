@@ -13,8 +13,9 @@ from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.envelope import FOOT
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 START = (85500.0 * FOOT, 7900.0 * FOOT)
 TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
@@ -151,7 +152,7 @@ def critical_coupling(
     """
 
     def growth(kappa: float) -> float:
-        vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
+        vehicle = load_vehicle().coupled(kappa)
         return max(worst_growth(vehicle.perturbed(corner), feedback, notch, period) for corner in over)
 
     return stability_limit(growth, COUPLING_SCALES)

@@ -14,8 +14,8 @@ from hsv.study.figures.bode import pitch_rate_response
 from hsv.study.linear_loop import START
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import Mode, modes
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 WINDOW = 0.1
 """The peak of a mode is the highest within this share of its natural frequency."""
@@ -62,20 +62,20 @@ def highest_peak(frequencies: np.ndarray, response: np.ndarray, low: float, high
     return Peak(float(frequencies[top]), float(magnitude[top]))
 
 
-def elastic_modes(coupling: str) -> dict[str, Mode]:
+def elastic_modes(coupling: str | float) -> dict[str, Mode]:
     """Return the two elastic modes of the coupled model, linearised where Case 1 starts."""
-    vehicle = vehicle_parameters(coupling)
+    vehicle = load_vehicle().coupled(coupling)
     point = trim(vehicle, *START)
     second, first = modes(jacobian(point.state, point.input, vehicle)[0])[:2]
     return {"first": first, "second": second}
 
 
-def peak_falls(sections: Sequence[NotchSection], coupling: str = "paper_like") -> dict[str, PeakFall]:
+def peak_falls(sections: Sequence[NotchSection], coupling: str | float = "paper_like") -> dict[str, PeakFall]:
     """Return what ``sections`` in series do to the peak of each mode, elevator to filtered pitch rate.
 
     Continuous time, the vehicle of a named ``coupling`` linearised where Case 1 starts.
     """
-    plain = pitch_rate_response(vehicle_parameters(coupling), FREQUENCIES)
+    plain = pitch_rate_response(load_vehicle().coupled(coupling), FREQUENCIES)
     filtered = plain * notch_response(sections, FREQUENCIES)
     falls = {}
     for name, mode in elastic_modes(coupling).items():

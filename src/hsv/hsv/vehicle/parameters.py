@@ -1,28 +1,68 @@
-"""The vehicle's parameters: read from the published table with its units, held in SI, perturbed by name."""
+"""The vehicle's parameters as the equations of motion take them: named, in SI, perturbed by name."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
-from functools import cache
-from importlib.resources import files
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+import numpy as np
 
 from hsv.errors import QuantityError
-from hsv.units import in_base_units, parse_quantity
-
-COUPLING_SETS = ("paper_like", "derived")
-"""Named sets of inertial coupling that a vehicle may fly with."""
 
 MODELS = ("CM", "DM")
 """Coupled model (paper eq. 1) and decoupled model (paper eq. 4)."""
 
+COEFFICIENTS: dict[str, dict[str, str]] = {
+    "rigid_body": {"mass": "kg", "moment_of_inertia": "kg m^2", "gravity": "m/s^2"},
+    "geometry": {"reference_area": "m^2", "mean_aerodynamic_chord": "m", "thrust_moment_arm": "m"},
+    "atmosphere": {"reference_density": "kg/m^3", "reference_altitude": "m", "density_scale_height": "m"},
+    "lift": dict.fromkeys(("lift_alpha", "lift_elevator", "lift_zero"), "1"),
+    "drag": dict.fromkeys(
+        ("drag_alpha_squared", "drag_alpha", "drag_elevator_squared", "drag_elevator", "drag_zero"), "1"
+    ),
+    "pitching_moment": dict.fromkeys(("moment_alpha_squared", "moment_alpha", "moment_zero", "moment_elevator"), "1"),
+    "thrust": {f"thrust_beta_{i}": "N" for i in range(1, 9)},
+    "elastic_modes": {
+        "elastic_force_1_alpha_squared": "N/kg^0.5",
+        "elastic_force_1_alpha": "N/kg^0.5",
+        "elastic_force_1_zero": "N/kg^0.5",
+        "elastic_force_2_alpha_squared": "N/kg^0.5",
+        "elastic_force_2_alpha": "N/kg^0.5",
+        "elastic_force_2_elevator": "N/kg^0.5",
+        "elastic_force_2_zero": "N/kg^0.5",
+        "damping_ratio_1": "1",
+        "damping_ratio_2": "1",
+        "natural_frequency_1": "rad/s",
+        "natural_frequency_2": "rad/s",
+    },
+}
+"""SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
+
+COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
+"""All of them, in the order of :class:`VehicleParameters`, which ends with inertial coupling and limits."""
+
+POSITIVE = frozenset(
+    {
+        "mass",
+        "moment_of_inertia",
+        "gravity",
+        "reference_area",
+        "mean_aerodynamic_chord",
+        "reference_density",
+        "density_scale_height",
+        "natural_frequency_1",
+        "natural_frequency_2",
+    }
+)
+"""Coefficients that are above zero in any vehicle."""
+
 
 class VehicleParameters(NamedTuple):
-    """All constants of the equations of motion, SI (kg, m, s, N, rad; a slice of the vehicle 0.3048 m deep).
+    """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
 
-    Field names, units and symbols are those of ``vehicle.toml``. A named tuple, so that compiled functions take it.
+    Field names are those of a vehicle file, :mod:`hsv.vehicle.vehicle`; the shipped ones are slices 0.3048 m deep. A
+    named tuple, so that compiled functions take it.
     """
 
     mass: float
@@ -67,18 +107,25 @@ class VehicleParameters(NamedTuple):
     natural_frequency_2: float
     inertial_coupling_1: float
     inertial_coupling_2: float
+    fuel_equivalence_ratio_minimum: float
+    fuel_equivalence_ratio_maximum: float
+    elevator_deflection_minimum: float
+    elevator_deflection_maximum: float
+    angle_limit: float
+
+    @property
+    def input_minimum(self) -> np.ndarray:
+        """Least fuel equivalence ratio and elevator deflection (rad): the lower ends of U (paper eq. 29)."""
+        return np.array([self.fuel_equivalence_ratio_minimum, self.elevator_deflection_minimum])
+
+    @property
+    def input_maximum(self) -> np.ndarray:
+        """Largest fuel equivalence ratio and elevator deflection (rad): the upper ends of U (paper eq. 29)."""
+        return np.array([self.fuel_equivalence_ratio_maximum, self.elevator_deflection_maximum])
 
     def decoupled(self) -> VehicleParameters:
         """Return the decoupled model (paper eq. 4): the coupled one without inertial coupling."""
         return self._replace(inertial_coupling_1=0.0, inertial_coupling_2=0.0)
-
-    def with_coupling_scale(self, kappa: float) -> VehicleParameters:
-        """Return the vehicle with ``kappa`` times the derived inertial coupling (kappa = 0.25: paper-like)."""
-        derived = vehicle_parameters("derived")
-        return self._replace(
-            inertial_coupling_1=kappa * derived.inertial_coupling_1,
-            inertial_coupling_2=kappa * derived.inertial_coupling_2,
-        )
 
     def perturbed(self, perturbation: Mapping[str, float]) -> VehicleParameters:
         """Return the vehicle with relative changes applied, e.g. ``{"mass": 0.1}`` for +10 %.
@@ -88,56 +135,10 @@ class VehicleParameters(NamedTuple):
         """
         changes = {}
         for name, change in perturbation.items():
-            if name not in self._fields:
-                expected = ", ".join(uncertainty_bounds())
+            if name not in COEFFICIENT_UNITS:
+                expected = ", ".join(COEFFICIENT_UNITS)
                 raise QuantityError(f"perturbation.{name} = {change!r}: no such parameter, expected one of {expected}")
             if not (math.isfinite(change) and change > -1.0):
                 raise QuantityError(f"perturbation.{name} = {change!r}: expected a finite relative change above -1")
             changes[name] = getattr(self, name) * (1.0 + change)
         return self._replace(**changes)
-
-
-@cache
-def _table() -> dict[str, Any]:
-    return tomllib.loads(files("hsv.vehicle").joinpath("vehicle.toml").read_text(encoding="utf-8"))
-
-
-def _rows(coupling: str) -> dict[str, dict[str, str]]:
-    table = dict(_table())
-    couplings = table.pop("inertial_coupling")
-    rows: dict[str, dict[str, str]] = {}
-    for section in (*table.values(), couplings[coupling]):
-        rows.update(section)
-    return rows
-
-
-@cache
-def vehicle_parameters(coupling: str = "paper_like") -> VehicleParameters:
-    """Return the published vehicle with a named set of inertial coupling.
-
-    Args:
-        coupling: ``"paper_like"``, ``"derived"`` or ``"decoupled"``.
-
-    Raises:
-        QuantityError: No such set.
-    """
-    if coupling not in (*COUPLING_SETS, "decoupled"):
-        raise QuantityError(f"coupling = {coupling!r}: expected one of {', '.join(COUPLING_SETS)}")
-    return VehicleParameters(**{name: in_base_units(row["value"]) for name, row in _rows(coupling).items()})
-
-
-def paper_like_scale() -> float:
-    """Return kappa of the paper-like set: its inertial coupling as a share of the derived."""
-    return vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
-
-
-def uncertain_parameters() -> list[str]:
-    """Return the names of the paper's ten uncertain parameters (section 5.1)."""
-    return [name for name, row in _rows("derived").items() if "uncertainty" in row]
-
-
-@cache
-def uncertainty_bounds() -> Mapping[str, float]:
-    """Return the relative bound of each of the paper's ten uncertain parameters (section 5.1), by name."""
-    rows = _rows("derived")
-    return {name: parse_quantity(rows[name]["uncertainty"], "1", name) for name in uncertain_parameters()}

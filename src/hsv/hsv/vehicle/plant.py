@@ -9,12 +9,14 @@ from typing import Self
 
 import numpy as np
 
+from hsv.errors import ParameterError, QuantityError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import forces
-from hsv.vehicle.envelope import ALTITUDE_RANGE, VELOCITY_RANGE, in_model_range
+from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.parameters import COUPLING_SETS, MODELS, VehicleParameters, uncertain_parameters, vehicle_parameters
+from hsv.vehicle.parameters import COEFFICIENT_UNITS, MODELS, VehicleParameters
 from hsv.vehicle.trim import Trim, trim
+from hsv.vehicle.vehicle import COUPLING_PARAMETER, Vehicle
 
 
 class FlightStatus(IntEnum):
@@ -30,14 +32,15 @@ PLANT_PARAMETERS = (
     Parameter("substeps", 2, "Runge-Kutta steps per control period", "", 1, 100),
     Parameter("duration", 200.0, "simulated time to fly", "s", 0.0, 1e5),
     Parameter("vehicle.model", "CM", "coupled model (paper eq. 1) or decoupled model (eq. 4)", choices=MODELS),
-    Parameter("vehicle.coupling", "paper_like", "set of inertial coupling", choices=COUPLING_SETS),
-    Parameter("initial.altitude", 26060.4, "altitude of the initial trim", "m", *ALTITUDE_RANGE),
-    Parameter("initial.velocity", 2407.92, "velocity of the initial trim", "m/s", *VELOCITY_RANGE),
+    COUPLING_PARAMETER,
+    Parameter("initial.altitude", 26060.4, "altitude of the initial trim, in the vehicle's range", "m"),
+    Parameter("initial.velocity", 2407.92, "velocity of the initial trim, in the vehicle's range", "m/s"),
     *(
         Parameter(f"vehicle.perturbation.{name}", 0.0, f"relative change of {name.replace('_', ' ')}", "", -0.9, 10.0)
-        for name in uncertain_parameters()
+        for name in COEFFICIENT_UNITS
     ),
 )
+"""Beside :data:`hsv.vehicle.vehicle.VEHICLE_PARAMETERS`."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class PlantResult:
 class Plant:
     """The vehicle under held inputs. It starts in the trim of the *nominal* vehicle, perturbed or not."""
 
-    PARAMETERS = PLANT_PARAMETERS
+    PARAMETERS = (*PLANT_PARAMETERS, *VEHICLE_PARAMETERS)
 
     def __init__(self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2) -> None:
         self.vehicle = vehicle
@@ -68,16 +71,21 @@ class Plant:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`PLANT_PARAMETERS`.
+        """Build from :data:`PLANT_PARAMETERS` and those of the vehicle.
 
         Raises:
             ParameterError, TrimError: A wrong value, named.
         """
         v = check_all(PLANT_PARAMETERS, values)
-        nominal = vehicle_parameters(v["vehicle.coupling"])
+        flown = Vehicle.from_parameters(values)
+        flown.check_envelope(PLANT_PARAMETERS, v)
+        try:
+            nominal = flown.coupled(v["vehicle.coupling"])
+        except QuantityError as error:
+            raise ParameterError(f"parameter vehicle.{error}") from error
         if v["vehicle.model"] == "DM":
             nominal = nominal.decoupled()
-        vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in uncertain_parameters()})
+        vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
         initial = trim(nominal, v["initial.altitude"], v["initial.velocity"])
         return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"])
 
@@ -99,7 +107,7 @@ class Plant:
         return self._result(actuator)
 
     def _result(self, held: np.ndarray) -> PlantResult:
-        if not in_model_range(self._state):
+        if not in_model_range(self._state, self.vehicle.angle_limit):
             status = FlightStatus.DIVERGED
         elif self._step >= self.steps:
             status = FlightStatus.FINISHED

@@ -11,8 +11,7 @@ from numba import njit
 from hsv.elementary import arcsine
 from hsv.elimination import solve
 from hsv.errors import TrimError
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS, N_STATES, derivative, jacobian
 from hsv.vehicle.parameters import VehicleParameters
 
 CONVERGED = 1e-9
@@ -120,23 +119,22 @@ def trim(
     x, u = np.zeros(N_STATES), np.zeros(N_INPUTS)
     x[0], x[1] = altitude, velocity
     size = balance(vehicle.decoupled(), arcsine(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
-    check_equilibrium(where, size, u)
+    check_equilibrium(where, size, u, vehicle)
     rates = np.empty(N_STATES)
     derivative(x, u, vehicle, rates)
     rates[:2] -= climb_rate, acceleration
     return Trim(x, u, float(np.max(np.abs(rates))))
 
 
-def check_equilibrium(where: str, size: float, u: np.ndarray) -> None:
-    """Refuse what :func:`balance` did not balance, or only with an input ``u`` (2) outside its limits.
+def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
+    """Refuse what :func:`balance` did not balance, or only with an input ``u`` (2) outside the limits of ``vehicle``.
 
     Raises:
         TrimError: Says ``where`` and why.
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")
-    for name, unit, value, low, high in zip(
-        ("fuel_equivalence_ratio", "elevator_deflection"), ("", " rad"), u, INPUT_MINIMUM, INPUT_MAXIMUM, strict=True
-    ):
+    limits = vehicle.input_minimum, vehicle.input_maximum
+    for name, unit, value, low, high in zip(INPUT_NAMES, ("", " rad"), u, *limits, strict=True):
         if not low <= value <= high:
             raise TrimError(f"{where}: trim needs {name} = {value:.6g}{unit}, expected {low:.6g} to {high:.6g}{unit}")

@@ -18,7 +18,6 @@ from hsv.design.tightening import tighten
 from hsv.design.verification.claims import Claim, Subject, above, at_most, same, same_parameter
 from hsv.design.verification.invariant_set import stored_set
 from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
 
 
@@ -28,14 +27,14 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     if stored is None:
         return
     one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
-    complete = yield from _set_claims("Z at tau = 1", one, stored["complete"])
-    incomplete = yield from _set_claims("Z' of the unrelaxed plan", design, stored["incomplete"])
+    complete = yield from _set_claims("Z at tau = 1", subject, one, stored["complete"])
+    incomplete = yield from _set_claims("Z' of the unrelaxed plan", subject, design, stored["incomplete"])
     tau = np.append(design.tau_minimum, np.full(len(complete.half_width) - N_RIGID, design.tau_minimum[-1]))
     yield same("tau Z, half-widths", stored["scaled_half_width"], tau * complete.half_width, "half-widths")
     yield same_parameter(subject, "feedback.tau", design.tau, stored["tau"])
     inputs = subject.inputs
     target = inputs.nominal.target
-    trimmed = trim(vehicle_parameters("decoupled"), target.altitude, target.velocity).input
+    trimmed = trim(subject.vehicle.decoupled, target.altitude, target.velocity).input
     bounds = (tighten(found, design.input_minimum, design.input_maximum) for found in (complete, incomplete))
     relaxed = relaxed_bound(inputs.nominal.input_bound.array(), trimmed, *bounds)
     yield same("(52) bounds of |u_n|", stored["input_bound"], relaxed, "relaxed bounds")
@@ -45,7 +44,7 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     gamma, _ = certified_cost(nominal_problem(inputs, design.polytope, relaxed), K, Q, "single nominal gain K'")
     yield same("certified cost of the single K'", gamma, single["certified_gamma"], "certified costs")
     full = stored["full_state"]
-    parts = largest_real_parts(design, np.array(full["gain"]), (target.altitude, target.velocity))
+    parts = largest_real_parts(design, subject.vehicle, np.array(full["gain"]), (target.altitude, target.velocity))
     for coupling, value in parts["structured"].items():
         yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", value, 0.0)
     derived = parts["full_state"]["derived"]
@@ -53,8 +52,10 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], "rightmost poles")
 
 
-def _set_claims(name: str, design: ControlDesign, stored: dict[str, Any]) -> Generator[Claim, None, EllipsoidSet]:
-    found = stored_set(design, stored)
+def _set_claims(
+    name: str, subject: Subject, design: ControlDesign, stored: dict[str, Any]
+) -> Generator[Claim, None, EllipsoidSet]:
+    found = stored_set(design, subject.vehicle, stored)
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield above(f"{name}, invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0)
     yield same(f"{name}, half-widths from Q", stored["invariant_set"]["half_width"], found.half_width, "half-widths")

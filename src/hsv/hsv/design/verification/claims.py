@@ -12,6 +12,7 @@ import numpy as np
 from hsv.control.design_file import ControlDesign
 from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.errors import DesignError
+from hsv.vehicle.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from hsv.design.inputs import DesignInputs
@@ -55,12 +56,17 @@ class Subject:
         return inputs_from_report(self.certificate["inputs"])
 
     @cached_property
+    def vehicle(self) -> Vehicle:
+        """The vehicle in the certificate; where there is none, the default one."""
+        values = self.certificate["inputs"].get("vehicle")
+        return Vehicle.from_parameters(values) if values else load_vehicle()
+
+    @cached_property
     def model(self) -> DesignModel:
         """The polytopic model recomputed from those inputs and the vehicle; a second or two. Not for nodes."""
         from hsv.design.model import polytopic_model
-        from hsv.vehicle.parameters import vehicle_parameters
 
-        return polytopic_model(self.inputs.model, vehicle_parameters("decoupled"), self.design.notch)
+        return polytopic_model(self.inputs.model, self.vehicle, self.design.notch)
 
 
 def required(claim: Claim) -> Claim:

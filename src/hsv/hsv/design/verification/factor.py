@@ -23,10 +23,12 @@ def factor_claims(subject: Subject) -> Iterable[Claim]:
     yield required(same_parameter(subject, "feedback.tau_minimum", design.tau_minimum, stored["tau_minimum"]))
     effectiveness = subject.certificate["inputs"]["disturbance"]["elevator_effectiveness"]
     residuals = lyapunov_residuals(
-        certified_loops(design, effectiveness), np.array(stored["lyapunov"]["N"]), "common Lyapunov function"
+        certified_loops(design, subject.vehicle, effectiveness),
+        np.array(stored["lyapunov"]["N"]),
+        "common Lyapunov function",
     )
     yield required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0))
     yield same("its eigenvalues as certified", residuals, stored["lyapunov"]["lmi_smallest_eigenvalues"], "eigenvalues")
-    room = room_at_one(design, subject.certificate["tube"])
+    room = room_at_one(design, subject.vehicle, subject.certificate["tube"])
     yield same("room of the nominal plan at tau = 1", stored["room_at_one"], room, "room of plans")
     yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))

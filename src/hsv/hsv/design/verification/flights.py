@@ -27,7 +27,7 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
     stored, share = subject.certificate["tube"], incomplete_share(subject.inputs)
     # As certified: in flight the factor may be another one.
     design = replace(subject.design, tau=subject.design.tau_minimum)
-    region, model = Region(design, subject.inputs, share), channel_model(design)
+    region, model = Region(design, subject.inputs, share), channel_model(design, subject.vehicle)
     measured = stored["disturbance"]["measured"]
     seen = region.fraction()
     setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
@@ -50,7 +50,7 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
 
 def _sample(region: Region, found: EllipsoidSet, model: ChannelModel) -> list[FlightEvidence]:
     everyone = region.corners()
-    drawn = np.random.default_rng(_FLIGHT_SEED).choice(len(everyone), _FLIGHTS, replace=False)
+    drawn = np.random.default_rng(_FLIGHT_SEED).choice(len(everyone), min(_FLIGHTS, len(everyone)), replace=False)
     disturbance = found.problem.disturbance
     return region.map(
         lambda flight: flight_evidence(flight, found, disturbance, model), [everyone[i] for i in (0, *drawn)]

@@ -13,7 +13,6 @@ from hsv.design.nominal_problem import NominalProblem, certified_cost, step_devi
 from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
 from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
-from hsv.vehicle.parameters import vehicle_parameters
 
 
 def feedback_claims(subject: Subject) -> Iterable[Claim]:
@@ -50,7 +49,7 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
     sizes = [float(len(design.nominal_gains)), float(len(design.nominal_ellipsoids))]
     yield same("number of nominal gains and ellipsoids", sizes, [float(len(inputs["scales"]))] * 2, "copied")
     points = [(inputs[point]["altitude"], inputs[point]["velocity"]) for point in ("start", "target")]
-    start = step_deviation(vehicle_parameters("decoupled"), points[0], points[1])
+    start = step_deviation(subject.vehicle.decoupled, points[0], points[1])
     ellipsoids = [np.array(one["Q"]) for one in stored]
     for i, (one, Q, scale) in enumerate(zip(stored, ellipsoids, inputs["scales"], strict=True)):
         K = design.nominal_gains[i]

@@ -13,17 +13,18 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_resi
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
+from hsv.vehicle.vehicle import Vehicle
 
 
 def certified_set(subject: Subject) -> EllipsoidSet:
     """Return the ellipsoid that the certificate describes, for the design as it flies."""
-    return stored_set(subject.design, subject.certificate["tube"])
+    return stored_set(subject.design, subject.vehicle, subject.certificate["tube"])
 
 
-def stored_set(design: ControlDesign, stored: dict[str, Any]) -> EllipsoidSet:
-    """Return the ellipsoid that ``stored``, a tube in a certificate, describes for ``design``."""
+def stored_set(design: ControlDesign, vehicle: Vehicle, stored: dict[str, Any]) -> EllipsoidSet:
+    """Return the ellipsoid that ``stored``, a tube in a certificate, describes for ``design`` of ``vehicle``."""
     disturbance = DisturbanceSet.from_report(stored["disturbance"]["channels"])
-    return from_report(tube_problem(design, disturbance), stored["invariant_set"])
+    return from_report(tube_problem(design, vehicle, disturbance), stored["invariant_set"])
 
 
 def set_claims(subject: Subject) -> Iterable[Claim]:

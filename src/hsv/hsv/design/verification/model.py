@@ -8,7 +8,6 @@ import numpy as np
 
 from hsv.design.verification.claims import Claim, Subject, above, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
 
 
 def input_claims(subject: Subject) -> Iterable[Claim]:
@@ -19,8 +18,10 @@ def input_claims(subject: Subject) -> Iterable[Claim]:
     yield same("notch", [list(vars(section).values()) for section in design.notch], notch, "copied")
     coupling = inputs["disturbance"]["coupling"]
     yield Claim("design.coupling", design.coupling, repr(coupling), design.coupling == coupling)
-    yield same_parameter(subject, "input.minimum", design.input_minimum, INPUT_MINIMUM)
-    yield same_parameter(subject, "input.maximum", design.input_maximum, INPUT_MAXIMUM)
+    limits, digest = subject.vehicle.decoupled, subject.vehicle.digest
+    yield Claim("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest)
+    yield same_parameter(subject, "input.minimum", design.input_minimum, limits.input_minimum)
+    yield same_parameter(subject, "input.maximum", design.input_maximum, limits.input_maximum)
     for axis, (_, weights) in (("altitude", design.altitude_samples), ("velocity", design.velocity_samples)):
         sums = weights.sum(axis=1)
         yield same(f"scheduling.{axis}.weights, sums", sums, np.ones_like(sums), "sums")

@@ -21,7 +21,7 @@ from hsv.simulation.scenario import Scenario
 def bounding_corners(subject: Subject) -> list[Corner]:
     """Return the nominal vehicle and the corners of the parameters that set a bound of the disturbances."""
     measured = subject.certificate["tube"]["disturbance"]["measured"]
-    seen = fraction(incomplete_share(subject.inputs))
+    seen = fraction(subject.vehicle.uncertainty, incomplete_share(subject.inputs))
     return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
 
 
@@ -36,7 +36,7 @@ def scenario_claims(
     if scenario.controller != "tube_mpc":
         raise DesignError(f"scenario {scenario.name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
     parts = assemble_flight(scenario, subject.design.to_parameters())
-    found, model = certified_set(subject), channel_model(subject.design)
+    found, model = certified_set(subject), channel_model(subject.design, subject.vehicle)
     flown: list[FlightEvidence] = []
     for corner in over:
         flight = fly(parts.perturbed(corner))

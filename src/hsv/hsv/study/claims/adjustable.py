@@ -8,7 +8,7 @@ from hsv.control.nominal_trajectory import FamilyLaw, nominal_data
 from hsv.study.claims.claim import Claim, Finding, Reading, shown
 from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.linear_loop import sampled_loop
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 CASE2, WHOLE, BASELINE = "case2", "case2_tau1", "case2_baseline"
 DESIGN = "adjustable"
@@ -119,7 +119,7 @@ def _further_stable(evidence: Evidence) -> Finding:
 def _slowest(evidence: Evidence, factor: float) -> complex:
     """Return the slowest pole, rad/s, of the nominal loop with the paper-like coupling at the end of Case 1's step."""
     flown = evidence.design(DESIGN).flown
-    vehicle = vehicle_parameters("paper_like")
+    vehicle = load_vehicle().coupled("paper_like")
     poles = sampled_loop(vehicle, factor * flown.feedback_gain, flown.notch, flown.period).poles
     return complex(poles[np.argmax(poles.real)])
 

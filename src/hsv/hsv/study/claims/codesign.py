@@ -176,7 +176,7 @@ def _disturbances(evidence: Evidence) -> tuple[DisturbanceSet, DisturbanceSet]:
 
 
 def _half_width(design: ControlDesign, inputs: DesignInputs, disturbance: DisturbanceSet) -> np.ndarray:
-    return invariant_set(tube_problem(design, disturbance), inputs.invariant_set).half_width
+    return invariant_set(tube_problem(design, inputs.flown_vehicle, disturbance), inputs.invariant_set).half_width
 
 
 def _largest(one: np.ndarray, other: np.ndarray) -> float:

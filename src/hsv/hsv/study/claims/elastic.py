@@ -9,7 +9,7 @@ from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.claims.spread import Spread
 from hsv.study.claims.thresholds import A_LOT, SIGNIFICANT, SLIGHT, SOON
 from hsv.study.linear_loop import critical_coupling
-from hsv.vehicle.parameters import paper_like_scale
+from hsv.vehicle.vehicle import load_vehicle
 
 TUBE, WITHOUT, DERIVED = "case1", "case1_no_notch", "case1_derived"
 RMPC, FOURTH, SECOND_MODE = "case1_rmpc", "case1_rmpc_fourth_k", "case1_second_mode_notch"
@@ -130,7 +130,8 @@ def _rejected_paper_like(evidence: Evidence) -> Finding:
     flown = evidence.design("baseline").flown
     limit = critical_coupling(flown.feedback_gain, (), flown.period)
     unstable = int(np.count_nonzero(evidence.growth("paper_like", ()) > 0.0))
-    margin = "" if limit is None else f", {100 * (limit / paper_like_scale() - 1.0):.1f} % above the paper-like one"
+    scale = load_vehicle().coupling_scale("paper_like")
+    margin = "" if limit is None else f", {100 * (limit / scale - 1.0):.1f} % above the paper-like one"
     return Finding(
         (
             *evidence.spread(TUBE, SETTLED).readings("rates decayed after, with notch", "s", at_most=SOON),

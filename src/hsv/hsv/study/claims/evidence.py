@@ -19,7 +19,7 @@ from hsv.study.corner_flights import Table, corner_table, fly_over
 from hsv.study.figures.figure import Design
 from hsv.study.flights import Flights
 from hsv.study.linear_loop import worst_growth
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 Progress = Callable[[str, int, int], None]
 
@@ -36,7 +36,7 @@ class Evidence:
         """Keep tables in ``folder``; ``over``: the vehicles, the nominal one first, all corners unless given."""
         self._folder = folder
         self._progress = progress
-        self.over = corners() if over is None else over
+        self.over = corners(load_vehicle().uncertainty) if over is None else over
         self.flights = Flights(folder, graph=False, progress=progress)
         self.design = cache(Design)
         self.corners = cache(self._corners)
@@ -94,7 +94,7 @@ class Evidence:
         for number, corner in enumerate(self.over):
             if number % 50 == 0:
                 self._progress(what, number, len(self.over))
-            vehicle = vehicle_parameters(coupling).perturbed(corner)
+            vehicle = load_vehicle().coupled(coupling).perturbed(corner)
             found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period))
         self._progress(what, len(self.over), len(self.over))
         return np.array(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hsv.study.claims.claim import Claim, Finding, Reading, shown
 from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.corner_flights import Table
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
 
 LIMITED = "saturated_steps"
 
@@ -46,8 +46,9 @@ def _ranges(table: Table) -> str:
 
 
 def _limits() -> str:
+    limits = load_vehicle().decoupled
     fuel, elevator = (
-        f"{shown(float(INPUT_MINIMUM[i]), unit)} to {shown(float(INPUT_MAXIMUM[i]), unit)}"
+        f"{shown(float(limits.input_minimum[i]), unit)} to {shown(float(limits.input_maximum[i]), unit)}"
         for i, unit in ((0, "1"), (1, "rad"))
     )
     return f"Allowed are {fuel} and {elevator}."

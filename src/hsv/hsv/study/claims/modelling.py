@@ -12,8 +12,8 @@ from hsv.study.linear_loop import START
 from hsv.study.mode_peaks import FREQUENCIES, elastic_modes, peak_falls
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import Mode, modes
-from hsv.vehicle.parameters import vehicle_parameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 OVERLAP = {"dB": 0.1, "deg": 1.0}
 """How far apart two lines of a Bode plot may be and still look like one."""
@@ -25,29 +25,29 @@ SLOWEST_ELASTIC = 8.0
 """rad/s: half the lower structural frequency; slower modes are the rigid body's."""
 
 
-def open_loop_modes(coupling: str) -> list[Mode]:
+def open_loop_modes(coupling: str | float) -> list[Mode]:
     """Return the modes of the coupled model where Case 1 starts, fastest first."""
-    vehicle = vehicle_parameters(coupling)
+    vehicle = load_vehicle().coupled(coupling)
     point = trim(vehicle, *START)
     return modes(jacobian(point.state, point.input, vehicle)[0])
 
 
-def shift(coupling: str) -> float:
+def shift(coupling: str | float) -> float:
     """Return the largest relative distance of a coupled elastic mode from its structural frequency."""
-    vehicle = vehicle_parameters(coupling)
+    vehicle = load_vehicle().coupled(coupling)
     structural = {"first": vehicle.natural_frequency_1, "second": vehicle.natural_frequency_2}
     return max(abs(mode.natural_frequency / structural[n] - 1.0) for n, mode in elastic_modes(coupling).items())
 
 
 def almost() -> float:
     """Return the relative shift of a mode up to which it counts as unmoved: a tenth of what parts the two modes."""
-    vehicle = vehicle_parameters("decoupled")
+    vehicle = load_vehicle().decoupled
     return 0.1 * abs(vehicle.natural_frequency_2 / vehicle.natural_frequency_1 - 1.0)
 
 
-def rise(coupling: str) -> np.ndarray:
+def rise(coupling: str | float) -> np.ndarray:
     """Return by how many dB coupling raises the pitch rate's answer to the elevator, over the modes' frequencies."""
-    coupled, alone = (pitch_rate_response(vehicle_parameters(name), FREQUENCIES) for name in (coupling, "decoupled"))
+    coupled, alone = (pitch_rate_response(load_vehicle().coupled(name), FREQUENCIES) for name in (coupling, 0.0))
     return bode(coupled)[0] - bode(alone)[0]
 
 

@@ -15,7 +15,8 @@ from hsv.study.claims.claim import Finding, Reading
 from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.disturbances import largest_disturbances
 from hsv.study.linear_loop import TARGET, Margin, critical_coupling, phase_margins, sampled_loop, worst_growth
-from hsv.vehicle.parameters import VehicleParameters, paper_like_scale, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import load_vehicle
 
 WITH, WITHOUT, UNCERTAIN = "case1", "case1_no_notch", "case1_uncertain_no_notch"
 DERIVED = "case1_derived"
@@ -34,7 +35,7 @@ def without_notch(evidence: Evidence) -> Finding:
     """Judge stability without the notch, and by how much coupling it is there."""
     growth, derived = evidence.growth("paper_like", ()), evidence.growth("derived", ())
     flown = evidence.design("baseline").flown
-    share = paper_like_scale()
+    share = load_vehicle().coupling_scale("paper_like")
     critical = critical_coupling(flown.feedback_gain, (), flown.period)
     margin = float("inf") if critical is None else critical / share
     uncertain = assemble(flight_parameters(load_scenario(UNCERTAIN))).plant.vehicle
@@ -96,7 +97,7 @@ def margins(
     top = 0.95 * np.pi / flown.period
     frequencies = np.unique(np.concatenate((np.geomspace(0.1, top, 3000), np.linspace(12.0, 22.0, 5001))))
     loop = sampled_loop(
-        vehicle or vehicle_parameters("paper_like"), flown.feedback_gain, notch, flown.period, point=TARGET
+        vehicle or load_vehicle().coupled("paper_like"), flown.feedback_gain, notch, flown.period, point=TARGET
     )
     sign = 1.0 if loop.growth < 0.0 else -1.0
     found = phase_margins(frequencies, loop.elevator_loop(frequencies))
@@ -111,7 +112,7 @@ def phase_margin(evidence: Evidence) -> Finding:
     """Judge what the notch does to the phase margins of the loop broken at the elevator."""
     notch = evidence.design("baseline").flown.notch
     without, with_notch = margins(evidence, ()), margins(evidence, notch)
-    vehicles = [vehicle_parameters("paper_like").perturbed(corner) for corner in evidence.over]
+    vehicles = [load_vehicle().coupled("paper_like").perturbed(corner) for corner in evidence.over]
     gained, rigid = (
         np.array(found)
         for found in zip(
@@ -119,7 +120,7 @@ def phase_margin(evidence: Evidence) -> Finding:
             strict=True,
         )
     )
-    derived = vehicle_parameters("derived")
+    derived = load_vehicle().coupled("derived")
     retuned = margins(evidence, evidence.design("baseline_derived").flown.notch, derived, "baseline_derived")
     at_derived = _smallest(retuned) - _smallest(margins(evidence, (), derived))
     before = _smallest(without)
@@ -147,7 +148,7 @@ def _pairs(evidence: Evidence, vehicles: Sequence[VehicleParameters]) -> list[tu
 
 def less_uncertainty(evidence: Evidence) -> Finding:
     """Judge whether the lumped disturbance is smaller with the notch."""
-    over = [corner for corner in fraction() if corner in evidence.over]
+    over = [corner for corner in fraction(load_vehicle().uncertainty) if corner in evidence.over]
     a, b = (largest_disturbances(scenario, over) for scenario in (WITH, WITHOUT))
 
     def bound(channel: str) -> float:

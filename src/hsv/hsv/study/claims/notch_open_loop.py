@@ -19,8 +19,9 @@ from hsv.study.figures.figure_03 import POLE_DAMPINGS, POLE_FREQUENCIES
 from hsv.study.linear_loop import ELEVATOR, START
 from hsv.study.mode_peaks import FREQUENCIES, peak_falls
 from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE, jacobian
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 ELIMINATED, SUPPRESSED = 20.0, 10.0
 """dB: a tenth of a peak's height is left, about a third of it."""
@@ -41,7 +42,7 @@ def coupling_in_pitch_rate(evidence: Evidence) -> Finding:
     """Judge the share of the pitch rate in what coupling changes."""
     sizes = evidence.design("baseline").certificate["inputs"]["model"]["tensor_product"]["state_scale"]
     scale = np.array(list(sizes.values()))
-    (A, B), (A_alone, B_alone) = (_linearised(vehicle_parameters(name)) for name in ("paper_like", "decoupled"))
+    (A, B), (A_alone, B_alone) = (_linearised(load_vehicle().coupled(name)) for name in ("paper_like", 0.0))
     change = ((A - A_alone) * scale / scale[:, None]) ** 2
     onto_rigid, onto_elastic = change[:N_RIGID, N_RIGID:], change[N_RIGID:, :N_RIGID]
     answer, alone = (

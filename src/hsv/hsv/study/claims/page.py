@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 
-from hsv.design.region import corners
 from hsv.study.claims.claim import Judged, Verdict, shown
 from hsv.study.claims.ranking import METRICS, Rank
 from hsv.study.claims.thresholds import REASONS
+from hsv.vehicle.vehicle import load_vehicle
+
+_CORNERS = 2 ** len(load_vehicle().uncertainty)
 
 _HEADER = f"""# The paper's claims
 Made by `hsv claims --out docs/claims.md`, every number measured. A claim is quoted word for word and read in one or
@@ -18,7 +20,7 @@ stricter readings. A claim **holds** if all readings do, **holds under condition
 not, and **does not hold** if one in bold does not, whatever the others say.
 
 *Uncertain parameters*: the paper flies one perturbation and gives its bounds only; ours is half of each bound
-(`case1_uncertain`, `case2_uncertain`). *Corners*: all {len(corners()) - 1} combinations of the bounds, each flown, and
+(`case1_uncertain`, `case2_uncertain`). *Corners*: all {_CORNERS} combinations of the bounds, each flown, and
 the nominal vehicle; the *worst corner* is the vehicle least in favour of the claim. The *paper-like* coupling is meant
 where none is named ([assumptions](assumptions.md)). What the paper says of flights without the notch filter rests, with
 that coupling, on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).

@@ -8,7 +8,7 @@ from hsv.study.claims.claim import Claim, Finding, Reading, shown
 from hsv.study.claims.evidence import Evidence, nominal, worst
 from hsv.study.claims.thresholds import A_LOT, ALTITUDE_BAND, SOON, VELOCITY_BAND
 from hsv.study.linear_loop import critical_coupling
-from hsv.vehicle.parameters import paper_like_scale
+from hsv.vehicle.vehicle import load_vehicle
 
 TUBE, DERIVED, TUBE_DM = "case1", "case1_derived", "case1_tube_dm"
 RMPC, FAMILY = "case1_rmpc", "case1_rmpc_fourth_k"
@@ -41,7 +41,7 @@ def _rmpc_flexible(evidence: Evidence) -> Finding:
         evidence.changed(FAMILY, ("robust_mpc.gain_index", index), COUPLED, DERIVED_COUPLING) for index in range(count)
     ]
     lost = int(sum(flight["diverged"] for flight in derived))
-    family = evidence.design("baseline").flown
+    family, paper_like = evidence.design("baseline").flown, load_vehicle().coupling_scale("paper_like")
     limits = [critical_coupling(family.nominal_gains[index], (), family.period) for index in (0, count - 1)]
     ratio = coupled.over(alone)
     return Finding(
@@ -69,7 +69,7 @@ def _rmpc_flexible(evidence: Evidence) -> Finding:
         f"{shown(last['elastic_settling_time'], 's')}, on the decoupled model in "
         f"{shown(last_alone['elastic_settling_time'], 's')}. With the derived coupling {lost} of {count} gains lose "
         f"the vehicle: the loop is stable up to {_limit(limits[0])} of that coupling with the single gain, up to "
-        f"{_limit(limits[1])} with the last, and the paper-like one is {paper_like_scale():g} of it.",
+        f"{_limit(limits[1])} with the last, and the paper-like one is {paper_like:g} of it.",
     )
 
 

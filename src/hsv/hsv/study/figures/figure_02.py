@@ -13,7 +13,7 @@ from hsv.study.figures.style import BLUE, RED, letter, new_figure
 from hsv.study.linear_loop import ELEVATOR
 from hsv.vehicle.dynamics import PITCH_RATE
 from hsv.vehicle.envelope import FOOT
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 POINT = (85817.0, 8037.0)
 """ft, ft/s: between the samples of the model."""
@@ -26,7 +26,7 @@ def draw(material: Material) -> Drawing:
     design = material.design("baseline")
     point = POINT[0] * FOOT, POINT[1] * FOOT
     period = design.flown.period
-    exact = zero_order_hold(*linearise(vehicle_parameters("decoupled"), *point), period)
+    exact = zero_order_hold(*linearise(load_vehicle().decoupled, *point), period)
     figure = new_figure(5.0)
     magnitude, phase = figure.subplots(2, 1, sharex=True)
     for system, label, style in (

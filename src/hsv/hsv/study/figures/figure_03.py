@@ -12,7 +12,7 @@ from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import peak_in_words
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED, letter, new_figure
 from hsv.study.mode_peaks import peak_falls
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 FREQUENCIES = np.logspace(0.0, 2.0, 1500)
 POLE_FREQUENCIES = (10.0, 15.0, 20.0)
@@ -23,7 +23,7 @@ COLORS = (GREEN, BLUE, ORANGE)
 def draw(material: Material) -> Drawing:
     """Draw elevator to filtered pitch rate of the coupled model, one parameter of the poles changed at a time."""
     section: NotchSection = material.design("baseline").flown.notch[0]
-    plain = pitch_rate_response(vehicle_parameters("paper_like"), FREQUENCIES)
+    plain = pitch_rate_response(load_vehicle().coupled("paper_like"), FREQUENCIES)
     figure = new_figure(5.2)
     grid = figure.subplots(2, 2, sharex=True, sharey="row")
     families = (

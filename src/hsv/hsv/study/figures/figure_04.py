@@ -10,8 +10,9 @@ from hsv.study.linear_loop import START
 from hsv.study.mode_peaks import elastic_modes
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.modes import modes
-from hsv.vehicle.parameters import VehicleParameters, vehicle_parameters
+from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
 
 SETS = (("paper_like", "paper-like coupling", BLUE, "x"), ("derived", "derived coupling", RED, "+"))
 
@@ -21,7 +22,7 @@ def draw(material: Material) -> Drawing:
     figure = new_figure(4.2)
     whole, near = figure.subplots(1, 2, width_ratios=(1.5, 1))
     for name, label, color, marker in SETS:
-        vehicle = vehicle_parameters(name)
+        vehicle = load_vehicle().coupled(name)
         poles = _poles(vehicle)
         for axis in (whole, near):
             axis.plot(poles.real, poles.imag, marker, color=color, markersize=7, markeredgewidth=1.4, label=label)
@@ -37,7 +38,7 @@ def draw(material: Material) -> Drawing:
                 color=color,
                 fontsize=8,
             )
-    structural = vehicle_parameters("decoupled")
+    structural = load_vehicle().decoupled
     frequencies = (structural.natural_frequency_1, structural.natural_frequency_2)
     for omega in frequencies:
         whole.axhline(omega, color=GREY, linewidth=0.5, linestyle=":")
@@ -45,8 +46,10 @@ def draw(material: Material) -> Drawing:
     whole.set_xlim(-2.4, 2.6)
     near.set_xlim(-0.02, 0.02)
     near.set_ylim(-0.1, 0.1)
-    slow = [mode for mode in modes(_matrix(vehicle_parameters("paper_like"))) if mode.natural_frequency < 5.0]
-    rigid = sorted((p for p in _poles(vehicle_parameters("paper_like")) if abs(p) < 5.0), key=lambda p: -abs(p.real))
+    slow = [mode for mode in modes(_matrix(load_vehicle().coupled("paper_like"))) if mode.natural_frequency < 5.0]
+    rigid = sorted(
+        (p for p in _poles(load_vehicle().coupled("paper_like")) if abs(p) < 5.0), key=lambda p: -abs(p.real)
+    )
     for pole in rigid[:2]:
         whole.annotate(
             f"{pole.real:+.2f}", (pole.real, 0.0), (0, 8), textcoords="offset points", ha="center", fontsize=8
@@ -64,7 +67,7 @@ def draw(material: Material) -> Drawing:
     letter((whole, near))
     near.set_title("near the origin", loc="right")
     like, derived = ([f"{m.natural_frequency:.2f}" for m in elastic_modes(name).values()] for name, *_ in SETS)
-    share = vehicle_parameters("paper_like").inertial_coupling_1 / vehicle_parameters("derived").inertial_coupling_1
+    share = load_vehicle().coupling_scale("paper_like")
     fast = max(pole.real for pole in rigid)
     return Drawing(
         figure,

@@ -11,7 +11,7 @@ from hsv.study.figures.figure import Drawing, Material, PaperFigure
 from hsv.study.figures.readings import peak_in_words
 from hsv.study.figures.style import BLUE, GREY, RED, new_figure
 from hsv.study.mode_peaks import elastic_modes, peak_falls
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 FREQUENCIES = np.logspace(0.7, 1.7, 3000)
 
@@ -19,7 +19,7 @@ FREQUENCIES = np.logspace(0.7, 1.7, 3000)
 def draw(material: Material) -> Drawing:
     """Draw elevator to pitch rate about both modes, with and without the design's filter, and its gain alone."""
     section = material.design("baseline").flown.notch
-    plain = pitch_rate_response(vehicle_parameters("paper_like"), FREQUENCIES)
+    plain = pitch_rate_response(load_vehicle().coupled("paper_like"), FREQUENCIES)
     filter_ = notch_response(section, FREQUENCIES)
     figure = new_figure(5.0)
     magnitude, phase = figure.subplots(2, 1, sharex=True)

@@ -33,7 +33,7 @@ def draw(material: Material) -> Drawing:
     drawn = []
     for system, label, style in (
         (extended_model(inputs, "paper_like", point), "ECM with its coupling", {"color": GREY, "linewidth": 0.8}),
-        (extended_model(inputs, "decoupled", point), "ECM, coupling ignored", {"color": RED}),
+        (extended_model(inputs, 0.0, point), "ECM, coupling ignored", {"color": RED}),
         (
             codesigned_model(inputs, point),
             "Codesigned polytopic LPV",

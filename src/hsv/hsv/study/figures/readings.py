@@ -10,11 +10,13 @@ from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.study.figures.figure import Material
 from hsv.study.mode_peaks import PeakFall
 from hsv.units import to_paper
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
+
+_LIMITS = load_vehicle().decoupled
 
 LIMITS = (
-    f"{INPUT_MINIMUM[0]:g} to {INPUT_MAXIMUM[0]:g} and {np.degrees(INPUT_MINIMUM[1]):g} deg to "
-    f"{np.degrees(INPUT_MAXIMUM[1]):g} deg"
+    f"{_LIMITS.input_minimum[0]:g} to {_LIMITS.input_maximum[0]:g} and {np.degrees(_LIMITS.input_minimum[1]):g} deg to "
+    f"{np.degrees(_LIMITS.input_maximum[1]):g} deg"
 )
 """Of both inputs."""
 

@@ -14,7 +14,9 @@ from matplotlib.lines import Line2D
 from hsv.simulation.metrics import FlightData
 from hsv.study.figures.style import GREY, letter, new_figure
 from hsv.units import to_paper
-from hsv.vehicle.envelope import INPUT_MAXIMUM, INPUT_MINIMUM
+from hsv.vehicle.vehicle import load_vehicle
+
+_LIMITS = load_vehicle().decoupled
 
 _FAULT: Any = {"color": GREY, "linewidth": 0.6, "linestyle": (0, (4, 3))}
 _LIMIT: Any = {"color": "black", "linewidth": 0.7, "linestyle": (0, (1, 1.5))}
@@ -85,7 +87,7 @@ ELASTIC = (
     Panel(r"$\dot\eta_2$ (slug$^{1/2}$ ft/s)", "kg^0.5 m/s", column(8)),
 )
 INPUTS = tuple(
-    Panel(label, unit, command(i), limits=(float(INPUT_MINIMUM[i]), float(INPUT_MAXIMUM[i])))
+    Panel(label, unit, command(i), limits=(float(_LIMITS.input_minimum[i]), float(_LIMITS.input_maximum[i])))
     for i, (label, unit) in enumerate(((r"$\Phi$", "1"), (r"$\delta_e$ (deg)", "rad")))
 )
 

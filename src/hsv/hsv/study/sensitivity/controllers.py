@@ -18,7 +18,8 @@ from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv.study.linear_loop import COUPLING_SCALES, critical_coupling, worst_growth
-from hsv.vehicle.parameters import VehicleParameters, uncertainty_bounds
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import load_vehicle
 
 PURPLE = "#7d3c98"
 
@@ -83,17 +84,17 @@ def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
 
     A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
     """
-    names = list(uncertainty_bounds())
+    names = list(load_vehicle().uncertainty)
     runs = hadamard(16)[:, 1 : 1 + len(names)]
     signs = np.vstack((runs, -runs))
-    bounds = np.array(list(uncertainty_bounds().values()))
+    bounds = np.array(list(load_vehicle().uncertainty.values()))
     over: list[Corner] = [{}, *(dict(zip(names, map(float, scale * row * bounds), strict=True)) for row in signs)]
     return over[:: max(1, round(coarseness))]
 
 
 def said_corners(over: Sequence[Corner]) -> str:
     """Return how many corners ``over`` holds beside the nominal vehicle, and of how many."""
-    return f"{len(over) - 1} of the {2 ** len(uncertainty_bounds())} corners"
+    return f"{len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"
 
 
 @cache

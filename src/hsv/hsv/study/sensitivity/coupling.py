@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,16 +25,17 @@ from hsv.study.sensitivity.controllers import (
 from hsv.study.sensitivity.flights_strip import draw_metric, legend, lost_where, widths
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.vehicle.parameters import paper_like_scale, vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
+
+PAPER_LIKE = load_vehicle().coupling_scale("paper_like")
+"""kappa of the paper-like set."""
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Fly and linearise every controller from kappa = 0, the decoupled model, on."""
     kappas = grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05, coarseness)
     over = corners_of(1.0, coarseness)
-    strips = sweep(
-        "coupling", {c: [Point(c.parameters(), over, float(k)) for k in kappas] for c in ALL}, folder, progress
-    )
+    strips = sweep("coupling", {c: [_point(c, float(k), over) for k in kappas] for c in ALL}, folder, progress)
     growths: dict[Controller, np.ndarray] = {}
     limits: dict[Controller, CouplingLimits] = {}
     for number, controller in enumerate(ALL):
@@ -55,9 +57,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     plain_log(axes[2])
     axes[2].set_xlabel(r"coupling $\kappa$ (0: decoupled, 1: derived from a beam model)")
     for axis in axes:
-        for kappa in (paper_like_scale(), 1.0):
+        for kappa in (PAPER_LIKE, 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[0].text(paper_like_scale() + 0.005, 1.32, "paper-like", color=GREY, fontsize=8)
+    axes[0].text(PAPER_LIKE + 0.005, 1.32, "paper-like", color=GREY, fontsize=8)
     axes[0].text(0.995, 1.32, "derived", color=GREY, fontsize=8, ha="right")
     letter(axes)
     legend(figure, shares=False)
@@ -81,17 +83,21 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
 def growth_over(controller: Controller, kappa: float, over: list[Corner]) -> list[float]:
     """Return the largest real part (1/s) of a controller's loop around each vehicle of ``over`` with ``kappa``."""
-    vehicle = vehicle_parameters("derived").with_coupling_scale(kappa)
+    vehicle = load_vehicle().coupled(kappa)
     return [growth(controller, vehicle.perturbed(corner)) for corner in over]
+
+
+def _point(controller: Controller, kappa: float, over: Sequence[Corner]) -> Point:
+    return Point({**controller.parameters(), "vehicle.model": "CM", "vehicle.coupling": repr(kappa)}, over)
 
 
 def _margin(limits: CouplingLimits) -> str:
     """Return in words how far the paper-like coupling is from the limit of the loop without notch."""
-    unstable = np.array(growth_over(WITHOUT_NOTCH, paper_like_scale(), list(limits.over))) >= 0.0
-    said = f"the paper-like coupling, κ = {paper_like_scale():.2f},"
+    unstable = np.array(growth_over(WITHOUT_NOTCH, PAPER_LIKE, list(limits.over))) >= 0.0
+    said = f"the paper-like coupling, κ = {PAPER_LIKE:.2f},"
     if limits.nominal is None:
         return f"{said} is below any limit of the {WITHOUT_NOTCH.label}"
-    share = paper_like_scale() / limits.nominal - 1.0
+    share = PAPER_LIKE / limits.nominal - 1.0
     side = "below" if share < 0.0 else "above"
     return (
         f"{said} lies {abs(100.0 * share):.1f} % {side} the limit of the {WITHOUT_NOTCH.label}, κ = "

@@ -15,6 +15,7 @@ from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_
 from hsv.study.sensitivity.controllers import corners_of, said_corners
 from hsv.study.sensitivity.study import Outcome, Progress, Study
 from hsv.units import to_paper
+from hsv.vehicle.vehicle import load_vehicle
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
@@ -62,6 +63,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
 
 def _shows(over: Sequence[Corner]) -> str:
+    selection = said_corners(fraction(load_vehicle().uncertainty))
     return (
         "The adjustable design made anew for each factor, and flown. (a) Rightmost pole of the linear sampled loop "
         "around the coupled vehicle, notch filter included, the worst of both ends of the step, before and after the "
@@ -72,7 +74,7 @@ def _shows(over: Sequence[Corner]) -> str:
         "for the nominal input about the target's trim, on the side with less of it, as a share of that at τ = 1 (eq. "
         "53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: integral of the "
         "error of altitude and velocity, nominal vehicle, as a share of that at τ = 1. (f) Attitude after the fault, "
-        f"from nominal: nominal vehicle, and the worst of {said_corners(fraction())}, another selection."
+        f"from nominal: nominal vehicle, and the worst of {selection}, another selection."
     )
 
 

@@ -21,7 +21,7 @@ from hsv.study.sensitivity.controllers import Controller, corners_of, growth, sa
 from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 SETS = (
     Controller("paper-like coupling", "case1", BLUE),
@@ -164,7 +164,7 @@ def _limits(coupled: Controller, over: list[Corner], centres: np.ndarray, depths
 
 
 def _growths(coupled: Controller, section: NotchSection, over: list[Corner]) -> list[float]:
-    vehicle = vehicle_parameters(load_scenario(coupled.scenario).vehicle.coupling)
+    vehicle = load_vehicle().coupled(load_scenario(coupled.scenario).vehicle.coupling)
     return [growth(coupled, vehicle.perturbed(corner), notch=[section]) for corner in over]
 
 

@@ -18,7 +18,7 @@ from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, package_digest
 from hsv.units import to_paper
-from hsv.vehicle.parameters import paper_like_scale, vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 PERIODS = {
     period: Controller(f"T = {period:g} s", "case1", color)
@@ -40,14 +40,14 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         for number, (name, notch) in enumerate(zip(FILTERS, (design.notch, ()), strict=True)):
             progress("sampling, linear loops", len(FILTERS) * done + number, len(FILTERS) * len(designs))
             loop = (design.feedback_gain, notch, period)
-            vehicles = [vehicle_parameters("derived").with_coupling_scale(float(kappa)) for kappa in kappas]
+            vehicles = [load_vehicle().coupled(float(kappa)) for kappa in kappas]
             growths[period, name] = np.array([[worst_growth(v.perturbed(c), *loop) for c in over] for v in vehicles])
             limits[period, name] = coupling_limits(*loop, over)
     progress("sampling, linear loops", len(growths), len(growths))
     along = {PERIODS[period]: [Point(_values(design), over)] for period, design in designs.items()}
     strips = sweep("sampling", along, folder, progress)
 
-    figure = new_figure(5.6)
+    figure, paper_like = new_figure(5.6), load_vehicle().coupling_scale("paper_like")
     axes = figure.subplots(2, 1, sharex=True)
     for axis, name in zip(axes, FILTERS, strict=True):
         for period, controller in PERIODS.items():
@@ -57,9 +57,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         axis.axhline(0.0, color="black", linewidth=0.6)
         axis.set_ylabel("largest real part (1/s)")
         axis.set_title(name, loc="right")
-        for kappa in (paper_like_scale(), 1.0):
+        for kappa in (paper_like, 1.0):
             axis.axvline(kappa, color=GREY, linewidth=0.6, linestyle=":")
-    axes[1].set_xlabel(rf"coupling $\kappa$ ({paper_like_scale():g}: paper-like, 1: derived)")
+    axes[1].set_xlabel(rf"coupling $\kappa$ ({paper_like:g}: paper-like, 1: derived)")
     axes[0].legend(loc="upper left")
     letter(axes)
     return Outcome(

@@ -31,11 +31,10 @@ _HALF_WIDTH = np.ones(5)
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a strip: flat parameters, the vehicles flown there, kappa in place of a named coupling set."""
+    """One point of a strip: flat parameters and the vehicles flown there."""
 
     values: Mapping[str, Any]
     over: Sequence[Corner]
-    coupling_scale: float | None = None
 
 
 def sweep(
@@ -59,9 +58,7 @@ def sweep(
             tables = []
             for index, point in enumerate(points):
                 progress(f"{name}, flights", done + index, total)
-                tables.append(
-                    fly_over(dict(point.values), point.over, _HALF_WIDTH, coupling_scale=point.coupling_scale)
-                )
+                tables.append(fly_over(dict(point.values), point.over, _HALF_WIDTH))
             strips[controller] = strip(tables)
             if controller.kept:
                 _keep(path, strips[controller])
@@ -71,7 +68,7 @@ def sweep(
 
 
 def _digest(points: Sequence[Point]) -> str:
-    flown = [[dict(point.values), [dict(corner) for corner in point.over], point.coupling_scale] for point in points]
+    flown = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
     text = json.dumps(flown, sort_keys=True, default=np.ndarray.tolist)
     return digest_of([text.encode(), code_digest().encode(), *map(file_bytes, _MEASURING)])
 

@@ -16,7 +16,6 @@ from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv.study.sensitivity.controllers import PURPLE
 from hsv.study.sensitivity.study import Progress
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
-from hsv.vehicle.parameters import vehicle_parameters
 
 FACTORS = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0)
 """By which a group is multiplied; 1: the baseline's own."""
@@ -80,7 +79,7 @@ class Variations:
         found = feedback_gain(
             polytope.A[:, :N_RIGID, :N_RIGID],
             polytope.B[:, :N_RIGID],
-            disturbance_columns(self.inputs, vehicle_parameters("decoupled")),
+            disturbance_columns(self.inputs),
             part.state_scale.array(),
             part.input_scale.array(),
             part.method,

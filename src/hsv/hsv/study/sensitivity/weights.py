@@ -37,7 +37,7 @@ from hsv.study.sensitivity.variations import (
     baseline_variations,
 )
 from hsv.units import to_paper
-from hsv.vehicle.parameters import vehicle_parameters
+from hsv.vehicle.vehicle import load_vehicle
 
 Strips = dict[Group, Strip]
 
@@ -106,7 +106,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
 
 def _growth(varied: Variations, gain: np.ndarray, notched: bool, over: list[Corner]) -> float:
-    vehicle, notch = vehicle_parameters("paper_like"), varied.flown.notch if notched else ()
+    vehicle, notch = load_vehicle().coupled("paper_like"), varied.flown.notch if notched else ()
     return max(worst_growth(vehicle.perturbed(corner), gain, notch, varied.flown.period) for corner in over)
 
 
