@@ -38,6 +38,7 @@ from hsv.cli.simulate import simulate
 from hsv.cli.study import study
 from hsv.cli.topic import topic
 from hsv.cli.trim import trim
+from hsv.cli.vehicles import vehicles
 from hsv.cli.verify import verify
 from hsv.cli.view import view
 from hsv.errors import HsvError, RunError, reason
@@ -61,6 +62,7 @@ for command in (
     verify,
     check,
     scenarios,
+    vehicles,
     simulate,
     run,
     prepare,

@@ -38,7 +38,7 @@ from hsv.vehicle.parameters import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, Ve
 GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""
 
-SHIPPED_VEHICLES = {"parker": "hsv.vehicle:parker.toml"}
+SHIPPED_VEHICLES = {name: f"hsv.vehicle:{name}.toml" for name in ("parker", "stiffened")}
 """The files of this library's by name, which a source tree knows as well; others are entry points."""
 
 DEFAULT_VEHICLE = "parker"

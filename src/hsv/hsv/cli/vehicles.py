@@ -1,0 +1,37 @@
+"""The command ``hsv vehicles``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+from hsv.cli.options import JsonOption
+from hsv.cli.output import console, print_json
+
+
+def vehicles(
+    show: Annotated[str, typer.Option(metavar="NAME", help="Print this one whole, a registered one or a file.")] = "",
+    json: JsonOption = False,
+) -> None:
+    """List the vehicles that are registered, or print one with everything that it takes from the one it extends.
+
+    Example: hsv vehicles --show stiffened
+    """
+    from hsv.vehicle.vehicle import load_vehicle, vehicle_names, vehicle_tables, vehicle_text
+
+    if show:
+        text = vehicle_text(show)
+        if json:
+            print_json(vehicle_tables(show))
+        else:
+            print(text, end="")
+        return
+    titles = {name: load_vehicle(name).title for name in vehicle_names()}
+    if json:
+        print_json(titles)
+        return
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))
