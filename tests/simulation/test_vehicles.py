@@ -9,7 +9,8 @@ from hsv.campaign.factors import factors_of, scenario_toml
 from hsv.control.tube_law import TubeStatusCode
 from hsv.errors import ScenarioError
 from hsv.simulation.assembly import assemble, assemble_flight, flight_parameters
-from hsv.simulation.closed_loop import controller_input, fly
+from hsv.simulation.blocks import steps
+from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_text
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -125,9 +126,7 @@ def test_a_number_couples_as_the_set_it_is():
 )
 def test_a_tube_is_certified_for_its_own_vehicle(design, changes, status):
     parts = assemble_flight(load_scenario("case1", SHORT | {"design": design} | changes))
-    state = parts.plant.reset().state
-    filtered, planned = parts.notch_filter.step(float(state[4])), parts.nominal_trajectory.step(state)
-    assert parts.controller.step(controller_input(0, state, filtered, planned)).status is status
+    assert next(steps(parts)).answer.status is status
 
 
 def test_input_limits_are_those_of_the_vehicle(folder):

@@ -16,7 +16,7 @@ from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.parameters import COEFFICIENT_UNITS, MODELS, VehicleParameters
 from hsv.vehicle.trim import Trim, trim
-from hsv.vehicle.vehicle import COUPLING_PARAMETER, Vehicle
+from hsv.vehicle.vehicle import COUPLING_PARAMETER, VEHICLE_PARAMETERS, Vehicle
 
 
 class FlightStatus(IntEnum):
