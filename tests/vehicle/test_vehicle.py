@@ -59,6 +59,12 @@ def test_coefficients_are_named_in_the_order_of_the_equations():
     ]
 
 
+def test_what_is_certain_is_not_varied():
+    tables = vehicle_tables("parker")
+    tables["rigid_body"]["mass"]["uncertainty"] = "0 %"
+    assert parse_vehicle(tables, "mine").uncertainty.keys() == load_vehicle().uncertainty.keys() - {"mass"}
+
+
 def test_units_are_those_of_ones_choice():
     tables = vehicle_tables("parker")
     tables["rigid_body"]["mass"]["value"] = "4378.1708811 kg"
@@ -81,8 +87,8 @@ WRONG = [
     ("wings", {}, "wings: unknown field, expected one of title, rigid_body, geometry, atmosphere"),
     ("title", 3, "title = 3: expected text"),
     ("lift.lift_alpha.value", "4.7 m", "lift.lift_alpha.value = '4.7 m': wrong unit"),
-    ("rigid_body.mass.uncertainty", "0 %", "rigid_body.mass.uncertainty = '0 %': expected above 0 and at most 90 %"),
-    ("rigid_body.mass.uncertainty", "95 %", "rigid_body.mass.uncertainty = '95 %': expected above 0"),
+    ("rigid_body.mass.uncertainty", "-1 %", "rigid_body.mass.uncertainty = '-1 %': expected 0 % to 90 %"),
+    ("rigid_body.mass.uncertainty", "95 %", "rigid_body.mass.uncertainty = '95 %': expected 0 % to 90 %"),
     ("elastic_modes.natural_frequency_1.value", "16 Hz", "elastic_modes.natural_frequency_1.value = '16 Hz': wrong"),
     (
         "envelope.altitude.minimum",

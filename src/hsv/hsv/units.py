@@ -70,16 +70,6 @@ def to_paper(value: float, unit: str) -> tuple[float, str]:
     return (value * factor(unit, paper) if paper != unit else value), paper
 
 
-def in_base_units(text: str) -> float:
-    """Return the quantity in ``text``, such as ``"300 slug"``, in SI base units and radians.
-
-    Raises:
-        ValueError, pint.UndefinedUnitError: The text is not a number and a unit.
-    """
-    number, unit = _number_and_unit(text)
-    return _scaled(number, _squared(unit)[0])
-
-
 def si_unit_of(text: object) -> str:
     """Return the SI unit of what a quantity is written in, ``"1"`` where there is no unit or no such quantity."""
     import pint

@@ -310,6 +310,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
         table = _table(text, name)
         for field, value in changes.items():
             set_field(table, field, value, name)
+            table = _with_named_vehicle(table, name)
             if field == "vehicle.name":
                 table["vehicle"].pop("definition", None)
         if changes.keys() & {"controller", "vehicle", "vehicle.name"}:

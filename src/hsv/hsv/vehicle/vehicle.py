@@ -335,12 +335,12 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
             if coefficient in POSITIVE and not coefficients[coefficient] > 0.0:
                 raise QuantityError(f"{field}.value = {row['value']!r}: expected above zero")
             if "uncertainty" in row:
-                uncertainty[coefficient] = _quantity(row, field, "uncertainty", "1")
-                if not 0.0 < uncertainty[coefficient] <= LARGEST_UNCERTAINTY:
-                    raise QuantityError(
-                        f"{field}.uncertainty = {row['uncertainty']!r}: expected above 0 and at most "
-                        f"{100 * LARGEST_UNCERTAINTY:g} %"
-                    )
+                bound = _quantity(row, field, "uncertainty", "1")
+                if not 0.0 <= bound <= LARGEST_UNCERTAINTY:
+                    most = f"{100 * LARGEST_UNCERTAINTY:g} %"
+                    raise QuantityError(f"{field}.uncertainty = {row['uncertainty']!r}: expected 0 % to {most}")
+                if bound > 0.0:  # a vehicle that extends another says so of what it knows better
+                    uncertainty[coefficient] = bound
     if len(uncertainty) > MOST_UNCERTAIN:
         raise QuantityError(
             f"uncertainty: of {len(uncertainty)} coefficients, expected at most {MOST_UNCERTAIN}: a design flies every "

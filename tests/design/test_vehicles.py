@@ -1,0 +1,152 @@
+"""From a vehicle's file to a controller that is certified for it."""
+
+import json
+
+import pytest
+
+from hsv.control.design_file import read_design
+from hsv.control.tube_law import TubeStatusCode
+from hsv.design.inputs import find_inputs, read_inputs
+from hsv.design.region import corners, fraction
+from hsv.design.verification.verifier import load_subject, verify
+from hsv.errors import DesignError
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.blocks import steps
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.vehicle.plant import FlightStatus
+from hsv.vehicle.vehicle import load_vehicle
+
+VEHICLE = """extends = "stiffened"
+[rigid_body]
+mass = { value = "4600 kg" }
+[geometry]
+reference_area = { uncertainty = "0 %" }
+mean_aerodynamic_chord = { uncertainty = "0 %" }
+thrust_moment_arm = { uncertainty = "0 %" }
+[thrust]
+thrust_beta_1 = { uncertainty = "0 %" }
+thrust_beta_3 = { uncertainty = "0 %" }
+thrust_beta_5 = { uncertainty = "0 %" }
+[input_limits]
+elevator_deflection = { minimum = "-31 deg", maximum = "32 deg" }
+"""
+
+SMALL = """extends = "baseline_single_k"
+name = "small"
+vehicle = "mine.toml"
+[model]
+representation = "grid"
+[model.grid]
+altitude_vertices = 2
+velocity_vertices = 2
+[disturbance]
+coupling = 0.3
+duration = "8 s"
+fault_start = "4 s"
+share = 0.5
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A design's inputs beside the file of the vehicle that they name."""
+    (tmp_path / "inputs").mkdir()
+    (tmp_path / "inputs" / "mine.toml").write_text(VEHICLE)
+    (tmp_path / "inputs" / "small.toml").write_text(SMALL)
+    return tmp_path
+
+
+def holds(path, quick=False):
+    return all(claim.ok for claims in verify(load_subject(path), quick).values() for claim in claims)
+
+
+def designed(hsv, monkeypatch, source, target):
+    """Run ``hsv design`` from another folder than that of the inputs."""
+    words = ["hsv", "design", str(source), "--out", str(target)]
+    monkeypatch.chdir(target.parent)
+    monkeypatch.setattr("sys.argv", words)
+    with pytest.raises(SystemExit) as ended:
+        hsv()
+    assert not ended.value.code
+
+
+@pytest.fixture
+def hsv():
+    from hsv.cli.main import main
+
+    return main
+
+
+def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):
+    design, source = folder / "small.yaml", folder / "inputs" / "small.toml"
+    designed(hsv, monkeypatch, source, design)
+    mine = load_vehicle(str(folder / "inputs" / "mine.toml"))
+    found = read_design(design)
+    assert found.vehicle == mine.digest != ""
+    assert found.coupling == "0.3"
+    assert found.input_maximum.tolist() == mine.decoupled.input_maximum.tolist()
+    flown = {"design": str(design), "vehicle": str(folder / "inputs" / "mine.toml"), "vehicle.coupling": 0.3}
+    short = {"duration": "4 s", "fault": [], "limits": {}}
+    parts = assemble_flight(load_scenario("case1", flown | short))
+    assert next(steps(parts)).answer.status is TubeStatusCode.OK
+    # Whoever verifies has the certificate alone.
+    for path in (folder / "inputs").iterdir():
+        path.unlink()
+    assert holds(design, quick=True)
+    certificate = design.with_suffix(".certificate.json")
+    report = json.loads(certificate.read_text())
+    assert report["inputs"]["vehicle"]["vehicle.mass"] == 4600.0
+    report["inputs"]["vehicle"]["vehicle.mass"] = 4700.0
+    certificate.write_text(json.dumps(report))
+    failed = {claim.name for part in verify(load_subject(design), True).values() for claim in part if not claim.ok}
+    assert "design.vehicle" in failed
+    assert any(name.startswith("model.a from the vehicle") for name in failed)
+
+
+@pytest.mark.long
+def test_the_second_vehicle_comes_from_its_file_to_a_certified_controller_that_flies(hsv, tmp_path, monkeypatch):
+    design = tmp_path / "stiffened.yaml"
+    designed(hsv, monkeypatch, "stiffened", design)
+    assert holds(design)
+    flight = fly(assemble_flight(load_scenario("case1_stiffened", {"design": str(design)})))
+    assert flight.status is FlightStatus.FINISHED
+    limits = load_scenario("case1_stiffened").limits
+    assert all(abs(flight.metrics[name]) <= limit for name, limit in limits.items())
+
+
+def test_the_default_vehicle_by_name_changes_nothing(folder):
+    (folder / "inputs" / "named.toml").write_text('extends = "baseline"\nvehicle = "parker"\n')
+    named, plain = read_inputs(folder / "inputs" / "named.toml"), read_inputs(find_inputs("baseline"))
+    assert named.model_dump_json(exclude_none=True) == plain.model_dump_json(exclude_none=True)
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, stiffened"),
+        ('vehicle = "gone.toml"', "gone.toml': cannot be read (No such file or directory), expected a TOML file"),
+        ("vehicle = 3", "vehicle = 3: expected a name or a path"),
+        (
+            '[disturbance]\ncoupling = "strong"',
+            "disturbance.coupling = 'strong': expected one of paper_like, derived, or",
+        ),
+        ("[disturbance]\ncoupling = -1", "disturbance.coupling = '-1.0': expected one of paper_like, derived, or"),
+        ("[disturbance]\ncoupling = true", "disturbance.coupling = True: input should be a valid string"),
+    ],
+)
+def test_a_wrong_vehicle_of_a_design_is_named(folder, own, message):
+    path = folder / "inputs" / "wrong.toml"
+    path.write_text(f'extends = "baseline"\n{own}\n')
+    with pytest.raises(DesignError) as caught:
+        read_inputs(path)
+    assert message in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_a_quarter_of_the_corners_is_measured_from_ten_uncertain_parameters_on():
+    names = [name for name, _ in zip(load_vehicle().decoupled._fields, range(12), strict=False)]
+    for n, flown in ((0, 1), (3, 8), (9, 512), (10, 256), (12, 1024)):
+        bounds = dict.fromkeys(names[:n], 0.1)
+        rows = fraction(bounds)
+        assert len(rows) == 1 + flown and rows[0] == {}
+        assert all(row in corners(bounds) for row in rows[:5])
