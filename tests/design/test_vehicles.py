@@ -79,6 +79,8 @@ def hsv():
 
 
 def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):
+    # Random sequences, which say nothing of vehicles, take most of a small design's time.
+    monkeypatch.setattr("hsv.design.tube.SEQUENCES", 1000)
     design, source = folder / "small.yaml", folder / "inputs" / "small.toml"
     designed(hsv, monkeypatch, source, design)
     mine = load_vehicle(str(folder / "inputs" / "mine.toml"))

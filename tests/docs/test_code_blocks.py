@@ -1,6 +1,7 @@
 """The Python code on pages of the documentation runs, block after block, as a reader would type it."""
 
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -8,9 +9,24 @@ import matplotlib
 import pytest
 
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = ["python.md"]
+PAGES = ["python.md", "vehicle.md"]
 MODULES = {"python.md": ("mine", "class Mine")}
 """Pages that tell to put a block into a module: its name, and what the block has in it."""
+
+
+def blocks(page, language):
+    text = (DOCS / page).read_text(encoding="utf-8")
+    found = re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    assert found
+    return found
+
+
+def write_files(page, folder):
+    """Write the blocks of a page that begin with the name of a file."""
+    for block in blocks(page, "toml"):
+        name = re.match(r"# (\w+\.toml)\n", block)
+        assert name
+        (folder / name[1]).write_text(block, encoding="utf-8")
 
 
 @pytest.mark.parametrize("page", PAGES)
@@ -18,14 +34,27 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
     matplotlib.use("agg")
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    blocks = re.findall(r"^```python\n(.*?)^```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
-    assert blocks
-    module, mark = MODULES[page]
-    [own] = [block for block in blocks if mark in block]
-    Path(f"{module}.py").write_text(own, encoding="utf-8")
+    code = blocks(page, "python")
+    if page in MODULES:
+        module, mark = MODULES[page]
+        [own] = [block for block in code if mark in block]
+        Path(f"{module}.py").write_text(own, encoding="utf-8")
+    else:
+        write_files(page, tmp_path)
     names: dict[str, object] = {}
-    for block in blocks:
+    for block in code:
         exec(compile(block, page, "exec"), names)
-    sys.modules.pop(module, None)
-    assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"\)', "".join(blocks)))
+    if page in MODULES:
+        sys.modules.pop(module, None)
+    assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"\)', "".join(code)))
     assert names["flight"].status.name == "FINISHED"
+
+
+@pytest.mark.long
+def test_commands_of_the_page_take_a_vehicle_from_its_file_to_a_certified_flight(tmp_path):
+    write_files("vehicle.md", tmp_path)
+    commands = re.findall(r"^    (hsv .*)$", (DOCS / "vehicle.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [command.split()[1] for command in commands[-3:]] == ["design", "verify", "simulate"]
+    for command in commands:
+        ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
+        assert ran.returncode == 0, f"{command}: {ran.stderr}"
