@@ -186,6 +186,7 @@ class ForeignController(Controller):
     def __init__(self, name: str, controller: Any, vehicle: VehicleParameters) -> None:
         """Call the ``controller`` by its ``name`` in errors, and keep to the input limits of ``vehicle``."""
         self.name = name
+        self.vehicle = vehicle
         self._minimum, self._maximum = vehicle.input_minimum, vehicle.input_maximum
         self._controller = controller
         self.kernel: StepKernel | None = getattr(controller, "kernel", None)

@@ -30,6 +30,8 @@ from hsv.control.library_process import LibraryUser, library_user
 from hsv.control.notch_filter import NotchFilter
 from hsv.errors import ControllerError, HsvError, ParameterError, ProcessError, reason
 from hsv.parameters import check_all
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import Vehicle
 
 
 def library_place(controller: str) -> tuple[Path, str] | None:
@@ -145,7 +147,8 @@ class LibraryClass:
             states = 2 * len(NotchFilter.from_parameters(values).sections)
             _check_signals("inputs", self.block.inputs, (*CONTROLLER_INPUTS, filter_state_signal(states)))
         numbers = np.concatenate([np.ravel(own[parameter.name]) for parameter in self.PARAMETERS] or [np.zeros(0)])
-        return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers)
+        vehicle = Vehicle.from_parameters(values).decoupled
+        return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
 
 def _expected_inputs(block: Block) -> tuple[Signal, ...]:
@@ -168,8 +171,16 @@ def _words(signal: Signal) -> str:
 class LibraryController(ForeignController):
     """A controller in a shared library. In flight as in single steps, its function is called by the child process."""
 
-    def __init__(self, name: str, path: Path, symbol: str, state_size: int, parameters: np.ndarray) -> None:
-        super().__init__(name, None)
+    def __init__(
+        self,
+        name: str,
+        path: Path,
+        symbol: str,
+        state_size: int,
+        parameters: np.ndarray,
+        vehicle: VehicleParameters,
+    ) -> None:
+        super().__init__(name, None, vehicle)
         self.path, self.symbol, self.parameters = path, symbol, parameters
         self._state = np.zeros(state_size)
 
@@ -181,7 +192,7 @@ class LibraryController(ForeignController):
     def loaded(self, address: int) -> ForeignController:
         """Return the same where the library is loaded, with its function at an address."""
         kernel = StepKernel(address, np.zeros_like(self._state), self.parameters)
-        return ForeignController(self.name, SimpleNamespace(kernel=kernel))
+        return ForeignController(self.name, SimpleNamespace(kernel=kernel), self.vehicle)
 
     def reset(self) -> None:
         """Start a new run."""
