@@ -16,7 +16,7 @@ from hsv.vehicle.vehicle import load_vehicle
 DESIGN = read_design(find_design("baseline"))
 DATA = nominal_data(DESIGN)
 START, REFERENCE = trim(load_vehicle().coupled(), 26060.4, 2407.92), trim(load_vehicle().coupled(), 26243.28, 2484.12)
-TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period)
+TRAJECTORY = ReferenceTrajectory([0.0], [26243.28], [2484.12], DESIGN.period, load_vehicle().decoupled)
 STEP = START.state - REFERENCE.state
 
 

@@ -13,7 +13,7 @@ from hsv.vehicle.vehicle import load_vehicle
 
 VEHICLE, PERIOD = load_vehicle().decoupled, 0.02
 LOW, HIGH = (26060.4, 2407.92), (26243.28, 2484.12)
-RAMP = ((20.0, 80.0), (LOW[0], HIGH[0]), (LOW[1], HIGH[1]), PERIOD)
+RAMP = ((20.0, 80.0), (LOW[0], HIGH[0]), (LOW[1], HIGH[1]), PERIOD, VEHICLE)
 
 
 def along(trajectory, steps):
@@ -23,7 +23,7 @@ def along(trajectory, steps):
 
 
 def test_a_step_at_the_start_is_one_equilibrium_without_defect():
-    trajectory = ReferenceTrajectory([0.0], [HIGH[0]], [HIGH[1]], PERIOD)
+    trajectory = ReferenceTrajectory([0.0], [HIGH[0]], [HIGH[1]], PERIOD, VEHICLE)
     state, inputs, defect = along(trajectory, 100)
     expected = trim(VEHICLE, *HIGH)
     assert len(trajectory.data.state) == 1
@@ -63,7 +63,7 @@ def test_the_defect_is_what_the_nominal_vehicle_does_not_fly_by_itself(kind):
 
 
 def test_of_two_equal_times_the_later_value_holds_from_there_on():
-    trajectory = ReferenceTrajectory([5.0, 5.0], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD)
+    trajectory = ReferenceTrajectory([5.0, 5.0], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD, VEHICLE)
     state, _, defect = along(trajectory, 300)
     assert_array_equal(state[249], trim(VEHICLE, *LOW).state)
     assert_array_equal(state[250], trim(VEHICLE, *HIGH).state)
@@ -72,10 +72,10 @@ def test_of_two_equal_times_the_later_value_holds_from_there_on():
 
 
 def test_a_time_that_is_no_step_is_met_by_the_next_one():
-    state, *_ = along(ReferenceTrajectory([0.03, 0.03], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD), 5)
+    state, *_ = along(ReferenceTrajectory([0.03, 0.03], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD, VEHICLE), 5)
     assert state[:, 0].tolist() == [LOW[0], LOW[0], HIGH[0], HIGH[0], HIGH[0]]
     # 0.06 / 0.02 is not 3 in floating point.
-    state, *_ = along(ReferenceTrajectory([0.06, 0.06], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD), 5)
+    state, *_ = along(ReferenceTrajectory([0.06, 0.06], [LOW[0], HIGH[0]], [LOW[1], HIGH[1]], PERIOD, VEHICLE), 5)
     assert state[:, 0].tolist() == [LOW[0], LOW[0], LOW[0], HIGH[0], HIGH[0]]
 
 

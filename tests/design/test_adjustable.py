@@ -57,7 +57,7 @@ def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
 
 def test_set_is_invariant_under_every_factor_that_is_certified(subject):
     found = certified_set(subject)
-    design, model = subject.design, channel_model(subject.design)
+    design, model = subject.design, channel_model(subject.design, subject.vehicle)
     # The inequality is linear in vertices and multipliers: between the two factors those between theirs prove it.
     least, one = np.split(found.multipliers, 2)
     for tau, multipliers in ((0.8, least), (0.87, 0.65 * least + 0.35 * one), (1.0, one)):
@@ -81,7 +81,7 @@ def test_set_is_invariant_under_every_factor_that_is_certified(subject):
 
 def test_room_at_one_is_that_of_the_whole_feedback(stored, subject):
     tube, design = subject.certificate["tube"], subject.design
-    smaller = room_at_one(dataclasses.replace(design, tau_minimum=np.full(5, 0.9)), tube)
+    smaller = room_at_one(dataclasses.replace(design, tau_minimum=np.full(5, 0.9)), load_vehicle(), tube)
     assert_allclose(smaller, stored["room_at_one"])
     at_least = np.minimum(tube["tightening"]["plan"]["margin_to_lower"], tube["tightening"]["plan"]["margin_to_upper"])
     assert np.all(smaller < at_least)
@@ -115,11 +115,11 @@ def test_nominal_bounds_grow_with_the_room(stored, subject):
         relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), narrow, wide)
     with pytest.raises(DesignError, match=r"U minus F' Z': .* expected room above zero"):
         relaxed_bound(np.array([0.25, 0.19]), np.array([0.15, 0.2]), wide, narrow)
-    assert np.all(room_at_one(design, subject.certificate["tube"]) > 0.0)
+    assert np.all(room_at_one(design, subject.vehicle, subject.certificate["tube"]) > 0.0)
 
 
 def test_one_lyapunov_function_for_all_certified_loops(subject):
-    loops = certified_loops(subject.design, 0.9)
+    loops = certified_loops(subject.design, subject.vehicle, 0.9)
     assert len(loops) == 6 * 2 * 2
     N = np.array(subject.certificate["adjustable"]["lyapunov"]["N"])
     factor = np.linalg.cholesky(N)
@@ -138,7 +138,7 @@ def test_stable_loops_without_a_common_function_are_refused():
 
 
 def test_union_keeps_the_first_feedback(subject):
-    problem = tube_problem(subject.design, certified_set(subject).problem.disturbance)
+    problem = tube_problem(subject.design, subject.vehicle, certified_set(subject).problem.disturbance)
     both = union(problem.system, problem.system)
     assert len(both.A) == 2 * len(problem.system.A)
     assert both.F is problem.system.F

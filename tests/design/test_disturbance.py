@@ -20,7 +20,7 @@ def flight(subject):
 
 
 def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
-    model = channel_model(subject.design)
+    model = channel_model(subject.design, subject.vehicle)
     signals = model.signals(record(flight))
     a, lost, rest = signals.channels[:, :3], signals.channels[:, 3], signals.channels[:, 5:]
     for k in (0, 100, 4999, 5000, 5150):
@@ -33,7 +33,7 @@ def test_channels_rebuild_the_disturbance_of_the_rigid_states(flight, subject):
 
 
 def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
-    lost = channel_model(subject.design).signals(record(flight)).channels[:, 3]
+    lost = channel_model(subject.design, subject.vehicle).signals(record(flight)).channels[:, 3]
     assert np.all(lost[:5000] == 0.0)
     assert_allclose(lost[5000:], -0.1 * flight.history.command[5000:-1, 1], rtol=1e-12)
 
@@ -41,7 +41,7 @@ def test_the_fault_is_one_tenth_of_the_total_elevator(flight, subject):
 def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
     """One step of the convex combination of vertices from the true error gives the next one, notch states included."""
     design = subject.design
-    model = channel_model(design)
+    model = channel_model(design, load_vehicle())
     errors = tube_errors(flight.history.state, flight.history.deviation, flight.reference, model.notch)
     channels = model.signals(record(flight)).channels
     ones = DisturbanceSet(-np.ones(7), np.ones(7))
@@ -50,7 +50,7 @@ def test_the_error_system_predicts_the_error_of_a_flight(flight, subject):
         A, B = design.polytope.at(h, v)
         local = dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
         local = dataclasses.replace(design, polytope=local)
-        system = tube_problem(local, ones).system
+        system = tube_problem(local, load_vehicle(), ones).system
         predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
         assert_allclose(predicted, errors[k + 1], rtol=0.0, atol=1e-11)
 

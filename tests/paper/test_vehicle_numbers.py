@@ -61,7 +61,7 @@ def test_trim_does_not_depend_on_inertial_coupling():
     ],
 )
 def test_coupled_poles(kappa, expected):
-    found = lightly_damped(load_vehicle().coupled().with_coupling_scale(kappa))
+    found = lightly_damped(load_vehicle().coupled(kappa))
     assert [(round(frequency, 2), round(damping, 4)) for frequency, damping in found] == expected
 
 
@@ -109,7 +109,7 @@ def test_unstable_pole_over_the_envelope():
 
 
 def test_first_mode_falls_with_coupling():
-    found = [lightly_damped(load_vehicle().coupled().with_coupling_scale(k))[0][0] for k in np.linspace(0, 1.25, 6)]
+    found = [lightly_damped(load_vehicle().coupled(k))[0][0] for k in np.linspace(0, 1.25, 6)]
     assert all(stronger < weaker for weaker, stronger in pairwise(found))
 
 

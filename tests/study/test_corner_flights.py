@@ -29,7 +29,7 @@ def test_a_table_has_a_row_for_every_vehicle_in_order():
 def test_coupling_is_scaled_from_the_derived_set():
     derived = {**short("case1"), "vehicle.coupling": "derived"}
     named = fly_over(derived, [{}], HALF_WIDTH)
-    scaled = fly_over(short("case1"), [{}], HALF_WIDTH, coupling_scale=1.0)
+    scaled = fly_over(short("case1") | {"vehicle.coupling": "1.0"}, [{}], HALF_WIDTH)
     assert scaled["elevator_deflection_maximum"] == named["elevator_deflection_maximum"]
 
 

@@ -22,10 +22,8 @@ def test_a_loop_lost_at_once_or_never_has_no_crossing():
 
 
 def test_the_loop_changes_its_stability_at_the_limit():
-    derived = load_vehicle().coupled("derived")
-
     def over_coupling(kappa: float) -> float:
-        return growth(WITHOUT_NOTCH, derived.with_coupling_scale(kappa))
+        return growth(WITHOUT_NOTCH, load_vehicle().coupled(kappa))
 
     limit = stability_limit(over_coupling, np.arange(0.0, 1.0, 0.1))
     assert 0.2 < limit < 0.3

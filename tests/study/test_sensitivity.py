@@ -104,11 +104,10 @@ def test_coupling_limits_bracket_the_change_of_sign(controller, near):
     limits = coupling_limits(*feedback(controller), over)
     assert limits.nominal == pytest.approx(near, abs=0.01)
     assert limits.worst < limits.nominal
-    derived = load_vehicle().coupled("derived")
     for limit, vehicles in ((limits.nominal, over[:1]), (limits.worst, over)):
 
         def worst(kappa, vehicles=vehicles):
-            return max(growth(controller, derived.with_coupling_scale(kappa).perturbed(corner)) for corner in vehicles)
+            return max(growth(controller, load_vehicle().coupled(kappa).perturbed(corner)) for corner in vehicles)
 
         assert worst(limit - 1e-3) < 0.0 < worst(limit + 1e-3)
     assert f"κ = {limits.nominal:.2f} (nominal vehicle), {limits.worst:.2f} (worst of" in limits.said()
@@ -125,13 +124,14 @@ def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
 
 def test_a_strip_is_flown_once_and_found_again(tmp_path):
     told = []
-    points = {WITH_NOTCH: [Point(WITH_NOTCH.parameters(), corners_of(1.0, 32.0), kappa) for kappa in (0.0, 0.25)]}
+    values = [WITH_NOTCH.parameters() | {"vehicle.coupling": kappa} for kappa in ("0.0", "0.25")]
+    points = {WITH_NOTCH: [Point(value, corners_of(1.0, 32.0)) for value in values]}
     flown = sweep("test", points, tmp_path, quiet)
     found = sweep("test", points, tmp_path, lambda *what: told.append(what))
     assert found == flown
     assert told == [("test, flights", 2, 2)]
     assert flown[WITH_NOTCH]["finished"] == [1.0, 1.0]
-    other = {WITH_NOTCH: [Point(WITH_NOTCH.parameters(), corners_of(0.5, 32.0), 0.25)]}
+    other = {WITH_NOTCH: [Point(values[1], corners_of(0.5, 32.0))]}
     assert sweep("test", other, tmp_path, quiet) != flown
     assert len(list(tmp_path.iterdir())) == 1
 
