@@ -134,5 +134,5 @@ def test_results_do_not_change_afterwards():
     [("reference.altitudes", 30000.0), ("reference.velocities", 2484), ("reference.altitudes", math.nan)],
 )
 def test_a_wrong_reference_is_named(name, value):
-    with pytest.raises(ParameterError, match=rf"parameter {name}\[0\] = {value}: expected double array from"):
+    with pytest.raises(ParameterError, match=rf"parameter {name}\[0\] = {value}: expected double array"):
         nominal(**{name: [value]})
