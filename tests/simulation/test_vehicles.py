@@ -1,11 +1,13 @@
 """Flights of other vehicles: named in a scenario, read from beside it, taken along, not taken for certified."""
 
 import shutil
+import tomllib
 
 import numpy as np
 import pytest
+import tomli_w
 
-from hsv.campaign.factors import factors_of, scenario_toml
+from hsv.campaign.factors import factors_of, flown_table
 from hsv.control.tube_law import TubeStatusCode
 from hsv.errors import ScenarioError
 from hsv.simulation.assembly import assemble, assemble_flight, flight_parameters
@@ -91,18 +93,20 @@ def test_envelope_and_uncertainty_are_those_of_the_vehicle(folder):
         load_scenario(path, {"vehicle.perturbation.gravity": "4 %"})
     with pytest.raises(ScenarioError, match=r"vehicle.perturbation.lift_alpha = 0.04: no such parameter"):
         load_scenario("case1", {"vehicle.perturbation.lift_alpha": "4 %"})
-    bounds = {factor.name: factor.high for factor in factors_of(load_scenario(path), 1.0, {})}
+    bounds = {factor.name: factor.high for factor in factors_of(tomllib.loads(scenario_text(path)), "flight", 1.0, {})}
     assert bounds["mass"] == 0.05 and bounds["thrust_moment_arm"] == 0.02 and bounds["lift_alpha"] == 0.04
 
 
 def test_a_sampled_scenario_takes_its_vehicle_along(folder):
-    scenario = load_scenario(str(folder / "flight.toml"), {"vehicle.coupling": 0.65})
-    factors = factors_of(scenario, 1.0, {})
-    text = scenario_toml(scenario, factors, [factor.low for factor in factors])
+    table = tomllib.loads(scenario_text(str(folder / "flight.toml")))
+    table["vehicle"]["coupling"] = {"uniform": [0.2, 0.65]}
     (folder / "mine.toml").unlink()
-    sampled = parse_scenario(text, "sampled")
-    assert sampled.vehicle.described.digest == scenario.vehicle.described.digest
-    assert sampled.vehicle.coupling == "0.65" and sampled.vehicle.perturbation["mass"] == -0.05
+    factors = factors_of(table, "flight", 1.0, {})
+    for end, coupling in (("low", "0.2"), ("high", "0.65")):
+        text = tomli_w.dumps(flown_table(table, "flight", factors, [getattr(factor, end) for factor in factors]))
+        sampled = parse_scenario(text, "sampled").vehicle
+        assert sampled.described.decoupled.mass == 4600.0 and sampled.coupling == coupling
+        assert abs(sampled.perturbation["mass"]) == 0.05
 
 
 def test_a_number_couples_as_the_set_it_is():
@@ -159,6 +163,7 @@ def test_input_limits_are_those_of_the_vehicle(folder):
         ("[vehicle]\nname = 3", "vehicle.name = 3: expected a name or a path"),
         ("[vehicle]\ndefinition = 3", "vehicle.definition = 3: expected the tables of a vehicle file"),
         ("[vehicle]\ndefinition = { wings = 2 }", "vehicle 'parker': wings: unknown field, expected one of title"),
+        ("[vehicle]\ncoupling = { uniform = [-1, 1] }", "vehicle.coupling = -1.0: expected one of paper_like, derived"),
         ("[vehicle]\ncoupling = -1", "vehicle.coupling = -1: expected one of paper_like, derived, or a multiple of"),
     ],
 )
