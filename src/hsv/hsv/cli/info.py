@@ -65,7 +65,7 @@ def _print(description: dict[str, Any]) -> None:
         "fingerprint": in_words(description["fingerprint"], description["as_published"]),
         "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
         or "nothing",
-        "faults": _intervals(description["faults"], lambda f: f"{f['type']} {f['value']:g} of {f['channel']}, "),
+        "faults": _intervals(description["faults"], _fault),
         "saturation": _saturation(description["saturation"]),
         "tube": _tube(description["tube"]),
     }
@@ -83,6 +83,12 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
     if intervals is None:
         return "not recorded"
     return "; ".join(f"{name(i)}{_span(i)}" for i in intervals) or "none"
+
+
+def _fault(fault: dict[str, Any]) -> str:
+    from hsv.recording.info import parameters_in_words
+
+    return f"{fault['type']} {parameters_in_words(fault)} of {fault['channel']}, "
 
 
 def _span(interval: dict[str, Any]) -> str:

@@ -23,8 +23,8 @@ def fault_topic(bag: Bag) -> str:
 
 def saturation_topic(bag: Bag) -> str:
     """Return the topic whose field ``saturated`` says which inputs are limited in a step."""
-    moved = COMMAND in bag.roles and "saturated" in bag.columns(COMMAND)
-    return COMMAND if moved or TUBE_STATUS not in bag.roles else TUBE_STATUS
+    moved = FAULT_STATUS not in bag.roles or TUBE_STATUS not in bag.roles
+    return COMMAND if moved else TUBE_STATUS
 
 
 def fault_parameters(fault: dict[str, Any]) -> dict[str, float]:

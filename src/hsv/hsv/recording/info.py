@@ -103,6 +103,12 @@ def _faults(bag: Bag) -> list[dict[str, Any]]:
     return sorted(intervals, key=lambda interval: interval["start_s"])
 
 
+def parameters_in_words(fault: dict[str, Any]) -> str:
+    """Return the parameters of a described fault: the value of a single one, names and values of several."""
+    given = fault["parameters"]
+    return ", ".join(f"{f'{name} ' if len(given) > 1 else ''}{value:g}" for name, value in given.items())
+
+
 def _saturation(bag: Bag) -> dict[str, Any]:
     saturated = bag.columns(saturation_topic(bag))["saturated"]
     return {

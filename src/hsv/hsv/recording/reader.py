@@ -16,7 +16,7 @@ from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.graph.description import OTHER_TOPICS, ROOT, TOPICS, resolved
+from hsv.graph.description import ROOT, TOPICS, resolved
 from hsv.recording.columns import Columns
 from hsv.recording.files import find_files, read_file, read_message
 from hsv.recording.metadata import (
@@ -29,7 +29,7 @@ from hsv.recording.metadata import (
     parsed,
     read_metadata,
 )
-from hsv.recording.roles import namespace_of, roles
+from hsv.recording.roles import KINDS, namespace_of, roles
 from hsv.recording.scan import MESSAGE_HEADER, Damage, Scan, content
 from hsv.recording.topic import Qos
 from hsv.recording.track import Track
@@ -37,7 +37,7 @@ from hsv.recording.typestore import message_types
 
 _OURS = "/hsv/"
 """In the names of this project's topics, unless they are remapped."""
-_USUAL = {resolved(role): kind for role, kind in (TOPICS | OTHER_TOPICS).items()}
+_USUAL = {resolved(role): kinds for role, kinds in KINDS.items()}
 """Types of the topics of a graph by the names that they have unless they are moved or remapped."""
 _STAMP_START, _STAMP_END = 4, 12
 """Where the messages of a step carry their stamp: seconds and nanoseconds, of four bytes each."""
@@ -381,8 +381,8 @@ class Bag:
             return
         if schema is None or not decodable:
             raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
-        if schema.name != (expected := _USUAL.get(name, schema.name)):
-            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
+        if schema.name not in (expected := _USUAL.get(name, (schema.name,))):
+            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected[0]}")
         first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
         if (schema.name, schema.data) != (first.name, first.data):
             raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")

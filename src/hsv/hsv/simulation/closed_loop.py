@@ -83,14 +83,14 @@ class History(NamedTuple):
     @classmethod
     def over(cls, memory: np.ndarray, rows: int) -> History:
         """Return ``rows`` steps that lie in ``memory``, one column after the other."""
-        cuts = np.cumsum([rows * max(width, 1) for width in _COLUMNS])
-        columns = zip(np.split(memory[: cuts[-1]], cuts[:-1]), _COLUMNS, strict=True)
+        ends = [*accumulate(rows * max(width, 1) for width in _COLUMNS)]
+        columns = zip(np.split(memory[: ends[-1]], ends[:-1]), _COLUMNS, strict=True)
         return cls(*(column.reshape(rows, width) if width else column for column, width in columns))
 
     @staticmethod
     def numbers() -> int:
         """Return how many numbers a step has."""
-        return sum(max(width, 1) for width in _COLUMNS)
+        return [*accumulate(max(width, 1) for width in _COLUMNS)][-1]
 
     def copy(self) -> History:
         """Return a copy, one column after the other in new memory."""

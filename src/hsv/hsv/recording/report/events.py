@@ -10,6 +10,7 @@ import numpy as np
 
 from hsv.graph.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
 from hsv.recording.former import saturation_topic
+from hsv.recording.info import parameters_in_words
 from hsv.recording.reader import Bag
 from hsv.recording.report.panels import INPUTS
 from hsv.recording.track import expecting_fields
@@ -63,10 +64,7 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
 def _faults(description: dict[str, Any]) -> Iterator[Event]:
     for fault in description["faults"] or ():
         channel = fault["channel"].replace("_", " ")
-        given = fault["parameters"]
-        named = {name: f"{name.replace('_', ' ')} " if len(given) > 1 else "" for name in given}
-        values = ", ".join(f"{named[name]}{value:.6g}" for name, value in given.items())
-        text = f"{channel}: {fault['type'].replace('_', ' ')} {values}"
+        text = f"{channel}: {fault['type'].replace('_', ' ')} {parameters_in_words(fault)}"
         yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
 
 
