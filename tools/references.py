@@ -12,6 +12,13 @@ import sys
 import tempfile
 from pathlib import Path
 
+from mcap.reader import make_reader
+
+from hsv.graph.description import ROSOUT
+from hsv.recording.reader import Bag
+from hsv.recording.topic import Topic
+from hsv.recording.writer import BagWriter
+
 ROOT = Path(__file__).resolve().parents[1]
 REFERENCES = ROOT / "bags" / "reference"
 LARGEST_TOTAL = 10_000_000
@@ -42,10 +49,7 @@ def main() -> int:
                 done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
                 if done.returncode:
                     return _refuse(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
-            for path in bag.iterdir():
-                if path.suffix not in (".mcap", ".yaml"):
-                    path.unlink()
-            made[scenario.stem] = bag
+            made[scenario.stem] = _without_paths(bag, Path(folder, "kept", scenario.stem))
         total = sum(path.stat().st_size for bag in made.values() for path in bag.iterdir())
         if total > LARGEST_TOTAL:
             return _refuse(f"the bags are {total} bytes together, expected at most {LARGEST_TOTAL}: shorten a scenario")
@@ -54,6 +58,26 @@ def main() -> int:
             bag.rename(REFERENCES / name)
     print(f"{len(made)} reference bags, {total / 1e6:.1f} MB: look at git diff --stat, then commit them")
     return 0
+
+
+def _without_paths(folder: Path, target: Path) -> Path:
+    """Write the bag in ``folder`` to ``target``, message by message, without the paths of this machine in its log."""
+    bag = Bag(folder)
+    topics = [Topic(t.name, t.type, bag.definition(t.name), t.type_hash, bag.qos(t.name)) for t in bag.topics.values()]
+    target.parent.mkdir(exist_ok=True)
+    writer = BagWriter(target, topics, bag.custom_data)
+    for name, data in bag.attachments.items():
+        writer.attach(name, bag.media_types[name], data)
+    with bag.path.open("rb") as stream:
+        for schema, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+            data = message.data
+            if channel.topic == ROSOUT:
+                log = bag.types.deserialize_cdr(data, schema.name)
+                log.file, log.msg = Path(log.file).name, log.msg.replace(str(folder), folder.name)
+                data = bytes(bag.types.serialize_cdr(log, schema.name))
+            writer.write(channel.topic, message.log_time, data)
+    writer.close()
+    return target
 
 
 def _refuse(reason: str) -> int:

@@ -7,6 +7,7 @@ from typing import Any
 
 from hsv_msgs.msg import Run
 
+from hsv.errors import RunError
 from hsv.graph.description import TOPICS, NodeDescription
 from hsv.graph.exchange import FILL, READ
 from hsv.simulation.blocks import Signals
@@ -50,7 +51,13 @@ class BlockNode(PeerNode):
         signals = self.signals
         for name, due in given.items():
             READ[name](due, signals)
-        self.advance(signals)
+        try:
+            self.advance(signals)
+        except RunError as error:
+            # Not raised: the executor would print a traceback.
+            self.get_logger().fatal(str(error))
+            self.finish(1)
+            return
         for fill, answer, publisher in self._answers:
             fill(signals, answer, message_class)
             publisher.publish(answer)
