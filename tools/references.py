@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from mcap.reader import make_reader
 
@@ -69,12 +70,13 @@ def _without_paths(folder: Path, target: Path) -> Path:
     for name, data in bag.attachments.items():
         writer.attach(name, bag.media_types[name], data)
     with bag.path.open("rb") as stream:
-        for schema, channel, message in make_reader(stream).iter_messages(log_time_order=False):
+        for _, channel, message in make_reader(stream).iter_messages(log_time_order=False):
             data = message.data
             if channel.topic == ROSOUT:
-                log = bag.types.deserialize_cdr(data, schema.name)
+                kind = bag.topics[ROSOUT].type
+                log: Any = bag.types.deserialize_cdr(data, kind)
                 log.file, log.msg = Path(log.file).name, log.msg.replace(str(folder), folder.name)
-                data = bytes(bag.types.serialize_cdr(log, schema.name))
+                data = bytes(bag.types.serialize_cdr(log, kind))
             writer.write(channel.topic, message.log_time, data)
     writer.close()
     return target
