@@ -41,6 +41,8 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
         (PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
         (PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
         (TUBE_MPC, "-p controller:=robust_mpc", ["controller = 'robust_mpc'", "expected tube_mpc"]),
+        (PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, stiffened"]),
+        (PLANT, "-p vehicle.coupling:=strong", ["vehicle.coupling = 'strong'", "expected one of paper_like, derived"]),
         (PLANT, "-r hsv/state", ["'-r hsv/state'"]),
         (PLANT, "-p duration", ["'-p duration'"]),
         (PLANT, "--nosuch", ["unknown ROS arguments", "--nosuch"]),
