@@ -107,6 +107,25 @@ def test_scenarios_lists_them_all(hsv):
     assert all(name in out for name in scenario_names())
 
 
+def test_vehicles_lists_them_all_and_shows_one_that_can_be_flown(hsv, tmp_path):
+    assert set(hsv("vehicles", "--json").json) == {"parker", "stiffened"}
+    assert all(name in hsv("vehicles").out for name in ("parker", "stiffened"))
+    (tmp_path / "mine.toml").write_text(hsv("vehicles", "--show", "stiffened").out)
+    table = hsv("vehicles", "--show", "mine.toml", "--json").json
+    assert table["rigid_body"]["mass"] == {"value": "318 slug", "symbol": "m", "uncertainty": "10 %"}
+    mine, shipped = (hsv("trim", "--vehicle", name, "--json").json for name in ("mine.toml", "stiffened"))
+    assert mine == shipped != hsv("trim", "--json").json
+
+
+def test_coupling_by_number_lies_between_the_named_sets(hsv):
+    def slowest(coupling):
+        poles = hsv("linearise", "--coupling", coupling, "--json").json["poles"]
+        return min(p["natural_frequency_rad_per_s"] for p in poles if p["natural_frequency_rad_per_s"] > 5.0)
+
+    assert slowest("derived") < slowest("0.65") < slowest("paper_like") < slowest("0")
+    assert slowest("0") == pytest.approx(16.02)
+
+
 @pytest.mark.parametrize("units", ["si", "paper"])
 def test_simulate_case1(hsv, units):
     ran = hsv("simulate", "case1", "--units", units, "--json")
@@ -192,6 +211,15 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
             "altitude = '85500 ft', velocity = '7900 ft/s', acceleration = '100 ft/s^2': trim needs fuel_equivalence",
         ),
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
+        (
+            ("trim", "--vehicle", "parkr"),
+            "vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file",
+        ),
+        (
+            ("linearise", "--vehicle", "absent.toml"),
+            "vehicle 'absent.toml': cannot be read (No such file or directory)",
+        ),
+        (("vehicles", "--show", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
         (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
         (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_derived"),
         (("simulate", "absent.toml"), "scenario 'absent.toml': cannot be read (No such file or directory)"),
