@@ -129,3 +129,13 @@ def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out
     campaign = plan(str(path), samples=40, scale=0.0)
     with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
         conduct(campaign, Store(out, campaign), OwnProcess())
+
+
+def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):
+    path = tmp_path / "drawn.toml"
+    text = 'title = ""\nduration = "2 s"\nvehicle = "stiffened"\n[initial]\naltitude = "85500 ft"\n'
+    path.write_text(text + 'velocity = "7900 ft/s"\n')
+    campaign = plan(str(path), samples=2)
+    sample = [factor.high for factor in campaign.factors]
+    assert campaign.flown(sample).vehicle.name == "stiffened"
+    assert campaign.flown(sample).vehicle.perturbation == {f.name: f.high for f in campaign.factors}

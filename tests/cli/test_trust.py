@@ -139,3 +139,13 @@ def test_a_section_of_one_node_brings_no_code(hsv, loaded, crafted):
     for words in ((), ("--rerun",), ("--node", "tube_mpc"), ("--trust",)):
         assert hsv("replay", bag, *words).code == 0
     assert not loaded()
+
+
+def test_no_vehicle_of_a_bag_is_read_from_another_file(hsv, flown, tmp_path):
+    (tmp_path / "secret.toml").write_text("secret = 1\n")
+    named = f'[vehicle]\nname = "{tmp_path / "secret.toml"}"\n'
+    scenario = flown.text("scenario.toml").replace("[vehicle]\n", named)
+    assert named in scenario
+    bag = str(changed_bag(flown.path, tmp_path / "bag", attachments={"scenario.toml": scenario.encode()}))
+    refused = hsv("conclude", bag, "--no-report")
+    assert refused.code == 2 and "secret.toml': expected a registered name, or a definition" in refused.error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -14,10 +13,10 @@ from typing import Any, Self
 import tomli_w
 
 from hsv.campaign.factors import Factor, check_factors, factors_of, flown_scenario, flown_table
-from hsv.control.library import library_digest, seen_from
+from hsv.control.library import library_digest
 from hsv.errors import CampaignError
 from hsv.simulation.assembly import assemble, blamed_on, design_parameters, scenario_parameters
-from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_text
+from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_table, scenario_text
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
@@ -50,7 +49,7 @@ class Campaign:
     @cached_property
     def table(self) -> dict[str, Any]:
         """The scenario as written."""
-        return tomllib.loads(self.scenario_text)
+        return scenario_table(self.scenario_text, self.scenario_name)
 
     @cached_property
     def scenario(self) -> Scenario:
@@ -65,16 +64,14 @@ class Campaign:
         """
         return flown_scenario(self.table, self.scenario_name, self.factors, sample)
 
-    def file(self, sample: Sequence[float], design: str | None = None) -> str:
-        """Return the scenario of the flight with a sample as a file for this folder, with errors as above.
+    def file(self, sample: Sequence[float], **replaced: str) -> str:
+        """Return the scenario of the flight with a sample as a file, with errors as above.
 
         Args:
             sample: One value a factor.
-            design: Name or path to put in the place of the design's.
+            replaced: Values to put in the place of the scenario's, by key.
         """
-        flown = flown_table(self.table, self.scenario_name, self.factors, sample)
-        named = {"controller": seen_from(self.scenario.controller, Path())} if "controller" in flown else {}
-        return tomli_w.dumps({**flown, **named, **({} if design is None else {"design": design})})
+        return tomli_w.dumps(flown_table(self.table, self.scenario_name, self.factors, sample) | replaced)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -162,7 +159,8 @@ def plan(
         CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
     """
     text = scenario_text(scenario_name)
-    table, name = tomllib.loads(text), Path(scenario_name).stem
+    name = Path(scenario_name).stem
+    table = scenario_table(text, name)
     scenario, _ = scenario_at_means(table, name)
     factors = factors_of(table, name, scale, ranges)
     if method not in METHODS:

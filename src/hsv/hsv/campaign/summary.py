@@ -130,14 +130,9 @@ class Results:
         row = self.row(flight)
         return {factor.name: row[f"sample_{factor.name}"] for factor in self.campaign.factors}
 
-    def file(self, flight: int, design: str | None = None) -> str:
-        """Return the scenario of a flight as a file that every command takes; errors as :meth:`row`.
-
-        Args:
-            flight: Number of the flight.
-            design: Name or path to put in the place of the design's.
-        """
-        return self.campaign.file(list(self.sample(flight).values()), design)
+    def file(self, flight: int, **replaced: str) -> str:
+        """Return the scenario of a flight as a file, with values ``replaced`` by key; errors as :meth:`row`."""
+        return self.campaign.file(list(self.sample(flight).values()), **replaced)
 
     def _read(self, **what: Any) -> pa.Table:
         try:

@@ -213,6 +213,7 @@ def scenario(
     from hsv.campaign.again import require_design
     from hsv.campaign.summary import Results
     from hsv.cli.targets import writing
+    from hsv.control.library import seen_from
     from hsv.errors import CampaignError
     from hsv.graph.parameter_sections import ParameterSections
 
@@ -221,7 +222,8 @@ def scenario(
         require_design(results)
     elif design.suffix != ".yaml":
         raise CampaignError(f"design = {str(design)!r}: expected a file that ends in .yaml")
-    text = results.file(flight, str(design) if design else None)
+    named = {"controller": seen_from(results.campaign.scenario.controller, Path())}
+    text = results.file(flight, **named, **({"design": str(design)} if design else {}))
     if design:
         check_target(design, "design")
         with writing(design, "design"):

@@ -20,14 +20,19 @@ def scenarios(
 
     Example: hsv scenarios --show case2_derived
     """
-    import tomllib
-
-    from hsv.simulation.scenario import load_scenario, scenario_at_means, scenario_names, scenario_text
+    from hsv.simulation.scenario import (
+        load_scenario,
+        scenario_at_means,
+        scenario_names,
+        scenario_table,
+        scenario_text,
+    )
 
     if show:
         text = scenario_text(show)
-        table = tomllib.loads(text)
-        scenario_at_means(table, Path(show).stem)
+        name = Path(show).stem
+        table = scenario_table(text, name)
+        scenario_at_means(table, name)
         if json:
             print_json(table)
         else:

@@ -214,9 +214,9 @@ def scenario_text(name: str) -> str:
         ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
     """
     text = _own_text(name)
-    own = _table(text, name)
+    own = scenario_table(text, name)
     whole = follow_extends(
-        name, lambda other: _located(_table(_own_text(other), other), other), _refused, REPLACED, KINDS
+        name, lambda other: _located(scenario_table(_own_text(other), other), other), _refused, REPLACED, KINDS
     )
     whole = _with_definition(whole, name)
     return text if whole == own else tomli_w.dumps(whole)
@@ -273,7 +273,12 @@ def _own_text(name: str) -> str:
     return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
 
-def _table(text: str, name: str) -> dict[str, Any]:
+def scenario_table(text: str, name: str) -> dict[str, Any]:
+    """Return the table of a scenario's ``text``, its vehicle a table in it.
+
+    Raises:
+        ScenarioError: It is no TOML, or the vehicle is none.
+    """
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -307,7 +312,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
     """
     text = scenario_text(name)
     if changes:
-        table = _table(text, name)
+        table = scenario_table(text, name)
         for field, value in changes.items():
             set_field(table, field, value, name)
             table = _with_named_vehicle(table, name)
@@ -341,7 +346,7 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
 
 def parse_scenario(text: str, name: str) -> Scenario:
     """Return the scenario written in ``text``, as :func:`scenario_text` returns it; errors as :func:`load_scenario`."""
-    scenario, drawn = scenario_at_means(_table(text, name), name)
+    scenario, drawn = scenario_at_means(scenario_table(text, name), name)
     if drawn:
         field = next(iter(drawn))
         raise ScenarioError(
@@ -354,9 +359,14 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     """Return the scenario in ``table`` with the mean of each distribution in its place, and these by field.
 
     Raises:
-        ScenarioError: As :func:`load_scenario`.
+        ScenarioError: As :func:`load_scenario`; or the vehicle is in another file: nothing is read from one.
     """
     whole = table
+    vehicle = table.get("vehicle", {})
+    if is_path(vehicle.get("name", "")) and "definition" not in vehicle:
+        raise ScenarioError(
+            f"scenario {name!r}: vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition"
+        )
     for key in ("name", "own"):
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
