@@ -10,6 +10,7 @@ from pyarrow import parquet
 from recorded_flight import record_flight
 
 from hsv.campaign.table import CAMPAIGN
+from hsv.vehicle.vehicle import vehicle_text
 
 MODULE = """
 from pathlib import Path
@@ -149,3 +150,18 @@ def test_no_vehicle_of_a_bag_is_read_from_another_file(hsv, flown, tmp_path):
     bag = str(changed_bag(flown.path, tmp_path / "bag", attachments={"scenario.toml": scenario.encode()}))
     refused = hsv("conclude", bag, "--no-report")
     assert refused.code == 2 and "secret.toml': expected a registered name, or a definition" in refused.error
+
+
+def test_parameters_of_a_bag_bring_no_vehicle_from_another_file(hsv, flown, tmp_path):
+    (tmp_path / "other.toml").write_text(vehicle_text("parker"))
+    parameters = yaml.safe_load(flown.text("scenario.yaml"))
+    everybodys = parameters["/**"]["ros__parameters"]
+    everybodys["vehicle.name"] = str(tmp_path / "other.toml")
+    files = {"scenario.yaml": yaml.safe_dump(parameters).encode()}
+    whole = str(changed_bag(flown.path, tmp_path / "whole", attachments=files))
+    assert hsv("replay", whole, "--node", "plant").code == 0
+    del everybodys["vehicle.mass"]
+    files = {"scenario.yaml": yaml.safe_dump(parameters).encode()}
+    lacking = str(changed_bag(flown.path, tmp_path / "lacking", attachments=files))
+    refused = hsv("replay", lacking, "--node", "plant")
+    assert refused.code == 2 and refused.error.startswith("vehicle 'other': expected one of ")

@@ -37,6 +37,7 @@ from hsv.recording.steps import cut_off, expected_stamps, joined
 from hsv.recording.track import expecting_fields
 from hsv.simulation.assembly import blamed_on
 from hsv.simulation.scenario import parse_scenario, scenario_text
+from hsv.vehicle.vehicle import vehicle_label
 
 DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 """Attachments: the parameters of the design and, over them, those of the scenario."""
@@ -97,8 +98,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
                 f"{bag.path}: no attachment {name}: ros2 bag record and convert keep none, expected --scenario "
                 "NAME|FILE and, where the flight had another design than the scenario's, --design FILE"
             )
-    attached = (ParameterSections.parse(bag.text(name), f"{bag.path}: {name}") for name in (DESIGN, SCENARIO))
-    designed, scenario = (sections.only(sections.names - _OF_THE_RUN) for sections in attached)
+    designed, scenario = (_attached(bag, name) for name in (DESIGN, SCENARIO))
     values = designed.overlaid(scenario)
     with expecting_fields(bag.path):
         try:
@@ -112,6 +112,15 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
     if design is not None:
         values = ParameterSections(read_design_parameters(design)).overlaid(scenario)
     return values.overlaid(ParameterSections({}, changed))
+
+
+def _attached(bag: Bag, name: str) -> ParameterSections:
+    """Return attached parameters of a flight; of a vehicle that was in a file, which is not read, what it is called."""
+    sections = ParameterSections.parse(bag.text(name), f"{bag.path}: {name}")
+    for flat in (sections.shared, *sections.own.values()):
+        if "vehicle.name" in flat:
+            flat["vehicle.name"] = vehicle_label(str(flat["vehicle.name"]))
+    return sections.only(sections.names - _OF_THE_RUN)
 
 
 def controller_of(values: ParameterSections) -> str:
