@@ -22,7 +22,7 @@ FORMAT = 1
 
 TABLE = "fingerprints.toml"
 
-_ROWS = 500
+_ROWS = 2000
 
 
 def fingerprint(
