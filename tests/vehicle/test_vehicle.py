@@ -183,6 +183,15 @@ def test_flat_parameters_are_the_whole_vehicle():
     assert heavier.digest not in ("", stiffened.digest)
 
 
+def test_no_path_in_parameters_is_followed(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "parker"\n')
+    with pytest.raises(ParameterError, match=r"parameter vehicle.mass: missing, expected that of the vehicle '.*mine"):
+        Vehicle.from_parameters({"vehicle.name": str(path)})
+    values = load_vehicle("stiffened").to_parameters() | {"vehicle.name": str(path)}
+    assert Vehicle.from_parameters(values).digest == load_vehicle("stiffened").digest
+
+
 def test_a_copy_under_another_name_is_the_same_vehicle():
     assert parse_vehicle(vehicle_tables("parker"), "copy").digest == ""
 

@@ -180,7 +180,10 @@ class Vehicle:
             ParameterError: A wrong value, named.
             VehicleError: Some are missing, and there is no vehicle of that name.
         """
-        if any(parameter.name not in values for parameter in VEHICLE_PARAMETERS):
+        if lacking := [parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in values]:
+            # Parameters may be data of somebody else's, as in a bag or a certificate: no path in them is followed.
+            if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
+                raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
             values = {**named_parameters(values), **values}
         v = {name.removeprefix("vehicle."): value for name, value in check_all(VEHICLE_PARAMETERS, values).items()}
         for name in POSITIVE:
