@@ -33,10 +33,11 @@ from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.fingerprint import as_published, fingerprint
 from hsv.simulation.scenario import load_scenario
+from hsv.vehicle.vehicle import load_vehicle
 
 DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable")}
 BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law")
-REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02)
+REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02, load_vehicle().decoupled)
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 each_design = pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)

@@ -19,7 +19,7 @@ from hsv.graph.description import TOPICS
 from hsv.recording.reader import Bag
 from hsv.replay.attached import flown_parameters
 from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes
+from hsv.replay.processes import processes_of
 
 pytestmark = pytest.mark.graph
 
@@ -38,7 +38,7 @@ def bag(shared_processes: Processes) -> Path:
 def test_replay_in_process_is_identical_in_every_byte(bag: Path) -> None:
     opened = Bag(bag)
     values = flown_parameters(opened)
-    results = [replay(opened, process, values, lambda *_: None) for process in processes("tube_mpc").values()]
+    results = [replay(opened, process, values, lambda *_: None) for process in processes_of("tube_mpc").values()]
     results += rerun(opened, "tube_mpc", values, lambda *_: None)
     assert len(results) == 10 and all(result.identical for result in results)
 

@@ -18,6 +18,7 @@ from hsv.control.design_file import find_design, read_design, write_design
 from hsv.recording.reader import Bag
 from hsv.replay.attached import complete_steps, flown_parameters
 from hsv.replay.engine import replay, rerun
+from hsv.replay.processes import processes_of
 
 pytestmark = pytest.mark.graph
 
@@ -69,7 +70,7 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     # Other nodes keep what they had: their design need not be certified for what the controller flew with.
     assert values.of("nominal_trajectory")["tau_change.starts"] == [2.0]
     assert values.of("tube_mpc")["tau_change.starts"] == pytest.approx([2.0, step * 0.02])
-    results = [replay(bag, processes("tube_mpc")["tube_mpc"], values, lambda *_: None)]
+    results = [replay(bag, processes_of("tube_mpc")["tube_mpc"], values, lambda *_: None)]
     # The graph repeats scheduled changes as the loop in process does: tests/graph/test_lockstep.py.
     values.shared["duration"] = complete_steps(bag) * values.shared["period"]
     results += rerun(bag, "tube_mpc", values, lambda *_: None)

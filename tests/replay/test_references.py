@@ -9,7 +9,7 @@ import pytest
 from hsv.recording.reader import Bag
 from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous
 from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes
+from hsv.replay.processes import processes_of
 from hsv.simulation.scenario import load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -37,7 +37,7 @@ def test_reference_bag_repeats(path: Path) -> None:
     refuse_vacuous(bag)
     values = flown_parameters(bag)
     controller = controller_of(values)
-    results = [replay(bag, process, values, lambda *_: None) for process in processes(controller).values()]
+    results = [replay(bag, process, values, lambda *_: None) for process in processes_of(controller).values()]
     results += rerun(bag, controller, values, lambda *_: None)
     differences = [f"{r.process.node.name}: {t.first}" for r in results for t in r.topics if t.first]
     assert not differences, (

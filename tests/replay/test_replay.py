@@ -17,7 +17,7 @@ from hsv.recording.reader import Bag
 from hsv.recording.track import Track
 from hsv.replay.attached import flown_parameters, refuse_vacuous
 from hsv.replay.engine import ProcessComparison, fly, replay, rerun
-from hsv.replay.processes import processes
+from hsv.replay.processes import processes_of
 
 CONTROLLER = "tube_mpc"
 
@@ -33,7 +33,7 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
 
 def replay_all(bag: Bag, design: Path | None = None) -> dict[str, ProcessComparison]:
     values = flown_parameters(bag, design)
-    return {name: replay(bag, process, values, quiet) for name, process in processes(CONTROLLER).items()}
+    return {name: replay(bag, process, values, quiet) for name, process in processes_of(CONTROLLER).items()}
 
 
 def tampered(bag: Bag, path: Path, change: Callable[[dict[str, Track]], None]) -> Bag:
@@ -45,7 +45,7 @@ def tampered(bag: Bag, path: Path, change: Callable[[dict[str, Track]], None]) -
 
 def test_table_describes_every_node_of_every_graph() -> None:
     for controller in CONTROLLERS:
-        found = processes(controller)
+        found = processes_of(controller)
         assert set(found) == {node.name for node in graph(controller) if node is not RECORDER}
         outputs = [topic for process in found.values() for topic in process.outputs]
         assert sorted(outputs) == sorted(TOPICS)
@@ -155,7 +155,7 @@ def test_tau_changed_in_flight_is_repeated_from_what_was_recorded(tmp_path: Path
     values = flown_parameters(bag)
     assert values.of("tube_mpc")["feedback.tau"] == [0.9] * 5
     assert values.of("tube_mpc")["tau_change.starts"] == pytest.approx([3.0, 7.02])
-    results = [replay(bag, process, values, quiet) for process in processes(CONTROLLER).values()]
+    results = [replay(bag, process, values, quiet) for process in processes_of(CONTROLLER).values()]
     assert all(result.identical for result in [*results, *rerun(bag, CONTROLLER, values, quiet)])
     # What was scheduled is no change in flight.
     again = Bag(write_bag(tmp_path / "scheduled", tracks, design, scenario | {"feedback.tau": [0.9]} | changes))

@@ -119,10 +119,9 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
     for package in wanted:
         package.stamp.unlink(missing_ok=True)
         package.exit_code.unlink(missing_ok=True)
-        if package.is_python:
-            # "develop" leaves the links of files that no longer exist.
-            shutil.rmtree(BUILD / package.name, ignore_errors=True)
-            shutil.rmtree(INSTALL / package.name, ignore_errors=True)
+        # Neither "develop" nor CMake takes away what was made of files that no longer exist, such as a message.
+        shutil.rmtree(BUILD / package.name, ignore_errors=True)
+        shutil.rmtree(INSTALL / package.name, ignore_errors=True)
     # Named here, because colcon's own choice also limits by load and crawls on a busy machine.
     jobs = f"-j{min(os.cpu_count() or 1, _JOBS_AT_MOST)}"
     own = {"PATH": f"{PYTHON.parent}{os.pathsep}{env['PATH']}", "MAKEFLAGS": jobs}

@@ -43,7 +43,7 @@ def replay(
     from hsv.recording.reader import Bag
     from hsv.replay import engine
     from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
-    from hsv.replay.processes import processes as processes_of
+    from hsv.replay.processes import processes_of
     from hsv.simulation.trust import require_trust
 
     opened = Bag(bag)

@@ -18,7 +18,7 @@ from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track, expecting_fields
 from hsv.replay.attached import broken_off, complete_steps
-from hsv.replay.processes import Process, processes
+from hsv.replay.processes import Process, processes_of
 
 Progress = Callable[[str, int, int], None]
 """Name of what is done, steps done, steps in all."""
@@ -128,7 +128,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     with expecting_fields(bag.path):
         commands = None if COMMAND in _published(controller) else bag.decode(COMMAND)
         tracks = fly(bag.types, controller, values, progress, str(bag.path), commands)
-    return [compare_process(bag, process, tracks) for process in processes(controller).values()]
+    return [compare_process(bag, process, tracks) for process in processes_of(controller).values()]
 
 
 def fly(
@@ -152,7 +152,7 @@ def fly(
     Raises:
         RecordingError: ``types`` lack a field, or commands are missing.
     """
-    flown = processes(controller)
+    flown = processes_of(controller)
     components = {name: process.block.build(values.of(name)) for name, process in flown.items()}
     made = {
         name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
@@ -179,7 +179,7 @@ def fly(
 
 
 def _published(controller: str) -> set[str]:
-    return {topic for process in processes(controller).values() for topic in process.outputs}
+    return {topic for process in processes_of(controller).values() for topic in process.outputs}
 
 
 def _next(commands: Iterator[tuple[int, Any]], source: str) -> Any:

@@ -12,7 +12,7 @@ from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag
 from hsv.replay.engine import ProcessComparison, Progress, compare_process, require
-from hsv.replay.processes import processes
+from hsv.replay.processes import processes_of
 
 
 def replay_all(
@@ -24,7 +24,7 @@ def replay_all(
         RecordingError: A topic that is needed is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
-    under_test = [processes(controller)[name] for name in names]
+    under_test = [processes_of(controller)[name] for name in names]
     for process in under_test:
         require(bag, (*process.inputs, *process.outputs))
     if not bag.messages(RUN):
@@ -59,7 +59,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
         run = {"recorder": True, "bag.directory": str(repeated)}
         _run(graph(controller), values.updated(run), Path(folder), PLANT.name, steps, progress)
         made = Bag(repeated)
-        for process in processes(controller).values():
+        for process in processes_of(controller).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
 

@@ -80,7 +80,7 @@ class Process:
             FILL[topic](signals, message, message_class)
 
 
-def processes(controller: str) -> dict[str, Process]:
+def processes_of(controller: str) -> dict[str, Process]:
     """Return the processes of a graph with ``controller``, by node, in the order in which a step passes through them.
 
     A controller that is a foreign node is none of them: nobody here can repeat what it did.
