@@ -64,6 +64,7 @@ def test_it_flies_without_a_design_and_holds_the_commands(hsv, example, altitude
     assert metrics["altitude_settling_time_s"] < 80.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("example", FLYABLE)
 def test_a_campaign_flies_it(hsv, example):
     words = ["montecarlo", str(EXAMPLES / example / "scenario.toml"), "--samples", "100", "--seed", "1", "--no-page"]
@@ -75,7 +76,9 @@ def test_a_campaign_flies_it(hsv, example):
     assert ended["within"] == 100
 
 
-@pytest.mark.parametrize("part", ["lqr", str(EXAMPLES / "compiled" / "scenario.toml")])
+@pytest.mark.parametrize(
+    "part", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "scenario.toml")]
+)
 def test_it_flies_the_same_bytes_every_time(hsv, part):
     ran = hsv("check", part, "--json")
     assert ran.returncode == 0, ran.stderr

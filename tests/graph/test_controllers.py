@@ -86,6 +86,7 @@ def test_qp_flies_as_in_process_and_leaving_the_tube_is_told(processes: Processe
     assert told["excursions"][0]["start_s"] == pytest.approx(0.02 * first)
 
 
+@pytest.mark.long
 def test_the_lmi_in_flight_depends_on_the_flight_alone(processes: Processes) -> None:
     scenario = _shortened(processes, "case1_kothare_online", 2.4, 2.2)
     first, second = _flown(processes, scenario, "first"), _flown(processes, scenario, "second", "--composed")

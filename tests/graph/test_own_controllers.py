@@ -66,7 +66,10 @@ def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
     return Bag(processes.folder / name)
 
 
-@pytest.mark.parametrize(("example", "place"), [("lqr", "hsv_lqr:Lqr"), ("compiled", "hsv_scheduled:Scheduled")])
+@pytest.mark.parametrize(
+    ("example", "place"),
+    [pytest.param("lqr", "hsv_lqr:Lqr", marks=pytest.mark.long), ("compiled", "hsv_scheduled:Scheduled")],
+)
 def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: str, place: str) -> None:
     path = scenario(processes.folder, example, f'controller = "{place}"')
     simulated = processes.run("hsv", "simulate", path)
