@@ -82,17 +82,25 @@ def test_a_topic_that_is_not_needed_may_be_missing(
     assert RESULTS[command] == [] or (tmp_path / RESULTS[command][-1]).is_file()
 
 
-@pytest.mark.parametrize("command", ["replay", "report", "plot", "export", "diff", "info"])
+@pytest.mark.parametrize("command", ["replay", "report", "plot", "export", "info"])
 def test_a_topic_that_is_needed_is_missing(
-    hsv: Hsv, bag: Path, without: Callable[[str], Path], tmp_path: Path, command: str
+    hsv: Hsv, without: Callable[[str], Path], tmp_path: Path, command: str
 ) -> None:
     partial = without("/hsv/command")
-    words = [*RESULTS.get(command, [str(bag)])]
+    words = RESULTS.get(command, [])
     ran = hsv(command, str(partial), *words, *(["--topic", "/hsv/command"] if command == "export" else []))
     assert ran.code == 2
     assert ran.error.startswith(f"{partial / 'partial_0.mcap'}: no topic /hsv/command, only /clock, ")
     assert [path.name for path in tmp_path.iterdir()] == ["partial"]
     assert (ran.out != "") is (command == "info"), "what else is in it helps to find out why"
+
+
+def test_a_topic_of_one_bag_alone_is_told_and_the_rest_compared(
+    hsv: Hsv, bag: Path, without: Callable[[str], Path]
+) -> None:
+    ran = hsv("diff", str(bag), str(without("/hsv/tube_status")))
+    assert ran.code == 1
+    assert ran.out.splitlines() == [f"/hsv/tube_status is in {Bag(bag).path} only", "4808 messages: identical"]
 
 
 def test_what_both_bags_lack_is_no_difference(hsv: Hsv, without: Callable[[str], Path]) -> None:

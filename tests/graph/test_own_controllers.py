@@ -61,7 +61,9 @@ def scenario(folder: Path, example: str, more: str = "", duration: float = 11.0)
 
 
 def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
-    done = processes.run("hsv", "run", path, "--no-report", "--bag", processes.folder / name, *words)
+    # On a busy machine a node may be silent for longer than a person would wait.
+    command = ("hsv", "run", path, "--no-report", "--step-timeout", "30", "--bag", processes.folder / name)
+    done = processes.run(*command, *words)
     assert done.returncode == 0, done.stdout
     return Bag(processes.folder / name)
 
@@ -93,7 +95,8 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
     bags = [flown(processes, path, "started")]
     # Late: all others wait for it.
     run = processes.start(
-        "hsv", "run", path, "--external", "--composed", "--no-report", "--bag", processes.folder / "late"
+        *("hsv", "run", path, "--external", "--composed", "--no-report", "--step-timeout", "30"),
+        *("--bag", processes.folder / "late"),
     )
     wait_until(lambda: (processes.folder / "late" / "late_0.mcap").exists(), [run.pid])
     regulator = processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", "__node:=any_name")
@@ -112,9 +115,12 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ("killed", "no answer from"),
-        ("hung", "no answer from"),
-        ("wrong_step", f"/regulator answered step {WRONG_STEP - 1} on hsv/command, expected step"),
+        ("killed", "; no answer from /regulator\n"),
+        ("hung", "; no answer from /regulator\n"),
+        (
+            "wrong_step",
+            f"/regulator answered step {WRONG_STEP - 1} at 2.00 s on /hsv/command, expected step {WRONG_STEP}",
+        ),
         ("nan", f"/regulator, step {WRONG_STEP}: elevator_deflection = nan, expected a finite number"),
     ],
 )
@@ -143,6 +149,14 @@ def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, w
     done = processes.run("hsv", "run", scenario(processes.folder, "node", more), "--bag", processes.folder / "bag")
     assert done.returncode == 2 and words in last_line(done) and len(done.stdout.splitlines()) == 1, done.stdout
     assert not (processes.folder / "bag").exists()
+
+
+def test_two_controllers_end_the_run_and_both_are_named(processes: Processes) -> None:
+    path = scenario(processes.folder, "node", 'controller = "node:"')
+    for name in ("one", "two"):
+        processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", f"__node:={name}")
+    done = processes.run("hsv", "run", path, "--composed", "--no-report", "--bag", processes.folder / "bag")
+    assert done.returncode == 1 and "/one and /two publish /hsv/command: expected one controller" in done.stdout
 
 
 def test_a_node_does_not_fly_in_process(processes: Processes) -> None:

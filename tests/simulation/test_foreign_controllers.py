@@ -187,6 +187,34 @@ def test_a_compiled_controller_that_leaves_a_step_out_is_named(monkeypatch):
         fly(flight("CompiledLeaky"))
 
 
+class Listed(Leaky):
+    """Parameters that are none."""
+
+    PARAMETERS = ("gain",)
+
+
+class Without:
+    """Nothing to step."""
+
+    PARAMETERS = Leaky.PARAMETERS
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        return object()
+
+
+class Leaving(Leaky):
+    """Wants to end the process."""
+
+    def reset(self):
+        raise SystemExit(5)
+
+
+def test_a_controller_that_ends_the_process_in_its_reset_is_named():
+    with pytest.raises(RunError, match=r"Leaving, reset: SystemExit: 5"):
+        fly(flight("Leaving"))
+
+
 def test_flights_in_threads_share_no_state():
     parts = flight()
     alone = fly(parts).fingerprint
@@ -206,6 +234,8 @@ def test_flights_in_threads_share_no_state():
         ({"controller": "nowhere:Class"}, r"cannot be loaded, ModuleNotFoundError: No module named 'nowhere'"),
         ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),
         ({"controller": "math:cos"}, r"has no PARAMETERS, from_parameters, expected a class of a controller"),
+        ({"controller": f"{__name__}:Listed"}, r"Listed': PARAMETERS: expected hsv.parameters.Parameter, each"),
+        ({"controller": f"{__name__}:Without"}, r"Without': has no reset, step, expected a controller"),
         ({"settings": "gian = 1.0"}, r"leaky.gian: unknown key, expected one of leaky.gain, leaky.time"),
         ({"settings": "gain = -1.0"}, r"leaky.gain = -1.0: expected double from 0 to 10"),
         ({"settings": 'time = "3 m"'}, r"leaky.time = '3 m': wrong unit"),

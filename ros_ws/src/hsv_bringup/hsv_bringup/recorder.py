@@ -32,7 +32,7 @@ from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
-from hsv_node.lockstep import PeerNode
+from hsv_node.lockstep import SAID_EVERY, PeerNode
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
@@ -153,6 +153,12 @@ class RecorderNode(PeerNode):
         # Every step topic begins with the simulated time, right behind the four bytes of the CDR header.
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
         stamp = seconds * 1_000_000_000 + nanoseconds
+        if stamp <= self._now and self._complete >= 0:
+            # Each topic keeps its order: whoever sends this is not of the graph.
+            self.get_logger().error(
+                f"{topic} at {stamp * 1e-9:.2f} s: is written already, ignored", throttle_duration_sec=SAID_EVERY
+            )
+            return
         step = self._pending.setdefault(stamp, {})
         step[topic] = data
         if len(step) == len(self._order):

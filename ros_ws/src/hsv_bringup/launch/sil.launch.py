@@ -32,7 +32,10 @@ ARGUMENTS = {
     "scenario": ("case1", "name of a shipped scenario (hsv scenarios lists them), or path of a TOML file"),
     "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
     "real_time_factor": ("0.0", "pace: 1 is real time, 0 as fast as possible"),
-    "step_timeout": ("", "wall time (s) after which a silent node ends the run; empty: 10, or 4 beside a foreign node"),
+    "step_timeout": (
+        "",
+        "wall time (s) after which a silent node ends the run; empty: 10, beside a foreign node 2.5",
+    ),
     "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),

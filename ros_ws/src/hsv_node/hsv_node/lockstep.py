@@ -145,6 +145,13 @@ class LockstepNode(ProcessNode):
         else:
             self.get_logger().info(words)
 
+    def publishers_of(self, topic: str) -> list[str]:
+        """Return the full names of the nodes that publish ``topic``, one for each that does."""
+        return sorted(
+            full_name(endpoint.node_name, endpoint.node_namespace)
+            for endpoint in self.get_publishers_info_by_topic(topic)
+        )
+
     def say_foreign(self, topic: str, step: int, expected: int) -> None:
         """Log now and then that messages come which nobody of this graph should send."""
         self._foreign += 1
@@ -152,10 +159,7 @@ class LockstepNode(ProcessNode):
         if now < self._foreign_said + SAID_EVERY:
             return
         self._foreign_said = now
-        publishers = sorted(
-            full_name(endpoint.node_name, endpoint.node_namespace)
-            for endpoint in self.get_publishers_info_by_topic(topic)
-        )
+        publishers = self.publishers_of(topic)
         self.get_logger().error(
             f"{self._inputs[topic].topic_name} of step {step}: expected {expected}, ignored ({self._foreign} so far; "
             f"published by {', '.join(publishers) or 'a node that is gone'})"
@@ -205,6 +209,11 @@ class PeerNode(LockstepNode):
     def end_run(self, how: str) -> None:
         """Say how the run ended; overridden where there is more to say."""
         self.get_logger().info(how)
+
+    @property
+    def announced(self) -> Run | None:
+        """The run that this node has announced itself ready for, if there is one."""
+        return self._run if self._announced else None
 
     def missing(self) -> list[str]:
         """Return what this node waits for before it is ready; overridden where that is more than links."""

@@ -21,6 +21,8 @@ class ProcessNode(Node):
         super().__init__(name, namespace=namespace)
         self.exit_code: int | None = None
         """Set when the node wants to end, to the exit code of the process."""
+        self.beside: list[ProcessNode] = [self]
+        """The nodes of this process."""
         self._claims: list[socket.socket] = []
 
     def claim_name(self, expected: str) -> None:

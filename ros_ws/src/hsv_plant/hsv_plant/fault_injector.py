@@ -11,7 +11,7 @@ from hsv_msgs.srv import ClearFault, InjectFault
 from hsv.errors import ParameterError
 from hsv.faults.actuator import FAULT_PARAMETERS, NEVER, FaultInjector, first_step
 from hsv.graph.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
-from hsv.graph.exchange import fault_in
+from hsv.graph.exchange import fault_in, stamp_of
 from hsv.simulation.blocks import Signals
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
@@ -27,7 +27,7 @@ class FaultInjectorNode(BlockNode):
         self._period = values["period"]
         self._controller = controller_node(self.controller)
         self._due = 0
-        """The step that a foreign controller has to answer next."""
+        """The step that the controller has to answer next."""
         self.component = self._injector = FaultInjector.from_parameters(values)
         self.create_service(InjectFault, INJECT_FAULT, self._inject)
         self.create_service(ClearFault, CLEAR_FAULT, self._clear)
@@ -38,18 +38,41 @@ class FaultInjectorNode(BlockNode):
         self._due = 0
 
     def on_message(self, topic: str, message: Any) -> None:
-        """Step; a controller that is not of this bench and answers another step than the one due ends the run."""
-        if self._controller.foreign:
-            if message.step != self._due and self.count_publishers(topic) > 1:
-                self.say_foreign(topic, message.step, self._due)
-                return
-            if message.step != self._due:
-                name = self.node_in_role(self._controller) or self._controller.name
-                self.get_logger().fatal(f"{name} answered step {message.step} on {COMMAND}, expected step {self._due}")
-                self.finish(1)
+        """Step; in a run, another step or time than the one due ends it: what flies would be nobody's."""
+        if self.announced is not None:
+            stamp = message.header.stamp
+            if (message.step, stamp.sec, stamp.nanosec) != (self._due, *stamp_of(self._due, self.announced.period)):
+                self._refuse(topic, message)
                 return
             self._due += 1
         super().on_message(topic, message)
+
+    def missing(self) -> list[str]:
+        """Wait for the links; two controllers in them end the run before it begins."""
+        missing = super().missing()
+        if not missing and len(names := self.publishers_of(COMMAND)) > 1:
+            self._end_for_two(names)
+        return missing
+
+    def _refuse(self, topic: str, message: Any) -> None:
+        names = self.publishers_of(topic)
+        if len(names) > 1:
+            self._end_for_two(names)
+            return
+        name, stamp = names[0] if names else self._controller.name, message.header.stamp
+        time = stamp.sec + 1e-9 * stamp.nanosec
+        due = self._due * self._period
+        self.get_logger().fatal(
+            f"{name} answered step {message.step} at {time:.2f} s on {self.resolve_topic_name(topic)}, expected step "
+            f"{self._due} at {due:.2f} s"
+        )
+        self.finish(1)
+
+    def _end_for_two(self, names: list[str]) -> None:
+        self.get_logger().fatal(
+            f"{' and '.join(names)} publish {self.resolve_topic_name(COMMAND)}: expected one controller"
+        )
+        self.finish(1)
 
     def stepped(self, signals: Signals) -> None:
         """Tell whether a fault acts."""

@@ -24,6 +24,7 @@ from hsv.graph.description import (
     RUN,
     STATE,
     TOPICS,
+    NodeDescription,
     controller_node,
     peers,
 )
@@ -57,6 +58,8 @@ class PlantNode(LockstepNode):
         self.values = declare(self, (*Plant.PARAMETERS, *PACE_PARAMETERS))
         self.plant = Plant.from_parameters(self.values)
         self._peers = [node for node in peers(PLANT, self.controller, self.recorded) if not node.foreign]
+        self._foreign_controller = ""
+        """Full name of the controller where it is a node that is not of this bench."""
         self._ready: set[str] = set()
         messages = {topic: message_class(TOPICS[topic])() for topic in PLANT.publishes}
         self._state_message: VehicleState = messages[STATE]
@@ -192,6 +195,8 @@ class PlantNode(LockstepNode):
     def _try_start(self) -> None:
         if self._is_ready() and self.links_are_counted() and not self.missing_links():
             self._started = True
+            controller = controller_node(self.controller)
+            self._foreign_controller = (self.node_in_role(controller) or "") if controller.foreign else ""
             self._begun = time.monotonic()
             self._standstill = Standstill()
             self.get_logger().info(f"starts {run_in_words(self._run)}")
@@ -219,11 +224,18 @@ class PlantNode(LockstepNode):
             if behind_recorder
             else (FAULT_INJECTOR, self.resolve_topic_name(ACTUATOR))
         )
-        silent = unresponsive(self, self._peers)
+        silent = unresponsive(self, self._elsewhere())
+        if not silent and not behind_recorder and self._foreign_controller:
+            silent = [self._foreign_controller]
         blame = f"no answer from {', '.join(silent)}" if silent else "all nodes answer, one of them is stuck"
         self.get_logger().fatal(f"step {step}: no {topic} (from {source.name}) for {waited:.1f} s; {blame}")
         self._broken_off = blame
         self.finish(1)
+
+    def _elsewhere(self) -> list[NodeDescription]:
+        """Return the peers in other processes: those of this one live as long as the plant."""
+        here = {node.get_fully_qualified_name() for node in self.beside}
+        return [peer for peer in self._peers if self.node_in_role(peer) not in here]
 
     def _land(self) -> None:
         signals = self._signals

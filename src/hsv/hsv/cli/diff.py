@@ -23,11 +23,11 @@ def diff(
 ) -> None:
     """Compare two bags step by step: where they part first, and the largest difference of every field.
 
-    Exit code 0 if all step topics are equal, 1 if not.
+    Exit code 0 if all step topics are equal, 1 if not, or if one bag lacks a topic of the other.
 
     Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
     """
-    from hsv.errors import ParameterError
+    from hsv.errors import ParameterError, RecordingError
     from hsv.graph.description import TOPICS
     from hsv.recording.compare import compare
     from hsv.recording.reader import Bag
@@ -36,15 +36,19 @@ def diff(
         raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
     bags = Bag(first), Bag(second)
     # What both lack is no difference.
-    topics = [topic for topic in TOPICS if any(topic in bag.roles for bag in bags)]
+    topics = [topic for topic in TOPICS if all(topic in bag.roles for bag in bags)]
+    alone = {topic: bag for bag in bags for topic in TOPICS if topic in bag.roles and topic not in topics}
+    if not topics:
+        raise RecordingError(f"{bags[1].path}: no step topic that {bags[0].path} has, too")
     compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in topics]
     differences = [c.first for c in compared if c.first]
     earliest = min(differences, key=lambda d: d.time_ns, default=None)
     if json:
         print_json(
             {
-                "equal": earliest is None,
-                "identical": all(c.identical for c in compared),
+                "equal": earliest is None and not alone,
+                "identical": all(c.identical for c in compared) and not alone,
+                "in_one_only": {bag.name_of(topic): str(bag.path) for topic, bag in alone.items()},
                 "first_difference": earliest
                 and {
                     "topic": earliest.topic,
@@ -60,9 +64,11 @@ def diff(
             }
         )
     else:
+        for topic, bag in alone.items():
+            console.print(f"{bag.name_of(topic)} is in {bag.path} only", soft_wrap=True)
         _print(compared, earliest)
     warn_of_shortcomings(*bags)
-    raise typer.Exit(0 if earliest is None else 1)
+    raise typer.Exit(1 if earliest or alone else 0)
 
 
 def _print(compared: list[Comparison], earliest: Difference | None) -> None:

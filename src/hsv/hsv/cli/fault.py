@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -21,16 +22,21 @@ def inject(
     channel: Annotated[str, typer.Argument(help="Actuator, e.g. elevator_deflection.")],
     type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
     value: Annotated[str, typer.Argument(help="Value of the type: 0.8 or '80 %' of the effectiveness is left.")],
+    duration: Annotated[
+        str, typer.Option(help="Simulated time after which it ends, such as '5 s'; default: until it is cleared.")
+    ] = "0 s",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
     """Begin a fault with the next step that is not flown yet; the answer says which one.
 
-    Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8
+    Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
     from hsv.units import parse_quantity
 
-    _ask("inject", channel, type, repr(parse_quantity(value, "1", "value")), namespace=namespace, json=json)
+    share, time = parse_quantity(value, "1", "value"), parse_quantity(duration, "s", "duration")
+    options = ["--duration", repr(time)]
+    _ask("inject", channel, type, repr(share), options=options, namespace=namespace, json=json)
 
 
 @fault.command()
@@ -55,11 +61,11 @@ def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> Non
     _ask("list", namespace=namespace, json=json)
 
 
-def _ask(*words: str, namespace: str, json: bool) -> None:
+def _ask(*words: str, options: Sequence[str] = (), namespace: str, json: bool) -> None:
     from hsv.graph.description import FAULT
     from hsv.graph.launcher import become
 
     # Behind the dashes stand words, also those that begin with one, as a value below zero.
     command, *values = words
     flags = ["--prog", "hsv fault", *(["--json"] if json else [])]
-    become(FAULT, [*flags, command, *(["--", *values] if values else [])], namespace)
+    become(FAULT, [*flags, command, *options, *(["--", *values] if values else [])], namespace)

@@ -29,7 +29,7 @@ ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenari
 RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
 StepTimeoutOption = Annotated[
     float | None,
-    typer.Option(help="Wall time (s) after which a silent node ends the run; default: 10, or 4 beside a foreign node."),
+    typer.Option(help="Wall time (s) after which a silent node ends the run; default: 10, beside a foreign node 2.5."),
 ]
 NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
 ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]

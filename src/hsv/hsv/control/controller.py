@@ -194,11 +194,20 @@ class ForeignController(Controller):
             self.reset()
 
     def reset(self) -> None:
-        """Start a new run."""
-        if self.kernel is None:
-            self._controller.reset()
-        else:
+        """Start a new run.
+
+        Raises:
+            ControllerError: The controller failed.
+        """
+        if self.kernel is not None:
             self._state = self.kernel.state.copy()
+            return
+        try:
+            self._controller.reset()
+        # Foreign code may fail in any way, and may even want to end the process.
+        except (Exception, SystemExit) as error:
+            words = " ".join(str(error).split())
+            raise ControllerError(f"{self.name}, reset: {type(error).__name__}: {words}") from error
 
     def copied(self) -> ForeignController:
         """Return a controller of its own that goes on from the state of this one; of a compiled one, all is in it."""
@@ -218,8 +227,7 @@ class ForeignController(Controller):
             given = self._answer(inputs)
         except ControllerError:
             raise
-        # Foreign code may fail in any way.
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             words = " ".join(str(error).split())
             raise ControllerError(f"{self.name}, step {inputs.step}: {type(error).__name__}: {words}") from error
         try:

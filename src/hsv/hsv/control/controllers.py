@@ -82,6 +82,8 @@ def controller_class(name: str) -> ControllerClass:
     lacking = [a for a in ("PARAMETERS", "from_parameters") if not hasattr(found, a)]
     if lacking:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a class of a controller")
+    if not all(isinstance(parameter, Parameter) for parameter in found.PARAMETERS):
+        raise ParameterError(f"controller = {name!r}: PARAMETERS: expected hsv.parameters.Parameter, each")
     return found
 
 
@@ -156,4 +158,7 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
         raise ParameterError(f"controller = {name!r}: cannot be built, {type(error).__name__}: {words}") from error
     if isinstance(built, Controller):
         return built
+    due = () if getattr(built, "kernel", None) is not None else ("reset", "step")
+    if lacking := [attribute for attribute in due if not hasattr(built, attribute)]:
+        raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a controller")
     return ForeignController(name, built, Vehicle.from_parameters(values).decoupled)

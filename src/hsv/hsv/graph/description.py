@@ -97,6 +97,11 @@ class NodeDescription:
     """Whether it is not one of this bench's: it knows the messages alone, and announces itself to nobody."""
 
     @property
+    def label(self) -> str:
+        """What the process is called in words: its role, or what was started where that is not of this bench."""
+        return f"{self.package}/{self.executable}" if self.foreign else self.name
+
+    @property
     def own_topics(self) -> tuple[str, ...]:
         """Topics that no other node of the same graph may publish."""
         return self.publishes + self.announces

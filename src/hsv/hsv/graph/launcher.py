@@ -170,7 +170,7 @@ class Launcher:
     def _watch(self, process: _Process, decides: bool) -> None:
         """Tell a process that does nothing at all; it ends the run only if it ``decides``."""
         idle = process.idle()
-        name = process.description.name
+        name = process.description.label
         if idle > self._wait_timeout and decides:
             raise RunError(f"{name} hangs: no progress for {idle:.1f} s, not even processor time used")
         if process.hung != (idle > HUNG_AFTER):
@@ -225,16 +225,16 @@ class Launcher:
                 # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
                 if not text.startswith("Extension modules:"):
                     process.words.append(text)
-                self._on_line(process.description.name, text)
+                self._on_line(process.description.label, text)
 
     def _failure(self, process: _Process, code: int) -> RunError:
         if process.reader:
             process.reader.join(1.0)
         reason = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         # Said now: until the others have ended and the bag is closed, a busy machine may take its time.
-        self._on_line(process.description.name, WARNING + reason)
+        self._on_line(process.description.label, WARNING + reason)
         words = "".join(f"\n  {word}" for word in process.words)
-        return RunError(f"{process.description.name} {reason}{'. Its last words:' if words else ''}{words}")
+        return RunError(f"{process.description.label} {reason}{'. Its last words:' if words else ''}{words}")
 
 
 def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:

@@ -22,7 +22,7 @@ from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
 
-STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 4.0
+STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 2.5
 """Wall time (s) after which a silent node ends a run; nobody knows what a controller that is a node of its own does."""
 
 
