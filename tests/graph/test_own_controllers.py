@@ -151,6 +151,17 @@ def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, w
     assert not (processes.folder / "bag").exists()
 
 
+def test_two_controllers_end_the_run(processes: Processes) -> None:
+    path = scenario(processes.folder, "node", 'controller = "node:"')
+    for name in ("one", "two"):
+        processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", f"__node:={name}")
+    done = processes.run("hsv", "run", path, "--composed", "--no-report", "--bag", processes.folder / "bag")
+    # The second may join in flight, and its answer come before DDS tells whose it is.
+    assert done.returncode == 1, done.stdout
+    [said] = [line for line in done.stdout.splitlines() if "publish /hsv/command: expected one controller" in line]
+    assert "/one" in said or "/two" in said
+
+
 def test_a_node_does_not_fly_in_process(processes: Processes) -> None:
     done = processes.run("hsv", "simulate", scenario(processes.folder, "node"))
     assert done.returncode == 2 and "a node of its own, expected hsv run" in last_line(done), done.stdout

@@ -25,7 +25,9 @@ def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
 
 
 def full_name(name: str, namespace: str) -> str:
-    """Return name and namespace of a node in one."""
+    """Return name and namespace of a node in one; of an endpoint whose node is not known yet, that."""
+    if not namespace.startswith("/"):
+        return "a node that just joins"
     return f"{namespace.rstrip('/')}/{name}"
 
 

@@ -39,6 +39,8 @@ class FaultInjectorNode(BlockNode):
 
     def on_message(self, topic: str, message: Any) -> None:
         """Step; in a run, another step or time than the one due ends it: what flies would be nobody's."""
+        if self.exit_code is not None:
+            return  # the run has ended, and why is said
         if self.announced is not None:
             stamp = message.header.stamp
             if (message.step, stamp.sec, stamp.nanosec) != (self._due, *stamp_of(self._due, self.announced.period)):

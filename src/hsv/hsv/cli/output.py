@@ -95,6 +95,16 @@ def print_written(paths: Sequence[Path], as_json: bool) -> None:
         console.print(f"written {path}", soft_wrap=True)
 
 
+def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
+    """Print titles by name, a line each, or as JSON."""
+    if as_json:
+        print_json(titles)
+        return
+    width = max(map(len, titles))
+    for name, title in titles.items():
+        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))
+
+
 def print_json(values: Mapping[str, Any]) -> None:
     """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
     sys.stdout.write(json_text(values, indent=2) + "\n")

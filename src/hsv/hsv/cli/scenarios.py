@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.text import Text
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import print_json, print_titles
 
 
 def scenarios(
@@ -39,9 +38,4 @@ def scenarios(
             print(text, end="")
         return
     titles = {name: load_scenario(name).title for name in scenario_names()}
-    if json:
-        print_json(titles)
-        return
-    width = max(map(len, titles))
-    for name, title in titles.items():
-        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))
+    print_titles(titles, json)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.text import Text
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import print_json, print_titles
 
 
 def vehicles(
@@ -29,9 +28,4 @@ def vehicles(
             print(text, end="")
         return
     titles = {name: load_vehicle(name).title for name in vehicle_names()}
-    if json:
-        print_json(titles)
-        return
-    width = max(map(len, titles))
-    for name, title in titles.items():
-        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))
+    print_titles(titles, json)
