@@ -55,6 +55,7 @@ ON_THE_PATH = (
     "simulation/fields.py",
     "simulation/foreign.py",
     "simulation/scenario.py",
+    "simulation/tables.py",
 )
 """Files that decide a flight, from the scenario's text to the last step."""
 
