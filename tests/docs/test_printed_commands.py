@@ -113,7 +113,7 @@ ELSEWHERE = {
     "hsv simulate examples/lqr/scenario.toml": "tests/examples/test_own_controllers.py",
     "cd examples/node": "tests/graph/test_own_controllers.py",
     "python3 -m colcon build": "tests/graph/test_own_controllers.py",
-    "source install/local_setup.bash": "tests/graph/test_own_controllers.py",
+    "source install/local_setup.bash": "test_a_workspace_of_ones_own, tests/graph/test_own_controllers.py",
     "hsv run scenario.toml": "tests/graph/test_own_controllers.py",
     "hsv run case1 --external": "tests/graph/test_own_controllers.py",
     "hsv check lqr": "tests/examples/test_own_controllers.py",
