@@ -27,6 +27,7 @@ ON_THE_PATH = (
     "elementary.py",
     "elimination.py",
     "inheritance.py",
+    "signals.py",
     "units.py",
     "vehicle/dynamics.py",
     "vehicle/envelope.py",

@@ -37,12 +37,12 @@ static int32_t step(int64_t k, const double *in, double *out, double *state, con
     (void)k, (void)state;
     if (!(par[LOW_VELOCITY] < par[HIGH_VELOCITY]))
         return 1;
-    double share = (in[HSV_STATE + HSV_VELOCITY] - par[LOW_VELOCITY]) / (par[HIGH_VELOCITY] - par[LOW_VELOCITY]);
+    double share = (in[HSV_ESTIMATE + HSV_VELOCITY] - par[LOW_VELOCITY]) / (par[HIGH_VELOCITY] - par[LOW_VELOCITY]);
     share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;
     for (int i = 0; i < HSV_INPUTS; i++) {
         double total = 0.0;
         for (int j = 0; j < RIGID; j++) {
-            const double value = in[j == HSV_PITCH_RATE ? HSV_FILTERED_PITCH_RATE : HSV_STATE + j];
+            const double value = in[j == HSV_PITCH_RATE ? HSV_FILTERED_PITCH_RATE : HSV_ESTIMATE + j];
             const double low = par[LOW_GAIN + RIGID * i + j], high = par[HIGH_GAIN + RIGID * i + j];
             total += (low + share * (high - low)) * (value - in[HSV_REFERENCE + j]);
         }

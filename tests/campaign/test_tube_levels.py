@@ -20,7 +20,7 @@ def published_levels(parts, flight):
     for k, (x, x_n, u_n, (x_r, u_r)) in enumerate(rows):
         filtered = notch.step(float(x[4]))
         q_f, s = filtered.filtered_pitch_rate, filtered.filter_state
-        result = law.step(ControllerInput(k, x, q_f, s, x_r, u_r, x_n, u_n))
+        result = law.step(ControllerInput(k, x, q_f, x_r, u_r, x_n, u_n, s))
         levels.append(result.level)
     return levels
 

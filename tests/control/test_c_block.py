@@ -6,17 +6,18 @@ import pytest
 from c_libraries import build_probe
 
 from hsv.control.c_block import load_block
-from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS, filter_state_signal
+from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
 from hsv.errors import ParameterError
+from hsv.signals import FILTER_STATE
 
 
 def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):
     library = build_probe(tmp_path, "-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)")
     block = load_block(library, "probe")
-    assert block.inputs == (*CONTROLLER_INPUTS, filter_state_signal(4))
+    assert block.inputs == (*CONTROLLER_INPUTS[:-1], FILTER_STATE.of_size(4))
     assert block.outputs == CONTROLLER_OUTPUTS
     ends = [0]
-    for signal in CONTROLLER_INPUTS:
+    for signal in CONTROLLER_INPUTS[:-1]:
         ends.append(ends[-1] + signal.size)
     assert list((ctypes.c_int64 * len(ends)).in_dll(ctypes.CDLL(str(library)), "offsets")) == ends
 

@@ -13,7 +13,7 @@ ERROR = np.array([0.5, -0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 def step(law, error, k=0):
     x = X_R + error
-    return law.step(ControllerInput(k, x, float(x[4]), np.empty(0), X_R, U_R, np.zeros(9), np.zeros(2)))
+    return law.step(ControllerInput(k, x, float(x[4]), X_R, U_R, np.zeros(9), np.zeros(2), np.empty(0)))
 
 
 def test_acts_on_the_integral_of_altitude_and_velocity_error():

@@ -20,7 +20,7 @@ NOTHING = np.empty(0)
 
 @pytest.mark.parametrize("index", [0, 3, -1])
 def test_law_is_one_gain_about_the_reference_with_the_filtered_rate(index):
-    result = RobustMpc(DESIGN, index).step(ControllerInput(0, X, 4e-3, NOTHING, X_R, U_R, np.ones(9), np.ones(2)))
+    result = RobustMpc(DESIGN, index).step(ControllerInput(0, X, 4e-3, X_R, U_R, np.ones(9), np.ones(2), NOTHING))
     deviation = X - X_R
     deviation[4] = 4e-3
     assert_allclose(result.u_unsaturated, U_R + DESIGN.nominal_gains[index] @ deviation, rtol=1e-12)
@@ -29,14 +29,14 @@ def test_law_is_one_gain_about_the_reference_with_the_filtered_rate(index):
 
 
 def test_input_is_limited():
-    result = RobustMpc(DESIGN).step(ControllerInput(0, X_R + 1e4, 0.0, NOTHING, X_R, U_R, np.zeros(9), np.zeros(2)))
+    result = RobustMpc(DESIGN).step(ControllerInput(0, X_R + 1e4, 0.0, X_R, U_R, np.zeros(9), np.zeros(2), NOTHING))
     assert np.all((result.input == DESIGN.input_minimum) | (result.input == DESIGN.input_maximum))
     assert result.saturated.all()
 
 
 def test_input_that_is_not_a_number_is_told():
     nothing = np.full(9, np.nan)
-    result = RobustMpc(DESIGN).step(ControllerInput(0, nothing, 0.0, NOTHING, X_R, U_R, np.zeros(9), np.zeros(2)))
+    result = RobustMpc(DESIGN).step(ControllerInput(0, nothing, 0.0, X_R, U_R, np.zeros(9), np.zeros(2), NOTHING))
     assert result.status is TubeStatusCode.INVALID_INPUT
 
 

@@ -22,7 +22,7 @@ ZERO = np.zeros(9)
 
 
 def step(law, state=REFERENCE, rate=0.0, deviation=ZERO, nominal_input=ZERO[:2], k=0):
-    return law.step(ControllerInput(k, state, rate, FILTER_STATE, REFERENCE, REFERENCE_INPUT, deviation, nominal_input))
+    return law.step(ControllerInput(k, state, rate, REFERENCE, REFERENCE_INPUT, deviation, nominal_input, FILTER_STATE))
 
 
 def near(rng):
@@ -198,7 +198,7 @@ def test_filtered_feedback_is_blind_to_what_the_filter_does_to_the_plan():
             x[4] = x_n[4] = rate
             measured = notch.step(rate)
             q_f, s = measured.filtered_pitch_rate, measured.filter_state
-            result = law.step(ControllerInput(k, x, q_f, s, REFERENCE, REFERENCE_INPUT, x_n, np.zeros(2)))
+            result = law.step(ControllerInput(k, x, q_f, REFERENCE, REFERENCE_INPUT, x_n, np.zeros(2), s))
             inputs[filtered].append(result.u_feedback)
     assert np.abs(inputs[True]).max() < 1e-12 < 1e-4 < np.abs(inputs[False]).max()
 
@@ -210,6 +210,6 @@ def test_without_the_filter_in_the_loop_filtered_feedback_is_the_plain_one():
         law = TubeLaw(adjustable(filtered=filtered))
         deviation = near(np.random.default_rng(5))
         x = REFERENCE + error + deviation
-        inputs = ControllerInput(0, x, x[4], np.empty(0), REFERENCE, REFERENCE_INPUT, deviation, np.zeros(2))
+        inputs = ControllerInput(0, x, x[4], REFERENCE, REFERENCE_INPUT, deviation, np.zeros(2), np.empty(0))
         results.append(law.step(inputs).u_feedback)
     assert_array_equal(*results)

@@ -25,7 +25,7 @@ def step(law, design, error, state=None):
     x[:5] = error
     filter_state = np.zeros(2) if state is None else state
     u_r = np.array([0.27, 0.21])
-    return law.step(ControllerInput(0, x, x[4], filter_state, np.zeros(9), u_r, np.zeros(9), np.zeros(2)))
+    return law.step(ControllerInput(0, x, x[4], np.zeros(9), u_r, np.zeros(9), np.zeros(2), filter_state))
 
 
 def test_error_at_the_centre_has_level_zero_and_on_the_boundary_one(design):
@@ -51,7 +51,7 @@ def test_filter_error_is_the_filter_fed_with_the_rate_error(design):
         x, x_n = np.zeros(9), np.zeros(9)
         x[4], x_n[4] = e_q + q_n, q_n
         q_f, s = filtered.filtered_pitch_rate, filtered.filter_state
-        result = law.step(ControllerInput(k, x, q_f, s, np.zeros(9), np.zeros(2), x_n, np.zeros(2)))
+        result = law.step(ControllerInput(k, x, q_f, np.zeros(9), np.zeros(2), x_n, np.zeros(2), s))
         assert_allclose(result.error[5:], fed.step(e_q).filter_state, atol=1e-15)
 
 

@@ -91,7 +91,7 @@ def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_en
     flown = {"design": str(design), "vehicle": str(folder / "inputs" / "mine.toml"), "vehicle.coupling": 0.3}
     short = {"duration": "4 s", "fault": [], "limits": {}}
     parts = assemble_flight(load_scenario("case1", flown | short))
-    assert next(steps(parts)).answer.status is TubeStatusCode.OK
+    assert next(steps(parts)).diagnostics.status is TubeStatusCode.OK
     # Whoever verifies has the certificate alone.
     for path in (folder / "inputs").iterdir():
         path.unlink()

@@ -145,7 +145,7 @@ def test_the_law_answers_the_same_bits(built, rate):
         for k, x in enumerate(measured):
             s, u_r, u_n = (scale * rng.normal(size=2) for scale in (1e-3, 0.2, 0.05))
             x_r, x_n = REFERENCE.data.state[0], rng.normal(size=9) * 1e-3
-            inputs = ControllerInput(k, x, 0.9 * x[4], s, x_r, u_r, x_n, u_n)
+            inputs = ControllerInput(k, x, 0.9 * x[4], x_r, u_r, x_n, u_n, s)
             a, b = ours.step(inputs), law.step(inputs)
             assert_array_equal(a.input, b.input)
             finite = np.isfinite(a.u_unsaturated)

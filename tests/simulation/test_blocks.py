@@ -3,19 +3,23 @@
 import pytest
 from flights import components
 
+from hsv.control.controller import CONTROLLER_INPUTS, ControllerInput
 from hsv.errors import HsvError
-from hsv.graph.description import TOPICS, graph
-from hsv.simulation.blocks import LOOP, Block, in_order, steps
+from hsv.graph.description import CARRIED, CLOCK, TOPICS, graph
+from hsv.graph.exchange import FILL
+from hsv.signals import SignalType
+from hsv.simulation.blocks import LOOP, Block, Signals, in_order, steps
 
 
-def block(name, inputs, outputs, delayed=()):
-    return Block(name, "", tuple(inputs), tuple(outputs), lambda component, signals: None, tuple(delayed))
+def block(name, inputs, outputs, delayed=(), unit="m"):
+    inputs, outputs, delayed = (tuple(SignalType(n, unit, 1) for n in names) for names in (inputs, outputs, delayed))
+    return Block(name, "", inputs, outputs, lambda component, signals: None, delayed)
 
 
 def test_every_block_finds_what_it_needs_in_whatever_order_they_are_given():
     assert in_order(LOOP) == LOOP
     for shifted in (LOOP[1:] + LOOP[:1], LOOP[::-1]):
-        given: set[str] = set()
+        given: set[SignalType] = set()
         for each in in_order(shifted):
             assert given.issuperset(each.inputs), each.name
             given.update(each.outputs)
@@ -29,6 +33,7 @@ def test_every_block_finds_what_it_needs_in_whatever_order_they_are_given():
         ([block("a", "z", "x")], "a: needs z, expected one of x"),
         ([block("a", "", "x", delayed="z")], "a: needs z"),
         ([block("a", "", "x"), block("b", "", "x")], "b: gives x, expected no other block to, a does"),
+        ([block("a", "", "x"), block("b", "x", "y", unit="ft")], "b: needs x, 1 in 'ft', expected 1 in 'm' as a gives"),
     ],
 )
 def test_what_cannot_be_ordered_is_refused(blocks, words):
@@ -41,11 +46,29 @@ def test_a_loop_over_a_step_is_no_algebraic_one():
     assert in_order([b, a]) == (a, b)
 
 
-def test_every_node_publishes_what_its_block_gives():
-    for node in graph():
-        if node.block:
-            assert node.publishes[: len(node.block.outputs)] == tuple(f"hsv/{s}" for s in node.block.outputs)
-    assert {f"hsv/{signal}" for each in LOOP for signal in each.outputs} < TOPICS.keys()
+def test_every_signal_travels_on_a_topic_and_has_a_place_in_the_loop():
+    given = {signal for each in LOOP for signal in each.outputs}
+    assert {signal for carried in CARRIED.values() for signal in carried} == given
+    assert {signal.name for signal in given} <= Signals.__annotations__.keys() | vars(Signals).keys()
+
+
+def test_every_node_subscribes_to_no_more_than_what_its_block_needs_and_publishes_what_it_gives():
+    assert {node.name: (node.subscribes, node.publishes) for node in graph() if node.block} == {
+        "plant": (("hsv/actuator",), ("hsv/measurement", "hsv/state", "hsv/forces", "clock")),
+        "notch_filter": (("hsv/measurement",), ("hsv/filtered_state",)),
+        "nominal_trajectory": (("hsv/measurement",), ("hsv/nominal",)),
+        "tube_mpc": (("hsv/filtered_state", "hsv/nominal"), ("hsv/command", "hsv/tube_status")),
+        "fault_injector": (("hsv/command",), ("hsv/actuator",)),
+    }
+
+
+def test_what_the_topics_carry_is_what_their_messages_are_filled_with():
+    assert CARRIED.keys() == TOPICS.keys() - {CLOCK} == FILL.keys() - {CLOCK}
+
+
+def test_a_controller_takes_its_inputs_in_one_order():
+    assert ControllerInput._fields == ("step", *(signal.name for signal in CONTROLLER_INPUTS))
+    assert LOOP[3].inputs == CONTROLLER_INPUTS
 
 
 def test_ideal_sensors_say_the_truth():

@@ -59,7 +59,7 @@ class Leaky:
         self.leaking = 0.0
 
     def step(self, inputs):
-        error = inputs.state[:5] - inputs.reference[:5]
+        error = inputs.estimate[:5] - inputs.reference[:5]
         error[4] = inputs.filtered_pitch_rate - inputs.reference[4]
         wanted = [0.0, 0.0]
         for i in range(2):
@@ -123,7 +123,7 @@ def test_python_and_compiled_controller_fly_the_same_bits_alone_and_stepped():
     assert len(one.time) > 100
     assert one.fingerprint == other.fingerprint
     inputs = ControllerInput(
-        0, one.history.state[0], 0.0, np.zeros(2), one.reference[0], one.reference_input[0], np.zeros(9), np.zeros(2)
+        0, one.history.state[0], 0.0, one.reference[0], one.reference_input[0], np.zeros(9), np.zeros(2), np.zeros(2)
     )
     for parts, flown in ((own, one), (compiled, other)):
         parts.controller.reset()

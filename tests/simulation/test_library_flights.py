@@ -76,7 +76,7 @@ class Probe:
     def step(self, inputs):
         fuel, elevator = inputs.reference_input
         elevator += self.weight[0] * self.integral
-        error = inputs.state[3] - inputs.reference[3]
+        error = inputs.estimate[3] - inputs.reference[3]
         self.integral += self.weight[1] * (error - self.weight[2] * self.integral)
         return fuel, elevator
 
@@ -100,7 +100,7 @@ def test_c_and_python_answer_the_same_stepwise(flight):
             parts.controller.reset()
         for k in range(5):
             given = ControllerInput(
-                k, state, 0.0, np.zeros(2), ours.plant.initial.state, np.array([0.4, 0.2]), np.zeros(9), np.zeros(2)
+                k, state, 0.0, ours.plant.initial.state, np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
             )
             answers = [parts.controller.step(given).input.tolist() for parts in (ours, other)]
             assert answers[0] == answers[1]
@@ -171,7 +171,7 @@ def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight
 def test_what_goes_wrong_stepwise_is_named_with_its_step(flight, settings, message):
     parts = flight(settings)
     given = ControllerInput(
-        3, np.zeros(9), 0.0, np.zeros(2), np.zeros(9), np.array([0.4, 0.2]), np.zeros(9), np.zeros(2)
+        3, np.zeros(9), 0.0, np.zeros(9), np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
     )
     with pytest.raises(ControllerError, match=message):
         parts.controller.step(given)
@@ -193,7 +193,10 @@ def test_a_library_that_is_built_anew_is_loaded_anew(tmp_path):
     [
         (["-DABI=2"], r"^scenario 'mine': controller = '.*/probe.so:probe': abi_version = 2, expected 1"),
         (['-DOUTPUTS={"u","1",2}'], r": outputs\[0\] = u, 2 in '1', expected wanted_input, 2 in '1, rad'$"),
-        (['-DINPUTS={"state","m",9}'], r": inputs\[0\] = state, 9 in 'm', expected state, 9 in 'm, m/s, rad, "),
+        (
+            ['-DINPUTS={"estimate","m",9}'],
+            r": inputs\[0\] = estimate, 9 in 'm', expected estimate, 9 in 'm, m/s, rad, ",
+        ),
         (
             ["-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)"],
             r": inputs\[6\] = filter_state, 4 in 'rad, rad s', expected filter_state, 2 in",

@@ -37,7 +37,7 @@ class Steady:
         self.memory.integral = 0.0
 
     def step(self, inputs):
-        error = inputs.state[:5] - inputs.reference[:5]
+        error = inputs.estimate[:5] - inputs.reference[:5]
         self.memory.integral += 0.02 * error[3]
         integral = np.array([0.0, 0.05 * self.memory.integral + self.more(inputs)])
         return inputs.reference_input + FEEDBACK @ error + integral

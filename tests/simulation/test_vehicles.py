@@ -130,7 +130,7 @@ def test_a_number_couples_as_the_set_it_is():
 )
 def test_a_tube_is_certified_for_its_own_vehicle(design, changes, status):
     parts = assemble_flight(load_scenario("case1", SHORT | {"design": design} | changes))
-    assert next(steps(parts)).answer.status is status
+    assert next(steps(parts)).diagnostics.status is status
 
 
 def test_input_limits_are_those_of_the_vehicle(folder):

@@ -27,10 +27,10 @@ def step_by_step(parts: Components) -> dict[str, np.ndarray]:
             "deviation": signals.deviation,
             "nominal_input": signals.nominal_input,
             "gain_index": signals.gain_index,
-            "u_unsaturated": signals.answer.u_unsaturated,
+            "u_unsaturated": signals.diagnostics.u_unsaturated,
             "command": signals.command,
             "actuator": signals.actuator,
-            "saturated": signals.answer.saturated,
+            "saturated": signals.saturated,
             "plant_status": int(signals.status),
             "nominal_status": int(signals.nominal_status),
         }

@@ -43,7 +43,7 @@ enum { WEIGHTS = 3, CRASH_AT = WEIGHTS, ABORT_AT, EXIT_AT, HANG_AT, FAIL_AT, SIL
 
 static int32_t step(int64_t k, const double *in, double *out, double *state, const double *par)
 {
-    if (k == (int64_t)par[CRASH_AT] || in[HSV_STATE + HSV_ALTITUDE] > par[CRASH_ABOVE])
+    if (k == (int64_t)par[CRASH_AT] || in[HSV_ESTIMATE + HSV_ALTITUDE] > par[CRASH_ABOVE])
         raise(SIGSEGV);
     if (k == (int64_t)par[ABORT_AT])
         abort();
@@ -62,7 +62,7 @@ static int32_t step(int64_t k, const double *in, double *out, double *state, con
     out[HSV_ELEVATOR_DEFLECTION] += kept;
     kept = 1e-6;
 #endif
-    state[0] += par[1] * (in[HSV_STATE + HSV_PITCH_ANGLE] - in[HSV_REFERENCE + HSV_PITCH_ANGLE] - par[2] * state[0]);
+    state[0] += par[1] * (in[HSV_ESTIMATE + HSV_PITCH_ANGLE] - in[HSV_REFERENCE + HSV_PITCH_ANGLE] - par[2] * state[0]);
     return 0;
 }
 
@@ -90,5 +90,5 @@ const hsv_block probe = {ABI,         NAME,   SOURCE,  STEP,
                          outputs,     HSV_COUNT(parameters), parameters};
 
 /* For the tests of the header itself. */
-const int64_t offsets[] = {HSV_STATE, HSV_FILTERED_PITCH_RATE, HSV_REFERENCE, HSV_REFERENCE_INPUT, HSV_DEVIATION,
+const int64_t offsets[] = {HSV_ESTIMATE, HSV_FILTERED_PITCH_RATE, HSV_REFERENCE, HSV_REFERENCE_INPUT, HSV_DEVIATION,
                            HSV_NOMINAL_INPUT, HSV_FILTER_STATE};

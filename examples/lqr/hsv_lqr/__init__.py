@@ -49,7 +49,7 @@ class Lqr:
 
     def step(self, inputs):
         """Return the wanted input; the bench limits it."""
-        error = (inputs.state - inputs.reference)[:RIGID]
+        error = (inputs.estimate - inputs.reference)[:RIGID]
         error[PITCH_RATE] = inputs.filtered_pitch_rate - inputs.reference[PITCH_RATE]
         wanted = inputs.reference_input - self.gain @ np.concatenate((error, self.integral))
         # The integral stands still while an input is limited: it would wind up.

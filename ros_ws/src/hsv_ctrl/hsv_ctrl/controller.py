@@ -38,7 +38,7 @@ class ControllerNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell whether its command is limited."""
-        self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.answer.saturated.any()))
+        self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.saturated.any()))
 
 
 def main(args: Sequence[str] | None = None) -> int:

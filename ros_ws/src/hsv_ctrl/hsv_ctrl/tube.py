@@ -34,7 +34,7 @@ class TubeNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell of the tube; leaving it is a warning."""
-        result = signals.answer
+        result = signals.diagnostics
         assert isinstance(result, TubeResult)
         outside = result.status is TubeStatusCode.OUTSIDE
         left, self._outside = outside and not self._outside, outside

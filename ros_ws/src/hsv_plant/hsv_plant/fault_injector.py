@@ -78,7 +78,7 @@ class FaultInjectorNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell whether a fault acts."""
-        self.diagnose(signals.header.stamp, "faults act" if signals.active else "no fault", step=signals.step)
+        self.diagnose(signals.header.stamp, "faults act" if signals.active_faults else "no fault", step=signals.step)
 
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:

@@ -191,7 +191,7 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
         memcpy(asked + 2 * N, d_r, sizeof(double[N]));
         nominal_trajectory.step(k, asked, nominal, nominal_state, NULL);
 
-        memcpy(given + HSV_STATE, x, sizeof(double[N]));
+        memcpy(given + HSV_ESTIMATE, x, sizeof(double[N]));
         memcpy(given + HSV_FILTERED_PITCH_RATE, filtered, sizeof(double));
         memcpy(given + HSV_REFERENCE, x_r, sizeof(double[N]));
         memcpy(given + HSV_REFERENCE_INPUT, u_r, sizeof(double[M]));

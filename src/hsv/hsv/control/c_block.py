@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.controller import Signal
 from hsv.errors import HsvError, ParameterError
 from hsv.parameters import Parameter
+from hsv.signals import SignalType
 from hsv.units import parse_quantity
 
 ABI_VERSION = 1
@@ -67,8 +67,8 @@ class Block:
     address: int
     """Of the step function, in the process that loaded the library"""
     state_size: int
-    inputs: tuple[Signal, ...]
-    outputs: tuple[Signal, ...]
+    inputs: tuple[SignalType, ...]
+    outputs: tuple[SignalType, ...]
     parameters: tuple[Parameter, ...]
     """Named ``block.parameter``, in the order in which the step function has their values"""
 
@@ -109,9 +109,9 @@ def load_block(path: Path, symbol: str) -> Block:
     )
 
 
-def _signals(count: int, signals: Any, kind: str) -> tuple[Signal, ...]:
+def _signals(count: int, signals: Any, kind: str) -> tuple[SignalType, ...]:
     return tuple(
-        Signal(_name(s.name, f"{field}.name"), _text(s.unit, f"{field}.unit"), _size(s.size, f"{field}.size"))
+        SignalType(_name(s.name, f"{field}.name"), _text(s.unit, f"{field}.unit"), _size(s.size, f"{field}.size"))
         for field, s in _entries(count, signals, kind)
     )
 

@@ -29,9 +29,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from hsv import signals
 from hsv.errors import ControllerError, ParameterError, RunError
 from hsv.parameters import Parameter
-from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES, STATE_UNITS
+from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
 from hsv.vehicle.parameters import VehicleParameters
 
 if TYPE_CHECKING:
@@ -43,16 +44,14 @@ STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void
 
 
 class ControllerInput(NamedTuple):
-    """What a controller is given in a step, SI units and radians."""
+    """What a controller is given in a step, SI units and radians: k, and the signals of :data:`CONTROLLER_INPUTS`."""
 
     step: int
     """k, from 0 on; t = k T"""
-    state: np.ndarray
-    """x (9), measured, with the unfiltered pitch rate"""
+    estimate: np.ndarray
+    """x (9) with the unfiltered pitch rate: the measurement, or what an estimator makes of it where one flies"""
     filtered_pitch_rate: float
     """q_f, rad/s"""
-    filter_state: np.ndarray
-    """s (2 s) of the notch filter before its update, two a section; empty without a notch filter"""
     reference: np.ndarray
     """x_r (9)"""
     reference_input: np.ndarray
@@ -61,37 +60,23 @@ class ControllerInput(NamedTuple):
     """x_n (9)"""
     nominal_input: np.ndarray
     """u_n (2)"""
+    filter_state: np.ndarray
+    """s (2 s) of the notch filter before its update, two a section; empty without a notch filter"""
 
-
-class Signal(NamedTuple):
-    """Numbers that go from block to block."""
-
-    name: str
-    unit: str
-    """SI; several, separated by commas, are repeated number by number"""
-    size: int
-
-
-_STATE_UNIT, _INPUT_UNIT = ", ".join(STATE_UNITS), ", ".join(INPUT_UNITS)
 
 CONTROLLER_INPUTS = (
-    Signal("state", _STATE_UNIT, N_STATES),
-    Signal("filtered_pitch_rate", "rad/s", 1),
-    Signal("reference", _STATE_UNIT, N_STATES),
-    Signal("reference_input", _INPUT_UNIT, N_INPUTS),
-    Signal("deviation", _STATE_UNIT, N_STATES),
-    Signal("nominal_input", _INPUT_UNIT, N_INPUTS),
+    signals.ESTIMATE,
+    signals.FILTERED_PITCH_RATE,
+    signals.REFERENCE,
+    signals.REFERENCE_INPUT,
+    signals.DEVIATION,
+    signals.NOMINAL_INPUT,
+    signals.FILTER_STATE,
 )
-"""What a compiled controller is given, one after the other, by the names of :class:`ControllerInput`; the state of the
-notch filter follows. C has the same order in ``hsv_block.h``."""
+"""In the order in which a compiled controller finds them, one after the other; C has the same in ``hsv_block.h``."""
 
-CONTROLLER_OUTPUTS = (Signal("wanted_input", _INPUT_UNIT, N_INPUTS),)
-"""What a compiled controller answers."""
-
-
-def filter_state_signal(size: int) -> Signal:
-    """Return the signal that follows :data:`CONTROLLER_INPUTS`, of a notch filter with ``size`` states."""
-    return Signal("filter_state", "rad, rad s", size)
+CONTROLLER_OUTPUTS = (signals.WANTED_INPUT,)
+"""What a compiled controller answers, before the bench limits it."""
 
 
 @dataclass(frozen=True)
@@ -113,8 +98,8 @@ class StepKernel(NamedTuple):
     """A compiled step function, as of :func:`numba.cfunc`, with its arrays.
 
     The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; what is
-    not 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` and s (2 s) one after the other, ``out`` takes the
-    wanted input (2). Everything that is kept from step to step is in ``state``.
+    not 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` one after the other, ``out`` takes the wanted
+    input (2). Everything that is kept from step to step is in ``state``.
     """
 
     address: int
@@ -126,9 +111,14 @@ class StepKernel(NamedTuple):
 class Controller(ABC):
     """A controller as the loop steps it: from measured, reference and nominal state to the input of a step."""
 
+    name = ""
+    """What errors call it"""
+    compiled_with_loop = False
+    """Whether it is a tube law, whose step the compiled loop has in itself; its ``kernel`` is the data of that."""
     kernel: Any = None
-    """What the compiled loop flies: a :class:`hsv.control.tube_law.TubeData`, a :class:`StepKernel`, or ``None``, and
-    :meth:`step` is called."""
+    """Of another one: the :class:`StepKernel` that the compiled loop calls; ``None``, and it calls :meth:`wanted`."""
+    library: Any = None
+    """The user of the shared library with its function, see :mod:`hsv.control.library_process`, where it is in one"""
 
     @abstractmethod
     def reset(self) -> None:
@@ -138,9 +128,19 @@ class Controller(ABC):
     def step(self, inputs: ControllerInput) -> ControllerResult:
         """Return the input of this step; called once a step, in order."""
 
+    def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
+        """Return the input of this step before the limits; called in place of :meth:`step`."""
+        fuel, elevator = self.step(inputs).u_unsaturated
+        return float(fuel), float(elevator)
+
     def copied(self) -> Controller:
         """Return a controller of its own that goes on from the state of this one."""
         return copy.deepcopy(self)
+
+    def failure(self, step: int, what: str) -> ControllerError:
+        """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
+        expected = f"expected a finite number for {' and '.join(INPUT_NAMES)}"
+        return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
 
 
 class ControllerClass(Protocol):
@@ -162,7 +162,16 @@ class ElsewhereController(Controller):
 
     def __init__(self, name: str) -> None:
         """Call it by its ``name`` in errors."""
-        self._name = name
+        self.name = name
+
+    @property
+    def kernel(self) -> Any:
+        """Refuse.
+
+        Raises:
+            ParameterError: Always.
+        """
+        raise self.refusal()
 
     def reset(self) -> None:
         """Nothing is here to be reset."""
@@ -177,7 +186,7 @@ class ElsewhereController(Controller):
 
     def refusal(self) -> ParameterError:
         """Return the error of who wants to fly it here."""
-        return ParameterError(f"controller = {self._name!r}: a node of its own, expected hsv run to fly it")
+        return ParameterError(f"controller = {self.name!r}: a node of its own, expected hsv run to fly it")
 
 
 class ForeignController(Controller):
@@ -189,7 +198,7 @@ class ForeignController(Controller):
         self.vehicle = vehicle
         self._minimum, self._maximum = vehicle.input_minimum, vehicle.input_maximum
         self._controller = controller
-        self.kernel: StepKernel | None = getattr(controller, "kernel", None)
+        self.kernel = getattr(controller, "kernel", None)
         if self.kernel is not None:
             self.reset()
 
@@ -247,11 +256,6 @@ class ForeignController(Controller):
             raise self.failure(inputs.step, f"answered {wanted.tolist()}")
         return ControllerResult(np.minimum(np.maximum(wanted, self._minimum), self._maximum), wanted)
 
-    def failure(self, step: int, what: str) -> ControllerError:
-        """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
-        expected = f"expected a finite number for {' and '.join(INPUT_NAMES)}"
-        return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
-
     def _answer(self, inputs: ControllerInput) -> Any:
         if self.kernel is None:
             return self._controller.step(inputs)
@@ -262,8 +266,7 @@ class ForeignController(Controller):
 
 def flat_input(inputs: ControllerInput) -> np.ndarray:
     """Return what a compiled controller is given, in one array."""
-    named = [np.ravel(getattr(inputs, signal.name)) for signal in CONTROLLER_INPUTS]
-    return np.concatenate((*named, inputs.filter_state))
+    return np.concatenate([np.ravel(given) for given in inputs[1:]])
 
 
 def call_step_function(

@@ -35,6 +35,8 @@ class KothareLaw:
     and the status says so. Inside the family's innermost ellipsoid the last gain stays: there is nothing left to gain.
     """
 
+    compiled_with_loop = False
+
     def __init__(self, design: ControlDesign, data: NominalData) -> None:
         # Modelling and solver take a second to import: only this law pays for them.
         from hsv.design.nominal import nominal_gain

@@ -21,15 +21,14 @@ from hsv.control.controller import (
     CONTROLLER_OUTPUTS,
     ControllerInput,
     ForeignController,
-    Signal,
     StepKernel,
-    filter_state_signal,
     flat_input,
 )
 from hsv.control.library_process import LibraryUser, library_user
 from hsv.control.notch_filter import NotchFilter
 from hsv.errors import ControllerError, HsvError, ParameterError, ProcessError, reason
 from hsv.parameters import check_all
+from hsv.signals import SignalType
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.vehicle import Vehicle
 
@@ -119,7 +118,9 @@ class LibraryClass:
         self._name, self._path, self._symbol = name, path, symbol
         try:
             self.block: Block = library_user(path).describe(symbol)
-            _check_signals("inputs", self.block.inputs, _expected_inputs(self.block))
+            # The size of the last one is that of the notch filter it is flown with.
+            size = self.block.inputs[-1].size if self.block.inputs else 0
+            _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])
             _check_signals("outputs", self.block.outputs, CONTROLLER_OUTPUTS)
         except OSError as error:
             raise ParameterError(
@@ -143,20 +144,20 @@ class LibraryClass:
                 raise ParameterError(
                     f"{parameter.name}: {np.size(own[parameter.name])} numbers, expected {np.size(parameter.default)}"
                 )
-        if len(self.block.inputs) > len(CONTROLLER_INPUTS):
+        if len(self.block.inputs) == len(CONTROLLER_INPUTS):
             states = 2 * len(NotchFilter.from_parameters(values).sections)
-            _check_signals("inputs", self.block.inputs, (*CONTROLLER_INPUTS, filter_state_signal(states)))
+            _check_signals("inputs", self.block.inputs, _inputs(states))
         numbers = np.concatenate([np.ravel(own[parameter.name]) for parameter in self.PARAMETERS] or [np.zeros(0)])
         vehicle = Vehicle.from_parameters(values).decoupled
         return LibraryController(self._name, self._path, self._symbol, self.block.state_size, numbers, vehicle)
 
 
-def _expected_inputs(block: Block) -> tuple[Signal, ...]:
-    """Return as many of a controller's inputs as the block has; the size of the last one depends on the flight."""
-    return (*CONTROLLER_INPUTS, filter_state_signal(block.inputs[-1].size if block.inputs else 0))[: len(block.inputs)]
+def _inputs(filter_states: int) -> tuple[SignalType, ...]:
+    """Return what a controller is given beside a notch filter with so many states."""
+    return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1].of_size(filter_states))
 
 
-def _check_signals(field: str, found: tuple[Signal, ...], expected: tuple[Signal, ...]) -> None:
+def _check_signals(field: str, found: tuple[SignalType, ...], expected: tuple[SignalType, ...]) -> None:
     for index, (signal, other) in enumerate(zip(found, expected, strict=False)):
         if signal != other:
             raise ParameterError(f"{field}[{index}] = {_words(signal)}, expected {_words(other)}")
@@ -164,7 +165,7 @@ def _check_signals(field: str, found: tuple[Signal, ...], expected: tuple[Signal
         raise ParameterError(f"{len(found)} {field}, expected {', '.join(signal.name for signal in expected)}")
 
 
-def _words(signal: Signal) -> str:
+def _words(signal: SignalType) -> str:
     return f"{signal.name}, {signal.size} in {signal.unit!r}"
 
 

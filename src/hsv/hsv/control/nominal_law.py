@@ -49,6 +49,9 @@ class LawResult:
 class NominalLaw(Protocol):
     """A nominal law: deterministic, stepped once a control period."""
 
+    compiled_with_loop: bool
+    """Whether it is the nested family, whose step the compiled loop has in itself."""
+
     def reset(self) -> None:
         """Forget the past."""
 
@@ -95,6 +98,8 @@ def nominal_input(data: Any, deviation: np.ndarray, u_n: np.ndarray) -> tuple[in
 
 class FamilyLaw:
     """The nested family: the gain of the smallest ellipsoid that holds x_n, the outermost where none does."""
+
+    compiled_with_loop = True
 
     def __init__(self, data: NominalData) -> None:
         self.data = data

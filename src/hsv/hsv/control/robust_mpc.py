@@ -25,6 +25,7 @@ class RobustMpc(Controller):
     """One of the nominal gains K acts on the whole deviation from the reference; it has no memory."""
 
     PARAMETERS = ROBUST_MPC_PARAMETERS
+    compiled_with_loop = True
     kernel: TubeData
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
@@ -45,7 +46,7 @@ class RobustMpc(Controller):
         )
         self._memory = memory_of(self.kernel)
         x, u = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
-        self.step(ControllerInput(0, x, 0.0, np.empty(0), x, u, x, u))  # compile now: a cold cache must not stall
+        self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.empty(0)))  # compile now: a cold cache must not stall
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
@@ -70,7 +71,7 @@ class RobustMpc(Controller):
         return TubeResult(
             input=u,
             u_unsaturated=total,
-            error=(inputs.state - inputs.reference)[:N_RIGID],
+            error=(inputs.estimate - inputs.reference)[:N_RIGID],
             tube_centre=np.empty(0),
             tube_half_width=np.empty(0),
             level=math.nan,

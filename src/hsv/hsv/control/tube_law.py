@@ -114,11 +114,11 @@ def tube_step(
     monitored: bool,
     x: np.ndarray,
     q_f: float,
-    s: np.ndarray,
     x_r: np.ndarray,
     u_r: np.ndarray,
     x_n: np.ndarray,
     u_n: np.ndarray,
+    s: np.ndarray,
     u_feedback: np.ndarray,
     u_total: np.ndarray,
     u: np.ndarray,
@@ -193,6 +193,7 @@ class TubeLaw(Controller):
     """The controller's last stage."""
 
     PARAMETERS = TUBE_PARAMETERS
+    compiled_with_loop = True
     kernel: TubeData
     design: ControlDesign
     factors: list[tuple[int, np.ndarray]]
@@ -224,7 +225,7 @@ class TubeLaw(Controller):
         self._memory = memory_of(self.kernel)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
-        self.step(ControllerInput(0, x, 0.0, np.zeros(2 * len(flown)), x, u, x, u))
+        self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown))))
         self.reset()
 
     @classmethod
@@ -278,14 +279,14 @@ class TubeLaw(Controller):
 
     def step(self, inputs: ControllerInput) -> TubeResult:
         """Return the input of this step; the first of a run is step 0."""
-        k, state, _, filter_state, reference, _, deviation, _ = inputs
+        k, x, _, reference, _, deviation, _, filter_state = inputs
         memory, size = self._memory, len(filter_state)
         in_loop = 0 < size == 2 * len(self._notch.D)
         planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         active = tube_step(self.kernel, memory, k, True, *inputs[1:], u_feedback, total, u)
         self._next = k + 1
-        error, tube = (state - reference - deviation)[:N_RIGID], None
+        error, tube = (x - reference - deviation)[:N_RIGID], None
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
         level = tube.level(error) if tube else math.nan

@@ -7,13 +7,17 @@ remappings of the nodes, and so does what a node is called; a bag says which of 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
+from hsv import signals
 from hsv.control.controllers import NODE
 from hsv.errors import ParameterError
+from hsv.signals import SignalType
 from hsv.simulation import blocks
-from hsv.simulation.blocks import Block
+from hsv.simulation.blocks import LOOP, Block
 
 CLOCK = "clock"
 STATE = "hsv/state"
@@ -46,6 +50,24 @@ TOPICS = {
 }
 """Topics with exactly one message a step, in the order in which a step is recorded; which of them there are depends on
 the controller, see :func:`step_topics`."""
+
+CARRIED = {
+    MEASUREMENT: (signals.MEASUREMENT, signals.STATUS),
+    STATE: (signals.STATE, signals.STATUS),
+    FORCES: (signals.FORCES, signals.EFFECTOR),
+    FILTERED_STATE: (
+        signals.MEASUREMENT,
+        signals.ESTIMATE,
+        signals.FILTERED_PITCH_RATE,
+        signals.FILTER_STATE,
+        signals.STATUS,
+    ),
+    NOMINAL: blocks.NOMINAL_TRAJECTORY.outputs,
+    COMMAND: (signals.COMMAND, signals.SATURATED),
+    TUBE_STATUS: (signals.DIAGNOSTICS,),
+    ACTUATOR: blocks.FAULT_INJECTOR.outputs,
+}
+"""The signals of the loop that the messages of a topic carry, passed on or from the block that publishes them."""
 
 LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready"}
 """Announcements that late joiners receive."""
@@ -118,9 +140,21 @@ RECORDER = NodeDescription(
 )
 
 
+def _publisher(topic: str) -> Block:
+    """Return the last block of the loop that gives something of what a topic carries; the rest is passed on."""
+    return next(block for block in reversed(LOOP) if set(block.outputs) & set(CARRIED[topic]))
+
+
+def _carrying(wanted: Iterable[SignalType]) -> tuple[str, ...]:
+    """Return the fewest topics that carry these signals together, of as few the first."""
+    choices = (chosen for count in range(len(CARRIED) + 1) for chosen in combinations(CARRIED, count))
+    return next(chosen for chosen in choices if set(wanted) <= {s for topic in chosen for s in CARRIED[topic]})
+
+
 def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDescription:
     """Return the node that steps ``block``, known by the type of the topic ``first``."""
-    publishes, subscribes = (tuple(f"hsv/{signal}" for signal in side) for side in (block.outputs, block.inputs))
+    publishes = tuple(topic for topic in CARRIED if _publisher(topic) is block)
+    subscribes = _carrying((*block.inputs, *block.delayed))
     return NodeDescription(block.name, package, block.name, publishes, subscribes, TOPICS[first], block=block, **others)
 
 
@@ -128,20 +162,18 @@ NOTCH_FILTER = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
 NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL)
 FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
 
-CONTROLLER = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
+_TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
+
+CONTROLLER = replace(_TUBE, publishes=(COMMAND,))
 """Flies any controller of a class of one's own, named by the parameter ``controller``."""
 
-TUBE_MPC, ROBUST_MPC = (
-    replace(CONTROLLER, name=name, executable=name, publishes=(COMMAND, TUBE_STATUS))
-    for name in ("tube_mpc", "robust_mpc")
-)
-"""Controllers with a node and a name of their own, on the same topics."""
+TUBE_MPC, ROBUST_MPC = (replace(_TUBE, name=name, executable=name) for name in ("tube_mpc", "robust_mpc"))
+"""Controllers with a node and a name of their own, which publish diagnostics of the tube, too."""
 
 CONTROLLERS = {node.name: node for node in (TUBE_MPC, ROBUST_MPC)}
 
-# The vehicle takes what was commanded in the step before, so that its input is no input of its block's step.
 PLANT = _stepping(blocks.VEHICLE, "hsv_plant", STATE, announces=(RUN, LAST_STATE))
-PLANT = replace(PLANT, publishes=(*PLANT.publishes, CLOCK), subscribes=(ACTUATOR,))
+PLANT = replace(PLANT, publishes=(*PLANT.publishes, CLOCK))
 
 COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
 """All nodes of the graph in one process."""

@@ -94,6 +94,9 @@ def _read_state(message: Message, signals: Signals) -> None:
 
 def _read_filtered_state(message: Message, signals: Signals) -> None:
     _read_measurement(message, signals)
+    # Bags from before there were estimators lack the field.
+    estimated = getattr(message, "estimate", ())
+    signals.estimate = np.asarray(estimated) if len(estimated) else signals.measurement
     signals.filtered_pitch_rate = message.filtered_pitch_rate
     signals.filter_state = np.asarray(message.filter_state)
 
@@ -168,7 +171,11 @@ def _fill_filtered_state(signals: Signals, filtered: Message, _: MessageClass) -
     fill_state(filtered.state, signals.measurement)
     filtered.filtered_pitch_rate = signals.filtered_pitch_rate
     filtered.filter_state = signals.filter_state
+    filtered.estimate = _NO_ESTIMATE if signals.estimate is signals.measurement else signals.estimate
     filtered.status = signals.status
+
+
+_NO_ESTIMATE = np.empty(0)
 
 
 def _fill_nominal(signals: Signals, nominal: Message, _: MessageClass) -> None:
@@ -184,12 +191,12 @@ def _fill_nominal(signals: Signals, nominal: Message, _: MessageClass) -> None:
 def _fill_command(signals: Signals, command: Message, _: MessageClass) -> None:
     _answer(signals, command)
     fill_input(command, signals.command)
-    command.saturated[:] = signals.answer.saturated.tolist()
+    command.saturated[:] = signals.saturated.tolist()
 
 
 def _fill_tube_status(signals: Signals, status: Message, _: MessageClass) -> None:
     _answer(signals, status)
-    result: Any = signals.answer
+    result: Any = signals.diagnostics
     status.error = result.error
     status.tube_centre, status.tube_half_width = result.tube_centre, result.tube_half_width
     status.level, status.inside = result.level, result.inside
@@ -225,7 +232,7 @@ def _fill_actuator(signals: Signals, actuator: Message, message_class: MessageCl
             parameter_names=list(acting.parameters),
             parameter_values=np.array([*acting.parameters.values()]),
         )
-        for acting in signals.active
+        for acting in signals.active_faults
     ]
 
 

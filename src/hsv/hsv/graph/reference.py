@@ -6,9 +6,11 @@ from collections.abc import Iterable
 
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
+from hsv.graph.description import CARRIED
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
+from hsv.signals import VARYING
 from hsv.simulation.blocks import LOOP
 from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
@@ -28,24 +30,36 @@ messages only. ROS takes the time from `/clock`: in a namespace it needs `-r /cl
 
 _LOOP = """## The loop
 The blocks that a step passes through, in this order; each is stepped by the node of its name, the controller by that of
-its own. A signal `x` is the topic `hsv/x`.
+its own.
+
+"""
+
+_SIGNALS = """
+The signals, with the topics whose messages carry them; a size that depends on the flight is left out.
 
 """
 
 
 def reference() -> str:
-    """Return the page: the loop, and one table a node."""
-    parts = [_HEADER, _LOOP + _loop(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
+    """Return the page: the loop, its signals, and one table a node."""
+    parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
     return "\n".join(parts)
 
 
 def _loop() -> str:
-    rows = ["| block | needs of the step | of the step before | gives |", "| --- | --- | --- | --- |"]
-    rows += [
-        f"| {block.name} | {' | '.join(', '.join(s) for s in (block.inputs, block.delayed, block.outputs))} |"
-        for block in LOOP
-    ]
+    rows = ["| block | needs of the step | of the step before | gives | keeps |", "| --- | --- | --- | --- | --- |"]
+    for block in LOOP:
+        groups = block.inputs, block.delayed, block.outputs, block.state
+        rows.append(f"| {block.name} | {' | '.join(', '.join(s.name for s in group) for group in groups)} |")
+    return "\n".join(rows) + "\n"
+
+
+def _signals() -> str:
+    rows = ["| signal | numbers | unit | topics |", "| --- | --- | --- | --- |"]
+    for signal in (signal for block in LOOP for signal in block.outputs):
+        topics = ", ".join(f"`{topic}`" for topic, carried in CARRIED.items() if signal in carried)
+        rows.append(f"| {signal.name} | {'' if signal.size == VARYING else signal.size} | {signal.unit} | {topics} |")
     return "\n".join(rows) + "\n"
 
 

@@ -9,13 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.controller import Controller, ControllerInput, ControllerResult
+from hsv import signals as types
+from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput, ControllerResult
 from hsv.control.controllers import build_controller
 from hsv.errors import HsvError
+from hsv.signals import SignalType
 from hsv.vehicle.dynamics import PITCH_RATE
 
 if TYPE_CHECKING:  # a node imports its own component alone
@@ -29,7 +32,10 @@ if TYPE_CHECKING:  # a node imports its own component alone
 
 
 class Signals:
-    """What the blocks say to one another in a step, SI units and radians; each writes what it gives."""
+    """What the blocks say to one another in a step, SI units and radians; each writes what it gives.
+
+    The attributes beside step, period and header are the signals of :mod:`hsv.signals`, by name.
+    """
 
     step = -1
     """k; -1 before the vehicle has said where it starts"""
@@ -49,6 +55,8 @@ class Signals:
     measurement: np.ndarray
     """x (9) as measured"""
 
+    estimate: np.ndarray
+    """x (9) as the controller is to take it: the measurement, or what an estimator makes of it"""
     filtered_pitch_rate: float
     """q_f, rad/s"""
     filter_state: np.ndarray
@@ -69,14 +77,16 @@ class Signals:
     nominal_status: int
     """:class:`hsv.control.nominal_law.NominalStatus`"""
 
-    answer: ControllerResult
-    """Of the controller: its input, and what it says beside"""
     command: np.ndarray
     """u (2)"""
+    saturated: np.ndarray
+    """(2) whether the limits have changed it"""
+    diagnostics: ControllerResult
+    """What the controller says beside its input"""
     actuator: np.ndarray
     """(2), what becomes of the command"""
-    active: tuple[Fault, ...]
-    """Faults of this step"""
+    active_faults: tuple[Fault, ...]
+    """Of this step"""
 
 
 @dataclass(frozen=True)
@@ -89,13 +99,15 @@ class Block:
 
     Empty where the parameters choose it.
     """
-    inputs: tuple[str, ...]
+    inputs: tuple[SignalType, ...]
     """Signals of the same step that it needs: what it gives feeds through from them."""
-    outputs: tuple[str, ...]
+    outputs: tuple[SignalType, ...]
     step: Callable[[Any, Signals], None]
     """Steps a component on the signals."""
-    delayed: tuple[str, ...] = ()
+    delayed: tuple[SignalType, ...] = ()
     """Signals of the step before that it needs."""
+    state: tuple[SignalType, ...] = ()
+    """Signals that it keeps for the next step."""
     designed: bool = False
     """Whether it is built from the controller's design, too."""
 
@@ -144,6 +156,7 @@ def _fly(plant: Plant, signals: Signals) -> None:
 
 def _filter(notch: NotchFilter, signals: Signals) -> None:
     result = notch.step(float(signals.measurement[PITCH_RATE]))
+    signals.estimate = signals.measurement
     signals.filtered_pitch_rate, signals.filter_state = result.filtered_pitch_rate, result.filter_state
 
 
@@ -156,61 +169,90 @@ def _plan(trajectory: NominalTrajectory, signals: Signals) -> None:
 
 
 def _control(controller: Controller, signals: Signals) -> None:
-    signals.answer = controller.step(
-        ControllerInput(
-            signals.step,
-            signals.measurement,
-            signals.filtered_pitch_rate,
-            signals.filter_state,
-            signals.reference,
-            signals.reference_input,
-            signals.deviation,
-            signals.nominal_input,
-        )
-    )
-    signals.command = signals.answer.input
+    result = controller.step(ControllerInput(signals.step, *_given(signals)))
+    signals.command, signals.saturated, signals.diagnostics = result.input, result.saturated, result
 
 
 def _actuate(injector: FaultInjector, signals: Signals) -> None:
     result = injector.step(signals.step, signals.command)
-    signals.actuator, signals.active = result.actuator, result.active
+    signals.actuator, signals.active_faults = result.actuator, result.active
 
 
 _NO_GAIN = np.empty((0, 9))
+_given = attrgetter(*(signal.name for signal in CONTROLLER_INPUTS))
 
 VEHICLE = Block(
-    "plant", "hsv.vehicle.plant:Plant", (), ("measurement", "state", "forces"), _fly, delayed=("actuator", "state")
+    "plant",
+    "hsv.vehicle.plant:Plant",
+    inputs=(),
+    outputs=(types.MEASUREMENT, types.STATE, types.STATUS, types.FORCES, types.EFFECTOR),
+    step=_fly,
+    delayed=(types.ACTUATOR,),
+    state=(types.STATE,),
 )
 NOTCH_FILTER = Block(
-    "notch_filter", "hsv.control.notch_filter:NotchFilter", ("measurement",), ("filtered_state",), _filter
+    "notch_filter",
+    "hsv.control.notch_filter:NotchFilter",
+    inputs=(types.MEASUREMENT,),
+    outputs=(types.ESTIMATE, types.FILTERED_PITCH_RATE, types.FILTER_STATE),
+    step=_filter,
+    state=(types.FILTER_STATE,),
 )
 NOMINAL_TRAJECTORY = Block(
     "nominal_trajectory",
     "hsv.control.nominal_trajectory:NominalTrajectory",
-    ("measurement",),
-    ("nominal",),
-    _plan,
+    inputs=(types.MEASUREMENT,),
+    outputs=(
+        types.REFERENCE,
+        types.REFERENCE_INPUT,
+        types.DEVIATION,
+        types.NOMINAL_INPUT,
+        types.GAIN,
+        types.GAIN_INDEX,
+        types.NOMINAL_STATUS,
+    ),
+    step=_plan,
+    state=(types.DEVIATION,),
     designed=True,
 )
-CONTROLLER = ControllerBlock("controller", "", ("filtered_state", "nominal"), ("command",), _control)
-FAULT_INJECTOR = Block("fault_injector", "hsv.faults.actuator:FaultInjector", ("command",), ("actuator",), _actuate)
+CONTROLLER = ControllerBlock(
+    "controller",
+    "",
+    inputs=CONTROLLER_INPUTS,
+    outputs=(types.COMMAND, types.SATURATED, types.DIAGNOSTICS),
+    step=_control,
+)
+FAULT_INJECTOR = Block(
+    "fault_injector",
+    "hsv.faults.actuator:FaultInjector",
+    inputs=(types.COMMAND,),
+    outputs=(types.ACTUATOR, types.ACTIVE_FAULTS),
+    step=_actuate,
+)
 
 
 def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
     """Return ``blocks`` in an order in which each finds the inputs that it needs.
 
     Raises:
-        HsvError: A signal that nobody or that two give, or an algebraic loop.
+        HsvError: A signal that nobody or that two give, or that is taken with another unit or size than it is given
+            with, or an algebraic loop.
     """
-    givers: dict[str, Block] = {}
+    givers: dict[str, tuple[Block, SignalType]] = {}
     for block in blocks:
         for signal in block.outputs:
-            if signal in givers:
-                raise HsvError(f"{block.name}: gives {signal}, expected no other block to, {givers[signal].name} does")
-            givers[signal] = block
+            if signal.name in givers:
+                other = givers[signal.name][0].name
+                raise HsvError(f"{block.name}: gives {signal.name}, expected no other block to, {other} does")
+            givers[signal.name] = block, signal
     for block in blocks:
-        if lacking := [signal for signal in (*block.inputs, *block.delayed) if signal not in givers]:
-            raise HsvError(f"{block.name}: needs {lacking[0]}, expected one of {', '.join(givers)}")
+        for signal in (*block.inputs, *block.delayed):
+            if signal.name not in givers:
+                raise HsvError(f"{block.name}: needs {signal.name}, expected one of {', '.join(givers)}")
+            giver, given = givers[signal.name]
+            if signal != given:
+                wanted, found = (f"{s.size} in {s.unit!r}" for s in (signal, given))
+                raise HsvError(f"{block.name}: needs {signal.name}, {wanted}, expected {found} as {giver.name} gives")
     ordered: list[Block] = []
 
     def place(block: Block, path: tuple[Block, ...]) -> None:
@@ -221,7 +263,7 @@ def in_order(blocks: Sequence[Block]) -> tuple[Block, ...]:
             )
         if block not in ordered:
             for signal in block.inputs:
-                place(givers[signal], (*path, block))
+                place(givers[signal.name][0], (*path, block))
             ordered.append(block)
 
     for block in blocks:

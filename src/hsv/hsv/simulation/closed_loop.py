@@ -8,27 +8,21 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import accumulate
+from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from hsv.control.controller import (
-    CONTROLLER_INPUTS,
-    Controller,
-    ControllerInput,
-    ElsewhereController,
-    ForeignController,
-)
-from hsv.control.library import LibraryController
-from hsv.control.nominal_law import FamilyLaw, NominalLaw, nominal_input
+from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
+from hsv.control.nominal_law import NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.tube_law import TubeData, memory_of, no_tube, tube_step
+from hsv.control.tube_law import memory_of, no_tube, tube_step
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.actuator import FaultInjector, apply_faults
+from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
 from hsv.simulation.metrics import FlightData, flight_metrics
@@ -114,7 +108,7 @@ class LoopArrays(NamedTuple):
     What a controller is given is one array.
     """
 
-    state: np.ndarray
+    estimate: np.ndarray
     filtered_pitch_rate: np.ndarray
     reference: np.ndarray
     reference_input: np.ndarray
@@ -126,27 +120,21 @@ class LoopArrays(NamedTuple):
     memory: np.ndarray
 
 
-_ENDS = tuple(accumulate(signal.size for signal in CONTROLLER_INPUTS))
-_CUTS = {
-    name: slice(start, end)
-    for name, start, end in zip(
-        (*(signal.name for signal in CONTROLLER_INPUTS), "filter_state"), (0, *_ENDS), (*_ENDS, None), strict=True
-    )
-}
-"""Where what a compiled controller is given lies in its one array."""
-_FIELDS = [_CUTS[name] for name in ControllerInput._fields[1:]]
-_FILTERED = ControllerInput._fields[1:].index("filtered_pitch_rate")
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, LoopArrays]:
-    given = np.zeros(_ENDS[-1] + filter_states)
-    views = {name: given[cut] for name, cut in _CUTS.items()}
-    return given, LoopArrays(**views, wanted=np.zeros(N_INPUTS), gain_index=np.zeros(1), memory=memory)
+def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, list[slice], LoopArrays]:
+    """Return what a controller is given, where each signal lies in it, and the arrays of which they are views."""
+    ends = [*accumulate(filter_states if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)]
+    given = np.zeros(ends[-1])
+    cuts = [slice(*cut) for cut in pairwise((0, *ends))]
+    views = [given[cut] for cut in cuts]
+    return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), memory))
 
 
 @njit(cache=True, nogil=True)
 def _fly(
+    x: np.ndarray,
     vehicle: Any,
     period: float,
     substeps: int,
@@ -161,11 +149,11 @@ def _fly(
     work: np.ndarray,
     history: Any,
 ) -> int:
-    """Fly as many steps as ``history`` has rows, from the state in ``arrays``; return the number of rows written.
+    """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
 
     Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k.
     """
-    x, q_f, x_r, u_r, x_n, u_n, s, wanted, gain_index, memory = arrays
+    estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, gain_index, memory = arrays
     n, m = len(x), len(u_n)
     filter_state = np.zeros(len(s))
     rest(notch, x[PITCH_RATE], filter_state)
@@ -183,6 +171,7 @@ def _fly(
             advance(x, actuator, vehicle, period, substeps, work)
         for i in range(n):
             history.state[k, i] = x[i]
+            estimate[i] = x[i]
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
@@ -217,7 +206,7 @@ def _fly(
                 total[i] = wanted[i]
                 u[i] = min(max(total[i], tube.minimum[i]), tube.maximum[i])
         else:
-            tube_step(tube, memory, k, False, x, q_f[0], s, x_r, u_r, x_n, u_n, u_feedback, total, u)
+            tube_step(tube, memory, k, False, estimate, q_f[0], x_r, u_r, x_n, u_n, s, u_feedback, total, u)
         for i in range(m):
             history.u_unsaturated[k, i] = total[i]
         for i in range(m):
@@ -303,7 +292,7 @@ def fly(components: Components) -> Flight:
         ParameterError: The controller is a node of its own.
     """
     rows = components.plant.steps + 1
-    if isinstance(components.controller, LibraryController):
+    if components.controller.library is not None:
         with watched(components.controller, rows) as (history, request):
             flown = request("fly", rows, kept=vars(components))
             return _flight(components, history.copy().cut(flown))
@@ -312,7 +301,7 @@ def fly(components: Components) -> Flight:
 
 
 @contextmanager
-def watched(controller: LibraryController, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
+def watched(controller: Controller, rows: int) -> Iterator[tuple[History, Callable[..., Any]]]:
     """Yield the history, of so many steps, that a library's flights are written to, and what requests them.
 
     Flights are given up when they stand still; an error says in which step.
@@ -340,19 +329,16 @@ def fly_into(history: History, components: Components) -> int:
         ControllerError, ParameterError: As :func:`fly`.
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
-    if isinstance(controller, ElsewhereController):
-        raise controller.refusal()
-    tube = controller.kernel if isinstance(controller.kernel, TubeData) else no_tube(plant.vehicle)
-    given, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
-    arrays.state[:] = plant.initial.state
+    tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
+    given, cuts, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
     nominal_call = controller_call = NO_CALL
     callbacks = []
-    if not isinstance(nominal.law, FamilyLaw):
+    if not nominal.law.compiled_with_loop:
         callbacks.append(_solving(nominal.law, arrays))
         nominal_call = callbacks[-1].call
-    if isinstance(controller, ForeignController):
+    if not controller.compiled_with_loop:
         if controller.kernel is None:
-            callbacks.append(_controlling(controller, given, arrays))
+            callbacks.append(_controlling(controller, given, cuts, arrays.wanted))
             controller_call = callbacks[-1].call
         else:
             address, state, parameters = controller.kernel
@@ -363,6 +349,7 @@ def fly_into(history: History, components: Components) -> int:
             nominal.law.reset()
             controller.reset()
         rows = _fly(
+            plant.initial.state.copy(),
             plant.vehicle,
             plant.period,
             plant.substeps,
@@ -381,7 +368,6 @@ def fly_into(history: History, components: Components) -> int:
         if callback.error is not None:
             raise callback.error
     if rows < 0:
-        assert isinstance(controller, ForeignController)
         raise controller.failure(-1 - rows, f"returned an error or answered {arrays.wanted.tolist()}")
     return rows
 
@@ -394,13 +380,13 @@ def _solving(law: NominalLaw, arrays: LoopArrays) -> Callback:
     return Callback(solve)
 
 
-def _controlling(controller: ForeignController, given: np.ndarray, arrays: LoopArrays) -> Callback:
+def _controlling(controller: Controller, given: np.ndarray, cuts: list[slice], wanted: np.ndarray) -> Callback:
     def control(step: int) -> None:
         # A copy: a controller may keep what it was given.
         now = given.copy()
-        fields: list[Any] = [now[cut] for cut in _FIELDS]
-        fields[_FILTERED] = float(fields[_FILTERED][0])
-        arrays.wanted[0], arrays.wanted[1] = controller.wanted(ControllerInput(step, *fields))
+        estimate, filtered_pitch_rate, *others = [now[cut] for cut in cuts]
+        inputs = ControllerInput(step, estimate, float(filtered_pitch_rate[0]), *others)
+        wanted[0], wanted[1] = controller.wanted(inputs)
 
     return Callback(control)
 

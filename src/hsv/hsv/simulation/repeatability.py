@@ -102,10 +102,10 @@ def _copy(controller: Controller) -> Controller:
 
 def _inputs(k: int, flight: Flight, filtered_pitch_rate: float, filter_state: np.ndarray) -> ControllerInput:
     history = flight.history
-    rows = (flight.reference, flight.reference_input, history.deviation, history.nominal_input)
+    rows = history.state, flight.reference, flight.reference_input, history.deviation, history.nominal_input
     # Copies: a controller may keep or change what it was given.
-    planned = [row[k].copy() for row in rows]
-    return ControllerInput(k, history.state[k].copy(), filtered_pitch_rate, filter_state.copy(), *planned)
+    x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
+    return ControllerInput(k, x, filtered_pitch_rate, x_r, u_r, x_n, u_n, filter_state.copy())
 
 
 def under_load(scenario: Scenario, first: Flight) -> Finding:

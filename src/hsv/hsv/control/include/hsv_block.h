@@ -102,8 +102,8 @@ enum { HSV_FUEL_EQUIVALENCE_RATIO, HSV_ELEVATOR_DEFLECTION, HSV_INPUTS };
 
 /* Where a controller finds what it is given. */
 enum {
-    HSV_STATE = 0,                                           /* x, measured, with the unfiltered pitch rate */
-    HSV_FILTERED_PITCH_RATE = HSV_STATE + HSV_STATES,        /* q_f */
+    HSV_ESTIMATE = 0,                                        /* x, measured or estimated, with the unfiltered pitch rate */
+    HSV_FILTERED_PITCH_RATE = HSV_ESTIMATE + HSV_STATES,     /* q_f */
     HSV_REFERENCE = HSV_FILTERED_PITCH_RATE + 1,             /* x_r */
     HSV_REFERENCE_INPUT = HSV_REFERENCE + HSV_STATES,        /* u_r */
     HSV_DEVIATION = HSV_REFERENCE_INPUT + HSV_INPUTS,        /* x_n, zero without a design */
@@ -115,7 +115,7 @@ enum {
  * reads the notch filter's state, with as many numbers as the filter has that it flies with. The outputs are the wanted
  * input of the vehicle, which the bench limits. */
 #define HSV_CONTROLLER_INPUTS \
-    {"state", HSV_STATE_UNITS, HSV_STATES}, \
+    {"estimate", HSV_STATE_UNITS, HSV_STATES}, \
     {"filtered_pitch_rate", "rad/s", 1}, \
     {"reference", HSV_STATE_UNITS, HSV_STATES}, \
     {"reference_input", HSV_INPUT_UNITS, HSV_INPUTS}, \
