@@ -28,6 +28,7 @@ ON_THE_PATH = (
     "elimination.py",
     "inheritance.py",
     "signals.py",
+    "noise.py",
     "units.py",
     "vehicle/dynamics.py",
     "vehicle/envelope.py",
