@@ -30,6 +30,7 @@ ON_THE_PATH = (
     "signals.py",
     "noise.py",
     "units.py",
+    "vehicle/actuators.py",
     "vehicle/dynamics.py",
     "vehicle/envelope.py",
     "vehicle/integration.py",

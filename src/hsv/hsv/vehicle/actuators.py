@@ -1,0 +1,277 @@
+"""Actuators of the vehicle: dynamics of first and second order with limits, discretised exactly, compiled.
+
+An actuator moves on substeps of a quarter of the control period, and the vehicle on the same ones, held over each where
+the actuator is at its middle. A channel whose actuator is ideal is where its command is; with all channels ideal and no
+fault of theirs the vehicle takes the command itself, as if this module were not there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hsv.elementary import exponential, sine_cosine
+from hsv.errors import ParameterError
+from hsv.parameters import Parameter, check_all
+from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS
+from hsv.vehicle.parameters import VehicleParameters
+
+SUBSTEPS = 4
+"""Of a control period, where an actuator is not ideal."""
+
+POSITION, RATE = 0, 1
+"""Columns of the state (2, 2), a row a channel."""
+
+
+@dataclass(frozen=True)
+class ActuatorSet:
+    """A published actuator, SI and radians; a limit that is infinite is none."""
+
+    channel: str
+    order: int
+    """0 ideal, 1 or 2"""
+    natural_frequency: float
+    """rad/s; the inverse of the time constant where the order is 1"""
+    damping_ratio: float
+    stop: float
+    """Largest magnitude of the position; the vehicle's limits hold beside"""
+    rate_limit: float
+    source: str
+
+
+IDEAL = "ideal"
+
+ACTUATOR_SETS = {
+    "elevator_50": ActuatorSet(
+        INPUT_NAMES[1],
+        2,
+        50.0,
+        0.7,
+        math.radians(20.0),
+        math.radians(400.0),
+        "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6",
+    ),
+    "elevator_150": ActuatorSet(
+        INPUT_NAMES[1],
+        2,
+        150.0,
+        0.7,
+        math.radians(30.0),
+        math.radians(100.0),
+        "Wiese, generic hypersonic vehicle, MIT thesis 2013",
+    ),
+    "elevator_20": ActuatorSet(
+        INPUT_NAMES[1], 2, 20.0, 0.7, math.radians(30.0), math.inf, "NASA, Generic Urban Air Mobility simulation"
+    ),
+    "elevator_first_order_20": ActuatorSet(
+        INPUT_NAMES[1], 1, 20.0, 1.0, math.inf, math.inf, "scramjet vehicle trade studies, AIAA 2009-7287"
+    ),
+    "fuel_10": ActuatorSet(
+        INPUT_NAMES[0],
+        1,
+        10.0,
+        1.0,
+        math.inf,
+        math.inf,
+        "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery",
+    ),
+}
+"""What a scenario may name."""
+
+
+def _parameters() -> tuple[Parameter, ...]:
+    table = []
+    for channel, unit in zip(INPUT_NAMES, ("", *INPUT_UNITS[1:]), strict=True):
+        names = tuple(name for name, entry in ACTUATOR_SETS.items() if entry.channel == channel)
+        where = f"actuator.{channel}"
+        per_second = f"{unit or '1'}/s"
+        table += [
+            Parameter(f"{where}.set", IDEAL, "published actuator of this channel", choices=(IDEAL, *names)),
+            Parameter(f"{where}.order", [], "order of the dynamics, 0 ideal, instead of the set's", "", 0.0, 2.0),
+            Parameter(f"{where}.natural_frequency", [], "instead of the set's", "rad/s", 0.1, 1e4),
+            Parameter(f"{where}.damping_ratio", [], "instead of the set's", "", 0.05, 1.0),
+            Parameter(f"{where}.stop", [], "largest magnitude, instead of the set's", unit, 0.0, 1e3),
+            Parameter(f"{where}.rate_limit", [], "largest rate, instead of the set's", per_second, 1e-6, 1e6),
+            Parameter(f"{where}.acceleration_limit", [], "of order 2; none unless given", f"{per_second}^2", 1e-6),
+        ]
+    return tuple(table)
+
+
+ACTUATOR_PARAMETERS = _parameters()
+"""Empty: as the set has it."""
+
+
+class ActuatorData(NamedTuple):
+    """Actuators for compiled functions, an entry a channel (2), and the length ``substep`` (s) of a substep.
+
+    ``map`` (2, 2, 2) takes position less command, and rate, over a substep; for an order of 1 its first entry alone.
+    """
+
+    order: np.ndarray
+    natural_frequency: np.ndarray
+    damping_ratio: np.ndarray
+    map: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+    rate_limit: np.ndarray
+    acceleration_limit: np.ndarray
+    substep: float
+    ideal: bool
+
+
+@njit(cache=True, error_model="numpy")
+def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
+    """Return F11, F12, F21, F22 of position less command and rate over ``h`` (s), the command held: exact.
+
+    Args:
+        order: 1: position less command decays by F11; 2.
+        frequency: rad/s.
+        damping: Up to 1, of an order of 2.
+        h: s.
+    """
+    if order == 1:
+        return exponential(-frequency * h), 0.0, 0.0, 0.0
+    decay = exponential(-damping * frequency * h)
+    damped = frequency * np.sqrt(1.0 - damping * damping)
+    sin, cos = sine_cosine(damped * h)
+    scaled = sin / damped if damped > 0.0 else h
+    return (
+        decay * (cos + damping * frequency * scaled),
+        decay * scaled,
+        -frequency * frequency * decay * scaled,
+        decay * (cos - damping * frequency * scaled),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def actuator_step(
+    order: int,
+    map: Any,
+    position: float,
+    rate: float,
+    command: float,
+    minimum: float,
+    maximum: float,
+    rate_limit: float,
+    acceleration_limit: float,
+    h: float,
+) -> tuple[float, float]:
+    """Return position and rate ``h`` (s) later, the command held (limits in GHV's order, see :data:`ACTUATOR_SETS`).
+
+    The command goes to the stops; the exact map; acceleration; rate; the stops. A position that is beyond a stop, which
+    has moved, may stay there and return, but not go further. In equilibrium nothing changes, to the bit.
+
+    Args:
+        order: 0, 1 or 2.
+        map: Of :func:`actuator_map` (2, 2).
+        position: Of the actuator; that and the rest in the channel's unit.
+        rate: Per second; an order below 2 does not need it.
+        command: Position that is asked for.
+        minimum: Stop.
+        maximum: Stop.
+        rate_limit: Infinite: none.
+        acceleration_limit: Infinite: none; for an order of 2.
+        h: s.
+    """
+    wanted = min(max(command, minimum), maximum)
+    if order == 2:
+        error = position - wanted
+        moved = wanted + (map[0, 0] * error + map[0, 1] * rate)
+        speed = map[1, 0] * error + map[1, 1] * rate
+        change = acceleration_limit * h
+        speed = min(max(speed, rate - change), rate + change)
+        speed = min(max(speed, -rate_limit), rate_limit)
+    elif order == 1:
+        moved = wanted + map[0, 0] * (position - wanted)
+        speed = 0.0
+    else:
+        moved = wanted
+        speed = 0.0
+    reach = rate_limit * h
+    if abs(moved - position) > reach:
+        moved = position + (reach if moved > position else -reach)
+    low, high = min(minimum, position), max(maximum, position)
+    if moved <= low:
+        moved = low
+        speed = max(speed, 0.0)
+    elif moved >= high:
+        moved = high
+        speed = min(speed, 0.0)
+    if order < 2:
+        speed = (moved - position) / h
+    return moved, speed
+
+
+@njit(cache=True, error_model="numpy")
+def held_position(before: float, after: float, command: float) -> float:
+    """Return what the vehicle is given over a substep: the middle of the way, or the command where it was reached.
+
+    An ideal actuator is where its command is at once, and so is one in equilibrium.
+    """
+    return after if after == command else 0.5 * (before + after)
+
+
+def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> ActuatorData:
+    """Return the actuators that :data:`ACTUATOR_PARAMETERS` describe, of ``vehicle``, on substeps of ``period`` (s).
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    v = check_all(ACTUATOR_PARAMETERS, values)
+    h = period / SUBSTEPS
+    order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 2, 2))
+    frequency, damping, rate, acceleration = (np.full(N_INPUTS, np.inf) for _ in range(4))
+    low, high = vehicle.input_minimum, vehicle.input_maximum
+    for i, channel in enumerate(INPUT_NAMES):
+        where = f"actuator.{channel}"
+        name = v[f"{where}.set"]
+        base = ACTUATOR_SETS.get(name, ActuatorSet(channel, 0, math.inf, 1.0, math.inf, math.inf, ""))
+        given = {
+            field: _one(v, f"{where}.{field}", standard)
+            for field, standard in (
+                ("order", float(base.order)),
+                ("natural_frequency", base.natural_frequency),
+                ("damping_ratio", base.damping_ratio),
+                ("stop", base.stop),
+                ("rate_limit", base.rate_limit),
+                ("acceleration_limit", math.inf),
+            )
+        }
+        if given["order"] not in (0.0, 1.0, 2.0):
+            raise ParameterError(f"parameter {where}.order = {given['order']:g}: expected 0, 1 or 2")
+        order[i] = int(given["order"])
+        frequency[i], damping[i] = given["natural_frequency"], given["damping_ratio"]
+        rate[i], acceleration[i] = given["rate_limit"], given["acceleration_limit"]
+        low[i], high[i] = max(low[i], -given["stop"]), min(high[i], given["stop"])
+        if order[i] > 0:
+            if not math.isfinite(frequency[i]):
+                raise ParameterError(
+                    f"parameter {where}.natural_frequency: none given, expected one for an order of {order[i]}"
+                )
+            map[i] = np.reshape(actuator_map(order[i], frequency[i], damping[i], h), (2, 2))
+        elif math.isfinite(frequency[i]):
+            raise ParameterError(f"parameter {where}.order: 0, expected 1 or 2 with a natural frequency")
+        if order[i] < 2 and math.isfinite(acceleration[i]):
+            raise ParameterError(f"parameter {where}.acceleration_limit: expected none for an order of {order[i]}")
+    stops = np.array_equal(low, vehicle.input_minimum) and np.array_equal(high, vehicle.input_maximum)
+    ideal = not order.any() and stops and not np.isfinite(rate).any()
+    return ActuatorData(order, frequency, damping, map, low, high, rate, acceleration, h, bool(ideal))
+
+
+def _one(values: Mapping[str, Any], name: str, standard: float) -> float:
+    given = values[name]
+    if len(given) > 1:
+        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
+    return float(given[0]) if len(given) else standard
+
+
+def actuators_at_rest(position: np.ndarray) -> np.ndarray:
+    """Return the state (2, 2) of actuators that rest at ``position`` (2), as flights begin in trim."""
+    state = np.zeros((N_INPUTS, 2))
+    state[:, POSITION] = position
+    return state
