@@ -3,7 +3,7 @@ import published_model as published
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.vehicle.dynamics import derivative, forces, jacobian
+from hsv.vehicle.dynamics import air_relative, derivative, forces, jacobian
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -132,3 +132,67 @@ def test_jacobian_leaves_its_arguments_alone():
     jacobian(x, u, vehicle)
     assert_array_equal(x, before[0])
     assert_array_equal(u, before[1])
+
+
+STILL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""Conditions of :func:`forces_in`: wind, density, factors of thrust, lift and drag, increment of the moment."""
+
+
+def rates_in(conditions, x, u, vehicle):
+    out = np.empty(9)
+    derivative(x, u, vehicle, out, conditions)
+    return out
+
+
+def acceleration(x, d):
+    """Forward and upward acceleration of the inertial velocity."""
+    path, turn = x[3] - x[2], d[3] - d[2]
+    ahead = np.array([np.cos(path), np.sin(path)])
+    return d[1] * ahead + x[1] * turn * np.array([-ahead[1], ahead[0]])
+
+
+def test_air_relative_velocity_is_the_difference_of_two_vectors():
+    for x, _ in random_points():
+        speed, angle = air_relative(x[1], x[3] - x[2], 30.0, -12.0)
+        ground = x[1] * np.exp(1j * (x[3] - x[2]))
+        assert_allclose(speed * np.exp(1j * angle), ground - (30.0 - 12.0j), rtol=1e-14)
+
+
+def test_still_air_given_as_conditions_is_still_air():
+    p = load_vehicle().coupled()
+    for x, u in random_points():
+        assert_allclose(rates_in(STILL, x, u, p), rates(x, u, p), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("wind", [(40.0, 0.0), (0.0, 9.0), (-25.0, -7.0)])
+def test_uniform_wind_is_a_moving_frame(wind):
+    # Galileo: over flat ground, forces and accelerations are those that an observer in the air sees in still air.
+    p = load_vehicle().coupled("derived")
+    for x, u in random_points():
+        seen = x.copy()
+        velocity = x[1] * np.exp(1j * (x[3] - x[2])) - complex(*wind)
+        seen[1], seen[2] = np.abs(velocity), x[3] - np.angle(velocity)
+        d, expected = rates_in(np.array([*wind, *STILL[2:]]), x, u, p), rates(seen, u, p)
+        assert d[0] == pytest.approx(expected[0] + wind[1], rel=1e-9)
+        assert_allclose(acceleration(x, d), acceleration(seen, expected), rtol=1e-8, atol=1e-9)
+        assert_allclose(d[3:], expected[3:], rtol=1e-9, atol=1e-9)
+
+
+def test_density_acts_on_all_forces_of_the_air_but_not_on_thrust():
+    p = load_vehicle().coupled()
+    denser = p._replace(reference_density=1.1 * p.reference_density)
+    conditions = STILL.copy()
+    conditions[2] = 1.1
+    for x, u in random_points():
+        assert_allclose(rates_in(conditions, x, u, p), rates(x, u, denser), rtol=1e-8, atol=1e-8)
+
+
+def test_factors_of_the_engine_scale_their_forces():
+    p = load_vehicle().coupled()
+    less = p._replace(**{f"thrust_beta_{i}": 0.3 * getattr(p, f"thrust_beta_{i}") for i in range(1, 9)})
+    less = less._replace(**{n: 0.8 * getattr(p, n) for n in p._fields if n.startswith("lift_")})
+    less = less._replace(**{n: 1.2 * getattr(p, n) for n in p._fields if n.startswith("drag_")})
+    less = less._replace(moment_zero=p.moment_zero + 0.05)
+    conditions = np.array([0.0, 0.0, 1.0, 0.3, 0.8, 1.2, 0.05])
+    for x, u in random_points():
+        assert_allclose(rates_in(conditions, x, u, p), rates(x, u, less), rtol=1e-8, atol=1e-8)

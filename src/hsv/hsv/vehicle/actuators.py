@@ -109,7 +109,7 @@ ACTUATOR_PARAMETERS = _parameters()
 class ActuatorData(NamedTuple):
     """Actuators for compiled functions, an entry a channel (2), and the length ``substep`` (s) of a substep.
 
-    ``map`` (2, 2, 2) takes position less command, and rate, over a substep; for an order of 1 its first entry alone.
+    ``map`` (2, 4) is that of :func:`actuator_map`, over a substep.
     """
 
     order: np.ndarray
@@ -160,15 +160,17 @@ def actuator_step(
     rate_limit: float,
     acceleration_limit: float,
     h: float,
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """Return position and rate ``h`` (s) later, the command held (limits in GHV's order, see :data:`ACTUATOR_SETS`).
 
     The command goes to the stops; the exact map; acceleration; rate; the stops. A position that is beyond a stop, which
-    has moved, may stay there and return, but not go further. In equilibrium nothing changes, to the bit.
+    has moved, may stay there and return, but not go further. In equilibrium nothing changes, to the bit. The third
+    number is what the vehicle is given: the middle of the way, but for an ideal actuator, which is where its command is
+    at once.
 
     Args:
         order: 0, 1 or 2.
-        map: Of :func:`actuator_map` (2, 2).
+        map: Of :func:`actuator_map` (4).
         position: Of the actuator; that and the rest in the channel's unit.
         rate: Per second; an order below 2 does not need it.
         command: Position that is asked for.
@@ -181,13 +183,13 @@ def actuator_step(
     wanted = min(max(command, minimum), maximum)
     if order == 2:
         error = position - wanted
-        moved = wanted + (map[0, 0] * error + map[0, 1] * rate)
-        speed = map[1, 0] * error + map[1, 1] * rate
+        moved = wanted + (map[0] * error + map[1] * rate)
+        speed = map[2] * error + map[3] * rate
         change = acceleration_limit * h
         speed = min(max(speed, rate - change), rate + change)
         speed = min(max(speed, -rate_limit), rate_limit)
     elif order == 1:
-        moved = wanted + map[0, 0] * (position - wanted)
+        moved = wanted + map[0] * (position - wanted)
         speed = 0.0
     else:
         moved = wanted
@@ -204,16 +206,7 @@ def actuator_step(
         speed = min(speed, 0.0)
     if order < 2:
         speed = (moved - position) / h
-    return moved, speed
-
-
-@njit(cache=True, error_model="numpy")
-def held_position(before: float, after: float, command: float) -> float:
-    """Return what the vehicle is given over a substep: the middle of the way, or the command where it was reached.
-
-    An ideal actuator is where its command is at once, and so is one in equilibrium.
-    """
-    return after if after == command else 0.5 * (before + after)
+    return moved, speed, 0.5 * (position + moved) if order > 0 or rate_limit < np.inf else moved
 
 
 def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> ActuatorData:
@@ -224,7 +217,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
     """
     v = check_all(ACTUATOR_PARAMETERS, values)
     h = period / SUBSTEPS
-    order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 2, 2))
+    order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 4))
     frequency, damping, rate, acceleration = (np.full(N_INPUTS, np.inf) for _ in range(4))
     low, high = vehicle.input_minimum, vehicle.input_maximum
     for i, channel in enumerate(INPUT_NAMES):
@@ -253,7 +246,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
                 raise ParameterError(
                     f"parameter {where}.natural_frequency: none given, expected one for an order of {order[i]}"
                 )
-            map[i] = np.reshape(actuator_map(order[i], frequency[i], damping[i], h), (2, 2))
+            map[i] = actuator_map(order[i], frequency[i], damping[i], h)
         elif math.isfinite(frequency[i]):
             raise ParameterError(f"parameter {where}.order: 0, expected 1 or 2 with a natural frequency")
         if order[i] < 2 and math.isfinite(acceleration[i]):

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from hsv.elementary import exponential, sine_cosine
+from hsv.elementary import arctangent2, exponential, sine_cosine
 from hsv.vehicle.parameters import VehicleParameters
 
 STATE_NAMES = (
@@ -73,13 +73,65 @@ def forces(x: Any, u: Any, p: Any) -> Any:
 
 
 @njit(cache=True, error_model="numpy")
-def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
+def air_relative(velocity: Any, path_angle: Any, wind_x: float, wind_z: float) -> Any:
+    """Return speed (m/s) and path angle (rad) relative to air that moves at ``wind_x`` forward, ``wind_z`` up (m/s)."""
+    sin, cos = sine_cosine(path_angle)
+    forward, up = velocity * cos - wind_x, velocity * sin - wind_z
+    return np.sqrt(forward * forward + up * up), arctangent2(up, forward)
+
+
+@njit(cache=True, error_model="numpy")
+def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
+    """Return lift N, drag N, thrust N, pitching moment N m under ``conditions``, and the air's angle of attack rad.
+
+    Lift is across the inertial path and drag along it: those of the air, turned by the angle between the two paths.
+
+    Args:
+        conditions: (7): wind forward and up (m/s), density for that of the model, factors of thrust, lift and drag,
+            increment of the pitching moment coefficient. The thrust does not depend on the density.
+        x: State (9), inertial.
+        u: Input (2).
+        p: Parameters.
+    """
+    path_angle = x[3] - x[2]
+    speed, air_angle = air_relative(x[1], path_angle, conditions[0], conditions[1])
+    alpha = x[3] - air_angle
+    lift, drag, thrust, moment, pressure = forces((x[0], speed, alpha), u, p)
+    moment = conditions[2] * (
+        moment - p.thrust_moment_arm * thrust + pressure * p.reference_area * p.mean_aerodynamic_chord * conditions[6]
+    )
+    thrust *= conditions[3]
+    lift *= conditions[2] * conditions[4]
+    drag *= conditions[2] * conditions[5]
+    sin, cos = sine_cosine(air_angle - path_angle)
+    return (
+        lift * cos - drag * sin,
+        drag * cos + lift * sin,
+        thrust,
+        moment + p.thrust_moment_arm * thrust,
+        alpha,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def derivative(x: Any, u: Any, p: Any, out: Any, conditions: Any = None) -> None:
     """Write dx/dt into ``out`` (9): the coupled model (paper eq. 1), decoupled (eq. 4) where both couplings are zero.
 
-    The two elastic accelerations appear in each other's equation; the 2x2 system is solved exactly.
+    The two elastic accelerations appear in each other's equation; the 2x2 system is solved exactly. Velocity and angle
+    of attack, pitch angle less path angle, are inertial.
+
+    Args:
+        x: State (9).
+        u: Input (2).
+        p: Parameters.
+        out: Written.
+        conditions: Of air and engine (7), see :func:`forces_in`; none: still air and an engine that works.
     """
     velocity, alpha, pitch, rate = x[1], x[2], x[3], x[4]
-    lift, drag, thrust, moment, _ = forces(x, u, p)
+    if conditions is None:
+        lift, drag, thrust, moment, _ = forces(x, u, p)
+    else:
+        lift, drag, thrust, moment, alpha = forces_in(conditions, x, u, p)
     alpha2 = alpha * alpha
     force_1 = p.elastic_force_1_alpha_squared * alpha2 + p.elastic_force_1_alpha * alpha + p.elastic_force_1_zero
     force_2 = (
@@ -100,6 +152,7 @@ def derivative(x: Any, u: Any, p: Any, out: Any) -> None:
     acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant
     acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant
 
+    alpha = x[2]
     sin_alpha, cos_alpha = sine_cosine(alpha)
     sin_path, cos_path = sine_cosine(pitch - alpha)
     out[0] = velocity * sin_path

@@ -16,23 +16,26 @@ def workspace() -> np.ndarray:
 
 
 @njit(cache=True, error_model="numpy")
-def advance(x: Any, u: Any, p: Any, period: float, substeps: int, work: Any) -> None:
-    """Replace ``x`` (9) by the state one ``period`` (s) later, input ``u`` (2) held, by ``substeps`` steps of RK4."""
+def advance(x: Any, u: Any, p: Any, period: float, substeps: int, work: Any, conditions: Any = None) -> None:
+    """Replace ``x`` (9) by the state one ``period`` (s) later, input ``u`` (2) held, by ``substeps`` steps of RK4.
+
+    So are the ``conditions`` (7) of :func:`hsv.vehicle.dynamics.forces_in`, where there are any.
+    """
     h = period / substeps
     slope, point, total = work[0], work[1], work[2]
     for _ in range(substeps):
-        derivative(x, u, p, slope)
+        derivative(x, u, p, slope, conditions)
         for i in range(N_STATES):
             total[i] = slope[i]
             point[i] = x[i] + 0.5 * h * slope[i]
-        derivative(point, u, p, slope)
+        derivative(point, u, p, slope, conditions)
         for i in range(N_STATES):
             total[i] += 2.0 * slope[i]
             point[i] = x[i] + 0.5 * h * slope[i]
-        derivative(point, u, p, slope)
+        derivative(point, u, p, slope, conditions)
         for i in range(N_STATES):
             total[i] += 2.0 * slope[i]
             point[i] = x[i] + h * slope[i]
-        derivative(point, u, p, slope)
+        derivative(point, u, p, slope, conditions)
         for i in range(N_STATES):
             x[i] += h / 6.0 * (total[i] + slope[i])

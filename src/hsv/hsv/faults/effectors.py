@@ -1,0 +1,182 @@
+"""Actuators and effectors that fail: from the command that reaches them to what the vehicle is given, compiled.
+
+The order is: dynamics with the limits that faults leave, scale, bias, drift, oscillation, what replaces the position
+(the newest wins), the stops. It is gone through on every substep; a law gives what holds at the middle of one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from hsv.elementary import sine
+from hsv.faults.laws import ACTING, KEPT, ONSET, begin_faults
+from hsv.faults.table import (
+    BANDWIDTH,
+    BIAS,
+    DRIFT,
+    FLOAT,
+    HARD_OVER,
+    LOCK,
+    LOCK_AT,
+    OSCILLATION,
+    RATE_LIMIT,
+    SCALE,
+    SOLID_OSCILLATION,
+    STOP_LIMIT,
+)
+from hsv.vehicle.actuators import POSITION, RATE, SUBSTEPS, actuator_map, actuator_step
+from hsv.vehicle.integration import advance
+
+_TWO_PI = 6.283185307179586
+
+
+@njit(cache=True, error_model="numpy")
+def move_effectors(
+    data: Any,
+    state: np.ndarray,
+    rows: Any,
+    memory: np.ndarray,
+    step: int,
+    substep: int,
+    command: np.ndarray,
+    angle_of_attack: float,
+    effector: np.ndarray,
+) -> None:
+    """Move the actuators over one substep and write what the vehicle is given over it into ``effector`` (2).
+
+    Args:
+        data: :class:`hsv.vehicle.actuators.ActuatorData`.
+        state: Position and rate of the actuators (2, 2), replaced.
+        rows: Faults of dynamics and effectors, of which those act that their ``memory`` says.
+        memory: See :mod:`hsv.faults.laws`.
+        step: k.
+        substep: From 0.
+        command: That reaches the actuators (2).
+        angle_of_attack: rad, for what floats along the flow.
+        effector: What it was over the substep before; replaced.
+    """
+    n = len(rows.start)
+    middle = (substep + 0.5) * data.substep
+    for channel in range(len(command)):
+        order = data.order[channel]
+        map = (data.map[channel, 0], data.map[channel, 1], data.map[channel, 2], data.map[channel, 3])
+        frequency, damping = data.natural_frequency[channel], data.damping_ratio[channel]
+        minimum, maximum, rate = data.minimum[channel], data.maximum[channel], data.rate_limit[channel]
+        slowed = False
+        for i in range(n):
+            if memory[i, ACTING] == 1.0 and rows.channel[i] == channel:
+                values = rows.parameters[i]
+                if rows.code[i] == BANDWIDTH and values[0] < frequency:
+                    frequency = values[0]
+                    order = max(order, 1)
+                    slowed = True
+                elif rows.code[i] == RATE_LIMIT:
+                    rate = min(rate, values[0])
+                elif rows.code[i] == STOP_LIMIT:
+                    minimum, maximum = max(minimum, values[0]), min(maximum, values[1])
+        if slowed:
+            map = actuator_map(order, frequency, damping, data.substep)
+        after, speed, position = actuator_step(
+            order,
+            map,
+            state[channel, POSITION],
+            state[channel, RATE],
+            command[channel],
+            minimum,
+            maximum,
+            rate,
+            data.acceleration_limit[channel],
+            data.substep,
+        )
+        replaced = False
+        for i in range(n):
+            if memory[i, ACTING] == 1.0 and rows.channel[i] == channel and rows.code[i] >= SCALE:
+                if memory[i, ONSET] == step and substep == 0:
+                    memory[i, KEPT] = effector[channel]
+                if rows.code[i] >= LOCK:
+                    replaced = rows.code[i] != FLOAT
+                position = _deflected(rows, memory[i], i, step, middle, angle_of_attack, position)
+        position = min(max(position, data.minimum[channel]), data.maximum[channel])
+        if replaced:  # the actuator itself is held, and goes on from there when it is free
+            after, speed = position, 0.0
+        state[channel, POSITION], state[channel, RATE] = after, speed
+        effector[channel] = position
+
+
+@njit(cache=True, error_model="numpy")
+def _deflected(rows: Any, memory: np.ndarray, i: int, step: int, middle: float, alpha: float, position: float) -> float:
+    """Return what the effector does, ``position`` without this fault, ``middle`` s after the beginning of ``step``."""
+    code, values = rows.code[i], rows.parameters[i]
+    elapsed = (step - rows.start[i]) * rows.period + middle
+    if code == SCALE:
+        return values[0] * position
+    if code == BIAS:
+        return position + values[0]
+    if code == DRIFT:
+        return position + min(max(values[0] * elapsed, -values[1]), values[1])
+    if code in (OSCILLATION, SOLID_OSCILLATION):
+        turns = values[1] * elapsed
+        wave = values[0] * sine(_TWO_PI * (turns - math.floor(turns)) + values[2])
+        return (position if code == OSCILLATION else memory[KEPT]) + wave
+    if code == LOCK:
+        return memory[KEPT]
+    if code == LOCK_AT:
+        return values[0]
+    if code == FLOAT:
+        return -values[0] * alpha
+    if code == HARD_OVER:
+        return memory[KEPT] + values[0] * ((step - memory[ONSET]) * rows.period + middle)
+    return position
+
+
+@njit(cache=True, error_model="numpy")
+def advance_equipped(
+    x: Any,
+    command: np.ndarray,
+    p: Any,
+    period: float,
+    substeps: int,
+    data: Any,
+    state: np.ndarray,
+    rows: Any,
+    memory: np.ndarray,
+    step: int,
+    seed: int,
+    effector: np.ndarray,
+    work: Any,
+    conditions: Any = None,
+) -> None:
+    """Replace ``x`` (9) by the state one ``period`` (s) later, ``command`` (2) held by what drives the actuators.
+
+    While actuators are ideal and no fault of theirs acts, the vehicle takes the command, within the stops, as
+    :func:`hsv.vehicle.integration.advance` does; else both move on the substeps of the actuators.
+
+    Args:
+        x: State, replaced.
+        command: That reaches the actuators.
+        p: Parameters of the vehicle.
+        period: T (s).
+        substeps: Runge-Kutta steps a period while all is ideal.
+        data: :class:`hsv.vehicle.actuators.ActuatorData`.
+        state: Position and rate of the actuators (2, 2), replaced.
+        rows: Faults of dynamics and effectors.
+        memory: Theirs, replaced.
+        step: k.
+        seed: Of the flight.
+        effector: What the vehicle was given last (2), replaced.
+        work: See :func:`hsv.vehicle.integration.workspace`.
+        conditions: Of air and engine (7), held, or none.
+    """
+    if begin_faults(rows, memory, step, seed) == 0 and data.ideal:
+        for i in range(len(command)):
+            effector[i] = min(max(command[i], data.minimum[i]), data.maximum[i])
+            state[i, POSITION], state[i, RATE] = effector[i], 0.0
+        advance(x, effector, p, period, substeps, work, conditions)
+    else:
+        for j in range(SUBSTEPS):
+            move_effectors(data, state, rows, memory, step, j, command, x[2], effector)
+            advance(x, effector, p, data.substep, 1, work, conditions)

@@ -1,0 +1,279 @@
+"""When faults act and what those on the command and on the engine do, compiled: functions of data, memory and step.
+
+Rows are faults, sorted into the order in which they are composed; a row of the memory is all that a row remembers.
+Everything random is drawn at (step, stream) once a period. Faults of effectors are in :mod:`hsv.faults.effectors`,
+those of sensors in :mod:`hsv.sensors`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from hsv.faults.table import (
+    BACKLASH,
+    DEAD_ZONE,
+    DELAY,
+    FAULT_KINDS,
+    LONGEST_DELAY,
+    LOSS,
+    REPLACING,
+    REVERSAL,
+    THRUST_LOSS,
+    UNSTART_OUTSIDE,
+    Fault,
+)
+from hsv.noise import STREAMS, uniforms
+from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
+
+ALWAYS, PERIODIC, RANDOM = 0, 1, 2
+"""How a fault occurs between its start and its stop."""
+
+N_PARAMETERS = max(len(kind.parameters) for kind in FAULT_KINDS.values())
+
+ACTING, LAST, ONSET, AWAY, KEPT, SINCE, QUEUE = range(7)
+"""Columns of the memory: whether it acts in this step; the last step in which it did; the first of those steps that
+follow one another; the state of the Markov chain, 1 while it does not act; what is kept of the signal, and since when;
+from the last one on, the delayed signal."""
+
+MEMORY = QUEUE + LONGEST_DELAY + 1
+"""Numbers in the memory of a row."""
+
+_NOT_YET = -2.0
+_OCCURRENCE = STREAMS["fault_occurrence"]
+
+
+class FaultRows(NamedTuple):
+    """Faults for compiled functions, a row each: steps [start, stop), channel, code, occurrence (n, 3), parameters.
+
+    The channel counts among inputs or states. ``occurrence`` is :data:`ALWAYS`, or :data:`PERIODIC` with the
+    period and the share of it in steps, or :data:`RANDOM` with the probabilities of going and of coming in a step.
+    ``period`` is T (s).
+    """
+
+    start: np.ndarray
+    stop: np.ndarray
+    channel: np.ndarray
+    code: np.ndarray
+    occurrence: np.ndarray
+    parameters: np.ndarray
+    period: float
+
+
+def fault_rows(sides: Sequence[str], scheduled: Sequence[tuple[Fault, int, int]], period: float) -> FaultRows:
+    """Return the faults of some ``sides`` among those that are scheduled, in the order of their composition.
+
+    Args:
+        sides: Of those in :mod:`hsv.faults.table`.
+        scheduled: Faults with the first step and the first step without, in any order.
+        period: T (s).
+    """
+    chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
+    n = len(chosen)
+    occurrence, parameters = np.zeros((n, 3)), np.zeros((n, N_PARAMETERS))
+    for i, (fault, _, _) in enumerate(chosen):
+        own = len(fault.kind.parameters)
+        parameters[i, :own] = fault.values[:own]
+        occurrence[i] = _occurrence(fault.values[own:], period)
+    return FaultRows(
+        np.array([start for _, start, _ in chosen], np.int64),
+        np.array([stop for _, _, stop in chosen], np.int64),
+        np.array([_place(fault.channel) for fault, _, _ in chosen], np.int64),
+        np.array([fault.kind.code for fault, _, _ in chosen], np.int64),
+        occurrence,
+        parameters,
+        period,
+    )
+
+
+def _place(channel: str) -> int:
+    """Return where a channel is among the inputs or the states; 0 for the engine."""
+    return next((names.index(channel) for names in (INPUT_NAMES, STATE_NAMES) if channel in names), 0)
+
+
+def _order(row: tuple[Fault, int, int]) -> tuple[Any, ...]:
+    fault, start, stop = row
+    code = fault.kind.code
+    # What replaces the position is one stage, in which the newest is last.
+    stage = (REPLACING[0], start, code) if code in REPLACING else (code, start, 0)
+    return *stage, fault.channel, fault.values, stop
+
+
+def _occurrence(values: Sequence[float], period: float) -> tuple[float, float, float]:
+    cycle, duty, on, off = values
+    if cycle > 0.0:
+        steps = max(1, round(cycle / period))
+        return float(PERIODIC), float(steps), float(math.ceil(duty * steps - 1e-9))
+    if on > 0.0:
+        return float(RANDOM), min(1.0, period / on), min(1.0, period / off)
+    return float(ALWAYS), 0.0, 0.0
+
+
+def fault_memory(rows: FaultRows, earlier: FaultRows | None = None, memory: np.ndarray | None = None) -> np.ndarray:
+    """Return the memory (n, :data:`MEMORY`) of ``rows`` before they act.
+
+    Args:
+        rows: Faults of a side.
+        earlier: Those that were known before a change in flight, with their ``memory``, which the same faults keep.
+        memory: See there.
+    """
+    kept: dict[tuple[Any, ...], np.ndarray] = {}
+    if earlier is not None and memory is not None:
+        kept = {_identity(earlier, i): memory[i] for i in range(len(earlier.start))}
+    found = np.zeros((len(rows.start), MEMORY))
+    found[:, LAST] = found[:, ONSET] = _NOT_YET
+    for i in range(len(found)):
+        if (known := kept.get(_identity(rows, i))) is not None:
+            found[i] = known
+    return found
+
+
+def _identity(rows: FaultRows, i: int) -> tuple[Any, ...]:
+    """Return what tells a fault from others: all but its stop, which a clearance in flight moves."""
+    return (
+        *(int(column[i]) for column in (rows.start, rows.channel, rows.code)),
+        *rows.occurrence[i].tolist(),
+        *rows.parameters[i].tolist(),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
+    """Note in ``memory`` (n, :data:`MEMORY`) which ``rows`` act in ``step``; return how many do."""
+    acting = 0
+    for i in range(len(rows.start)):
+        acts = rows.start[i] <= step < rows.stop[i]
+        if acts:
+            how = rows.occurrence[i, 0]
+            if how == PERIODIC:
+                acts = (step - rows.start[i]) % int(rows.occurrence[i, 1]) < int(rows.occurrence[i, 2])
+            elif how == RANDOM:
+                if step == rows.start[i]:
+                    memory[i, AWAY] = 0.0
+                else:
+                    drawn, _ = uniforms(seed, step, _OCCURRENCE + rows.code[i], rows.channel[i])
+                    away = memory[i, AWAY] == 1.0
+                    if drawn < (rows.occurrence[i, 2] if away else rows.occurrence[i, 1]):
+                        memory[i, AWAY] = 0.0 if away else 1.0
+                acts = memory[i, AWAY] == 0.0
+        memory[i, ACTING] = 1.0 if acts else 0.0
+        if acts:
+            acting += 1
+            if memory[i, LAST] != step - 1:
+                memory[i, ONSET] = step
+            memory[i, LAST] = step
+    return acting
+
+
+@njit(cache=True, error_model="numpy")
+def apply_command_faults(
+    rows: Any, memory: np.ndarray, trim: np.ndarray, step: int, seed: int, command: np.ndarray, actuator: np.ndarray
+) -> None:
+    """Write into ``actuator`` (2) what becomes of ``command`` (2) on its way to the actuators in ``step``.
+
+    Loss of effectiveness, reversal, delay, dead zone, backlash, in this order (paper eq. 14, eq. 15). Dead zones lie
+    about ``trim`` (2).
+    """
+    for i in range(len(command)):
+        actuator[i] = command[i]
+    if begin_faults(rows, memory, step, seed) == 0:
+        return
+    for i in range(len(rows.start)):
+        if memory[i, ACTING] == 1.0:
+            channel = rows.channel[i]
+            actuator[channel] = _commanded(rows, memory[i], i, trim[channel], step, actuator[channel])
+
+
+@njit(cache=True, error_model="numpy")
+def _commanded(rows: Any, memory: np.ndarray, i: int, trim: float, step: int, command: float) -> float:
+    code, value = rows.code[i], rows.parameters[i, 0]
+    fresh = memory[ONSET] == step
+    if code == LOSS:
+        ramp, elapsed = rows.parameters[i, 1], (step - rows.start[i]) * rows.period
+        if elapsed < ramp:
+            value = 1.0 + (value - 1.0) * (elapsed / ramp)
+        return value * command
+    if code == REVERSAL:
+        return 2.0 * value * trim - command
+    if code == DELAY:
+        size = int(value) + 1
+        if fresh:
+            for j in range(size):
+                memory[QUEUE + j] = command
+        memory[QUEUE + step % size] = command
+        return memory[QUEUE + (step + 1) % size]
+    if code == DEAD_ZONE:
+        off = command - trim
+        if abs(off) <= 0.5 * value:
+            return trim
+        return command - 0.5 * value if off > 0.0 else command + 0.5 * value
+    if code == BACKLASH:
+        before = command if fresh else memory[KEPT]
+        memory[KEPT] = min(max(before, command - 0.5 * value), command + 0.5 * value)
+        return memory[KEPT]
+    return command
+
+
+@njit(cache=True, error_model="numpy")
+def apply_engine_faults(
+    rows: Any,
+    memory: np.ndarray,
+    step: int,
+    seed: int,
+    angle_of_attack: float,
+    mach: float,
+    fuel: float,
+    engine: np.ndarray,
+) -> None:
+    """Write into ``engine`` (4) the factors of thrust, lift and drag and the increment of C_M in ``step``.
+
+    1, 1, 1, 0 while all is well. Losses of thrust and an unstarted inlet multiply; of the aerodynamic effects of
+    several unstarts, the last one's hold.
+
+    Args:
+        rows: Faults of the engine.
+        memory: Theirs.
+        step: k.
+        seed: Of the flight.
+        angle_of_attack: rad, of the air.
+        mach: Mach number.
+        fuel: Equivalence ratio that the engine gets.
+        engine: Written.
+    """
+    engine[0], engine[1], engine[2], engine[3] = 1.0, 1.0, 1.0, 0.0
+    if begin_faults(rows, memory, step, seed) == 0:
+        return
+    for i in range(len(rows.start)):
+        if memory[i, ACTING] == 1.0:
+            values = rows.parameters[i]
+            if rows.code[i] == UNSTART_OUTSIDE and not _unstarted(
+                rows, memory[i], i, step, angle_of_attack, mach, fuel
+            ):
+                continue
+            engine[0] *= values[0]
+            if rows.code[i] != THRUST_LOSS:
+                engine[1], engine[2] = values[1], values[2]
+                engine[3] = values[3] + values[4] * angle_of_attack
+
+
+@njit(cache=True, error_model="numpy")
+def _unstarted(rows: Any, memory: np.ndarray, i: int, step: int, alpha: float, mach: float, fuel: float) -> bool:
+    """Tell whether the inlet is unstarted; KEPT says that it was, SINCE from which step on."""
+    values = rows.parameters[i]
+    if memory[ONSET] == step:
+        memory[KEPT] = 0.0
+    off_alpha, off_mach = (alpha - values[5]) / values[6], (mach - values[7]) / values[8]
+    distance, limit = off_alpha * off_alpha + off_mach * off_mach, values[9]
+    if memory[KEPT] == 0.0:
+        if distance > 1.0 or fuel > limit:
+            memory[KEPT], memory[SINCE] = 1.0, step
+    else:
+        regained = 1.0 - values[10]
+        long_enough = (step - memory[SINCE]) * rows.period >= values[11]
+        if long_enough and distance < regained * regained and fuel < regained * limit:
+            memory[KEPT] = 0.0
+    return memory[KEPT] == 1.0

@@ -1,0 +1,397 @@
+"""Every kind of fault: what may fail in which way, with which parameters; parser, help and documentation read it.
+
+A fault has a side, where it acts: on the command on its way to the actuator, on the actuator's dynamics, on the
+effector that it moves, on the engine, or on a sensor. Faults that act at once are composed in one order whatever the
+order in which they are listed, that of :data:`FAULT_KINDS`; among those that replace the effector's position the newest
+wins. Any kind may come and go, see :data:`OCCURRENCE_PARAMETERS`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Self
+
+from hsv.errors import ParameterError
+from hsv.parameters import Parameter
+from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+
+ENGINE = "engine"
+"""The channel of faults of the engine itself."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """What can fail: the SI unit of its signal, and a travel, with which the ranges of parameters are measured."""
+
+    unit: str
+    travel: float
+
+
+CHANNELS = {
+    **{
+        name: Channel("" if unit == "1" else unit, travel)
+        for name, unit, travel in zip(INPUT_NAMES, INPUT_UNITS, (1.5, math.radians(30.0)), strict=True)
+    },
+    ENGINE: Channel("", 1.0),
+    **{
+        name: Channel(unit, travel)
+        for name, unit, travel in zip(
+            STATE_NAMES, STATE_UNITS, (3000.0, 300.0, 0.5, 0.5, 1.0, 30.0, 500.0, 30.0, 500.0), strict=True
+        )
+    },
+}
+"""Control inputs, the engine, and the states, whose sensors fail."""
+
+COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effector", "engine", "sensor"
+
+(
+    LOSS,
+    REVERSAL,
+    DELAY,
+    DEAD_ZONE,
+    BACKLASH,
+    BANDWIDTH,
+    RATE_LIMIT,
+    STOP_LIMIT,
+    SCALE,
+    BIAS,
+    DRIFT,
+    OSCILLATION,
+    LOCK,
+    LOCK_AT,
+    FLOAT,
+    HARD_OVER,
+    SOLID_OSCILLATION,
+    THRUST_LOSS,
+    UNSTART,
+    UNSTART_OUTSIDE,
+    SENSOR_SCALE,
+    SENSOR_NOISE,
+    SENSOR_BIAS,
+    SENSOR_RUNAWAY,
+    SENSOR_DROP_OUT,
+    SENSOR_FREEZE,
+) = range(26)
+"""Codes of the kinds for compiled functions, in the order in which they act."""
+
+REPLACING = (LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION)
+"""What replaces the position of an effector: the newest wins."""
+
+LONGEST_DELAY = 50
+"""Steps."""
+
+
+@dataclass(frozen=True)
+class FaultParameter:
+    """A parameter of a kind of fault; ``{}`` in its unit is the unit of the channel, whose travel scales the range."""
+
+    name: str
+    description: str
+    unit: str
+    minimum: float
+    maximum: float
+    default: float | None = None
+    """None: it must be given"""
+    whole: bool = False
+
+    def of(self, channel: str) -> Parameter:
+        """Return it for a ``channel``: unit, range and default in the channel's unit."""
+        described = CHANNELS[channel]
+        own = "{}" in self.unit
+        scale = described.travel if own else 1.0
+        unit = self.unit.replace("{}", described.unit or "1") if own else self.unit
+        return Parameter(
+            self.name,
+            self.minimum * scale if self.default is None else self.default,
+            self.description,
+            "" if unit == "1" else unit,
+            self.minimum * scale,
+            self.maximum * scale,
+        )
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A kind of fault: its code and side, which channels it may have, its own parameters, and whether it remembers."""
+
+    code: int
+    side: str
+    channels: tuple[str, ...]
+    meaning: str
+    parameters: tuple[FaultParameter, ...] = ()
+    memory: bool = False
+
+
+_P = FaultParameter
+_EFFECTIVENESS = _P("effectiveness", "share of the command that remains", "", 0.0, 1.0)
+_WIDTH = _P("width", "whole width", "{}", 0.0, 1.0)
+_AMPLITUDE = _P("amplitude", "amplitude", "{}", 0.0, 1.0)
+_FREQUENCY = _P("frequency", "frequency", "Hz", 1e-3, 100.0)
+_PHASE = _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0)
+_UNSTART = (
+    _P("thrust_factor", "thrust that remains", "", 0.0, 1.0, 0.0),
+    _P("lift_factor", "lift for that of the started inlet", "", 0.0, 2.0, 0.8),
+    _P("drag_factor", "drag for that of the started inlet", "", 0.0, 5.0, 1.2),
+    _P("moment_zero", "increment of the pitching moment coefficient", "", -0.5, 0.5, 0.045),
+    _P("moment_alpha", "the same, per angle of attack", "1/rad", -5.0, 5.0, 0.0),
+)
+_OUTSIDE = (
+    _P("angle_of_attack", "centre of the region where the inlet stays started", "rad", -0.5, 0.5, 0.0),
+    _P("angle_of_attack_reach", "half axis of that region", "rad", 1e-3, 10.0, 10.0),
+    _P("mach", "centre of that region", "", 0.0, 30.0, 8.0),
+    _P("mach_reach", "half axis of that region", "", 1e-2, 100.0, 100.0),
+    _P("fuel_limit", "fuel equivalence ratio above which the inlet unstarts", "", 0.0, 10.0, 10.0),
+    _P("hysteresis", "share of region and limit that must be regained for a restart", "", 0.0, 0.9, 0.1),
+    _P("restart_time", "time unstarted at least", "s", 0.0, 1e4, 0.0),
+)
+
+FAULT_KINDS = {
+    "loss_of_effectiveness": FaultKind(
+        LOSS,
+        COMMAND,
+        INPUT_NAMES,
+        "the actuator moves by effectiveness times the command (paper eq. 15), which is reached over a ramp",
+        (_EFFECTIVENESS, _P("ramp_time", "time in which it is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
+    ),
+    "reversal": FaultKind(
+        REVERSAL,
+        COMMAND,
+        INPUT_NAMES,
+        "the command changes its sign",
+        (_P("about_trim", "0: of the total command, 1: of its difference from the trim", "", 0.0, 1.0, 0.0),),
+    ),
+    "delay": FaultKind(
+        DELAY,
+        COMMAND,
+        INPUT_NAMES,
+        "the actuator hears the command late, at first the one at the start of the fault",
+        (_P("steps", "control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
+        memory=True,
+    ),
+    "dead_zone": FaultKind(DEAD_ZONE, COMMAND, INPUT_NAMES, "commands near the trim have no effect", (_WIDTH,)),
+    "backlash": FaultKind(
+        BACKLASH, COMMAND, INPUT_NAMES, "the actuator follows with play, at first in its middle", (_WIDTH,), memory=True
+    ),
+    "bandwidth": FaultKind(
+        BANDWIDTH,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the natural frequency falls to this one; an ideal actuator becomes a lag of first order",
+        (_P("natural_frequency", "at most", "rad/s", 0.1, 1e3),),
+    ),
+    "rate_limit": FaultKind(
+        RATE_LIMIT, DYNAMICS, INPUT_NAMES, "the actuator moves no faster", (_P("rate", "at most", "{}/s", 1e-4, 100.0),)
+    ),
+    "stop_limit": FaultKind(
+        STOP_LIMIT,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the actuator moves no further; beyond it, it returns as fast as it can",
+        (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
+    ),
+    "effector_scale": FaultKind(
+        SCALE,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector does this multiple of the actuator's position",
+        (_P("factor", "multiple", "", -1.0, 2.0),),
+    ),
+    "bias": FaultKind(
+        BIAS,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector is off by a constant",
+        (_P("offset", "added to the position", "{}", -1.0, 1.0),),
+    ),
+    "drift": FaultKind(
+        DRIFT,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector is off by more and more",
+        (
+            _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
+            _P("limit", "largest offset", "{}", 0.0, 1.0),
+        ),
+    ),
+    "oscillation": FaultKind(
+        OSCILLATION,
+        EFFECTOR,
+        INPUT_NAMES,
+        "an oscillation is added to the position (liquid failure)",
+        (_AMPLITUDE, _FREQUENCY, _PHASE),
+    ),
+    "lock_in_place": FaultKind(LOCK, EFFECTOR, INPUT_NAMES, "the effector stays where it is", memory=True),
+    "lock_at": FaultKind(
+        LOCK_AT,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector stays at a given position",
+        (_P("position", "position", "{}", -1.0, 1.0),),
+    ),
+    "float": FaultKind(
+        FLOAT,
+        EFFECTOR,
+        INPUT_NAMES[1:],
+        "the effector moves freely: no force at zero deflection, or along the flow",
+        (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
+    ),
+    "hard_over": FaultKind(
+        HARD_OVER,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector runs to its stop and stays there",
+        (_P("rate", "its sign says to which stop", "{}/s", -100.0, 100.0),),
+        memory=True,
+    ),
+    "solid_oscillation": FaultKind(
+        SOLID_OSCILLATION,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector oscillates about where it was, whatever the command (solid failure)",
+        (_AMPLITUDE, _FREQUENCY, _PHASE),
+        memory=True,
+    ),
+    "thrust_loss": FaultKind(
+        THRUST_LOSS, ENGINE_SIDE, (ENGINE,), "a share of the thrust remains", (_P("share", "share", "", 0.0, 1.0),)
+    ),
+    "inlet_unstart": FaultKind(
+        UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
+    ),
+    "inlet_unstart_outside": FaultKind(
+        UNSTART_OUTSIDE,
+        ENGINE_SIDE,
+        (ENGINE,),
+        "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
+        (*_UNSTART, *_OUTSIDE),
+        memory=True,
+    ),
+    "sensor_scale": FaultKind(
+        SENSOR_SCALE, SENSOR, STATE_NAMES, "the sensor shows this multiple", (_P("factor", "multiple", "", -1.0, 2.0),)
+    ),
+    "sensor_noise": FaultKind(
+        SENSOR_NOISE,
+        SENSOR,
+        STATE_NAMES,
+        "white noise is added",
+        (_P("standard_deviation", "of the noise", "{}", 0.0, 1.0),),
+    ),
+    "sensor_bias": FaultKind(
+        SENSOR_BIAS,
+        SENSOR,
+        STATE_NAMES,
+        "the sensor is off by a constant",
+        (_P("offset", "added to the measurement", "{}", -1.0, 1.0),),
+    ),
+    "sensor_runaway": FaultKind(
+        SENSOR_RUNAWAY,
+        SENSOR,
+        STATE_NAMES,
+        "the sensor is off by more and more",
+        (
+            _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
+            _P("limit", "largest offset", "{}", 0.0, 1.0),
+        ),
+    ),
+    "sensor_drop_out": FaultKind(
+        SENSOR_DROP_OUT,
+        SENSOR,
+        STATE_NAMES,
+        "samples are lost at random, the last one is held",
+        (_P("probability", "that a sample is lost", "", 0.0, 1.0),),
+        memory=True,
+    ),
+    "sensor_freeze": FaultKind(SENSOR_FREEZE, SENSOR, STATE_NAMES, "the sensor shows what it showed", memory=True),
+}
+"""The vocabulary, in the order in which faults that act at once are composed."""
+
+OCCURRENCE_PARAMETERS = (
+    _P("intermittent_period", "the fault comes and goes with this period; 0: it stays", "s", 0.0, 1e4, 0.0),
+    _P("intermittent_duty", "share of the period during which it acts", "", 0.0, 1.0, 0.5),
+    _P("random_on", "mean time for which it acts, random; 0: it stays", "s", 0.0, 1e4, 0.0),
+    _P("random_off", "mean time between", "s", 0.0, 1e4, 0.0),
+)
+"""Of a fault of any kind: always there from its start to its stop, in a period, or as a Markov chain of two states."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of one channel: ``values``, SI, are the parameters of its kind and then those of its occurrence.
+
+    Raises:
+        ParameterError: Unknown kind, a channel that the kind does not support, or a value that it does not admit.
+    """
+
+    channel: str
+    type: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        table = self._table(self.channel, self.type)
+        for parameter, value in zip(table, self.values, strict=True):
+            described = parameter.of(self.channel)
+            given = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+            try:
+                described.check(given)
+            except ParameterError as error:
+                raise ParameterError(str(error).replace("parameter ", "fault.", 1)) from error
+            if parameter.whole and not float(given).is_integer():
+                raise ParameterError(f"fault.{parameter.name} = {value!r}: expected a whole number")
+        named = dict(zip((p.name for p in table), self.values, strict=True))
+        if named.get("lower", 0.0) > named.get("upper", math.inf):
+            raise ParameterError(f"fault.lower = {named['lower']!r}: expected at most upper, {named['upper']!r}")
+        cycle, on, off = (named[name] for name in ("intermittent_period", "random_on", "random_off"))
+        if cycle and (on or off):
+            raise ParameterError(f"fault.intermittent_period = {cycle!r}: expected 0 with random_on or random_off")
+        if bool(on) != bool(off):
+            raise ParameterError(f"fault.random_off = {off!r}: expected above 0 where random_on is, and only there")
+
+    @staticmethod
+    def _table(channel: str, kind: str) -> tuple[FaultParameter, ...]:
+        if kind not in FAULT_KINDS:
+            raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}")
+        described = FAULT_KINDS[kind]
+        if channel not in described.channels:
+            raise ParameterError(
+                f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}"
+            )
+        return (*described.parameters, *OCCURRENCE_PARAMETERS)
+
+    @classmethod
+    def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
+        """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out.
+
+        Raises:
+            ParameterError: As above, or a parameter is missing or not one of the kind.
+        """
+        table = cls._table(channel, kind)
+        optional = {p.name: p.default for p in table if p.default is not None}
+        due = [p.name for p in table if p.default is None]
+        given = {**optional, **parameters}
+        if {*given} != {*optional, *due}:
+            raise ParameterError(
+                f"fault.parameters = {', '.join(parameters) or 'none'}: expected "
+                f"{' and '.join(due) or 'none'} for {kind}, or also {', '.join(optional)}"
+            )
+        return cls(channel, kind, tuple(given[p.name] for p in table))
+
+    def __str__(self) -> str:
+        said = " ".join(f"{name} {value:g}" for name, value in self.parameters.items())
+        return f"{self.type} {said + ' ' if said else ''}of {self.channel}"
+
+    @property
+    def kind(self) -> FaultKind:
+        """The kind, as the table has it."""
+        return FAULT_KINDS[self.type]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Its parameters by name, SI: all of its kind, of its occurrence those that are not as without any."""
+        table = self._table(self.channel, self.type)
+        own = len(self.kind.parameters)
+        return {
+            p.name: value
+            for i, (p, value) in enumerate(zip(table, self.values, strict=True))
+            if i < own or value != p.default
+        }
