@@ -31,6 +31,7 @@ ON_THE_PATH = (
     "noise.py",
     "units.py",
     "vehicle/actuators.py",
+    "vehicle/atmosphere.py",
     "vehicle/dynamics.py",
     "vehicle/envelope.py",
     "vehicle/integration.py",
