@@ -29,6 +29,7 @@ ON_THE_PATH = (
     "inheritance.py",
     "signals.py",
     "noise.py",
+    "sensors.py",
     "units.py",
     "vehicle/actuators.py",
     "vehicle/atmosphere.py",
