@@ -9,7 +9,7 @@ from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
 from hsv.errors import ParameterError
-from hsv.faults.actuator import FAULT_PARAMETERS
+from hsv.faults.injector import FAULT_PARAMETERS
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.plant import PLANT_PARAMETERS
 

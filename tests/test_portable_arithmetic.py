@@ -51,7 +51,7 @@ ON_THE_PATH = (
     "control/robust_mpc.py",
     "control/tube_law.py",
     "control/tube_set.py",
-    "faults/actuator.py",
+    "faults/injector.py",
     "faults/effectors.py",
     "faults/laws.py",
     "faults/table.py",
@@ -225,7 +225,7 @@ def test_compiled_loop_and_set_up_take_nothing_inexact_from_elsewhere(tmp_path):
         "hsv.control.notch_filter.filter_step",
         "hsv.elimination.solve",
         "hsv.elementary.tangent",
-        "hsv.faults.actuator.apply_faults",
+        "hsv.faults.laws.apply_command_faults",
     } <= functions
     assert [line for line in lines if not _harmless(line[1])] == []
 

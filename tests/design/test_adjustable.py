@@ -49,7 +49,7 @@ def test_every_claim_holds(subject):
 
 def test_incomplete_fault_and_bounds_are_scaled_by_the_factor(subject):
     assert incomplete_share(subject.inputs) == 0.8
-    assert_allclose(region_parameters(subject.inputs, 0.8)["fault.values"], [0.92])
+    assert region_parameters(subject.inputs, 0.8)["fault.parameters"] == ["effectiveness=0.92"]
     bounds = load_vehicle().uncertainty
     assert_allclose([abs(change) for change in corners(bounds, 0.8)[1].values()], [0.8 * b for b in bounds.values()])
     assert incomplete_share(with_tau(subject.inputs, [0.8, 0.7, 1.0, 1.0, 0.9])) == 1.0

@@ -56,7 +56,7 @@ TOGETHER = {
     "ros2 run hsv_ctrl nominal_trajectory",
     "ros2 run hsv_ctrl tube_mpc",
     "ros2 run hsv_plant fault_injector --ros-args -p fault.channels:=[elevator_deflection] "
-    "-p fault.types:=[loss_of_effectiveness] -p fault.values:=[0.9] -p fault.starts:=[100.0]",
+    "-p fault.types:=[loss_of_effectiveness] -p fault.parameters:=[effectiveness=0.9] -p fault.starts:=[100.0]",
     "ros2 run hsv_plant plant --ros-args -p duration:=200.0",
 }
 """Run by this file at the same time."""

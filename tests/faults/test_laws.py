@@ -23,7 +23,6 @@ from hsv.faults.table import (
 
 T = 0.02
 FUEL, ELEVATOR = "fuel_equivalence_ratio", "elevator_deflection"
-TRIM = np.array([0.3, 0.21])
 NEVER = 2**62
 
 
@@ -36,7 +35,7 @@ def flown(faults, commands, seed=0):
     rows = fault_rows([COMMAND], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
     memory, out, result = fault_memory(rows), np.empty(2), []
     for k, command in enumerate(commands):
-        apply_command_faults(rows, memory, TRIM, k, seed, np.array([0.4, command]), out)
+        apply_command_faults(rows, memory, k, seed, np.array([0.4, command]), out)
         assert out[0] == 0.4
         result.append(out[1])
     return np.array(result)
@@ -64,8 +63,8 @@ def test_loss_over_a_ramp_begins_with_nothing_and_ends_as_an_abrupt_one():
 
 def test_reversal_is_of_the_total_or_about_the_trim():
     assert_array_equal(flown([(elevator("reversal"), 0)], WAVE), -WAVE)
-    about = flown([(elevator("reversal", about_trim=1.0), 0)], WAVE)
-    assert_allclose(about - TRIM[1], -(WAVE - TRIM[1]), rtol=1e-12, atol=1e-16)
+    about = flown([(elevator("reversal", about_start=1.0), 0)], WAVE)
+    assert_allclose(about - WAVE[0], -(WAVE - WAVE[0]), rtol=1e-12, atol=1e-16)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 5, 50])
@@ -76,10 +75,10 @@ def test_delay_is_exact_and_begins_with_the_command_of_its_start(steps):
     assert_array_equal(result, expected)
 
 
-def test_dead_zone_lies_about_the_trim():
+def test_dead_zone_lies_about_the_command_at_its_start():
     width = 0.06
-    off = WAVE - TRIM[1]
-    expected = TRIM[1] + np.sign(off) * np.maximum(np.abs(off) - 0.5 * width, 0.0)
+    off = WAVE - WAVE[0]
+    expected = WAVE[0] + np.sign(off) * np.maximum(np.abs(off) - 0.5 * width, 0.0)
     assert_allclose(flown([(elevator("dead_zone", width=width), 0)], WAVE), expected, rtol=1e-14)
 
 
@@ -146,7 +145,7 @@ def test_a_change_in_flight_leaves_the_memory_of_the_others():
         if k == 30:
             changed = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T)
             memory, rows = fault_memory(changed, rows, memory), changed
-        apply_command_faults(rows, memory, TRIM, k, 0, np.array([0.4, command]), out)
+        apply_command_faults(rows, memory, k, 0, np.array([0.4, command]), out)
         result.append(out[1])
     assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
 

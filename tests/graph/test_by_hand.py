@@ -197,7 +197,7 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
         (
             "hsv_plant",
             "fault_injector",
-            ["-p", "fault.values:=[0.5, 0.5]", "-p", "fault.channels:=[elevator_deflection]"],
+            ["-p", "fault.types:=[bias, bias]", "-p", "fault.channels:=[elevator_deflection]"],
             ["fault."],
         ),
         ("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),

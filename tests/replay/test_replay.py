@@ -10,7 +10,7 @@ import pytest
 from flown_bags import flown_bag, parameters, types, write_bag
 
 from hsv.errors import RecordingError
-from hsv.faults.actuator import Fault
+from hsv.faults.table import Fault
 from hsv.graph.description import CONTROLLERS, RECORDER, TOPICS, graph
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag

@@ -34,7 +34,7 @@ def test_case1_is_the_flight_of_the_paper():
     assert values["reference.velocities"] == pytest.approx([8150 * foot])
     assert values["duration"] == 200.0
     assert values["fault.channels"] == ["elevator_deflection"]
-    assert values["fault.values"] == [0.9]
+    assert values["fault.parameters"] == ["effectiveness=0.9"]
     assert values["fault.starts"] == [100.0]
     assert values["vehicle.coupling"] == "paper_like"
     assert not any(name.startswith("vehicle.perturbation") for name in values)

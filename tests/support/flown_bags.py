@@ -9,7 +9,7 @@ from typing import Any
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from hsv.faults.actuator import FaultInjector
+from hsv.faults.injector import FaultInjector
 from hsv.graph.description import TOPICS, resolved
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.definitions import definition, type_hash
@@ -51,7 +51,7 @@ def as_flown(values: Mapping[str, Any], in_flight: InFlight) -> dict[str, Any]:
         if step in in_flight:
             in_flight[step](injector)
         injector.step(step, np.zeros(2))
-    return injector.parameters(values["period"])
+    return injector.parameters()
 
 
 def flown_bag(path: Path, duration: float = 12.0, fault: float = 6.0, in_flight: InFlight = NOTHING) -> Path:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from hsv.errors import ParameterError
+from hsv.units import parse_quantity
 
 Value = bool | int | float | str | list[float] | list[str] | list[int]
 
@@ -115,3 +116,29 @@ def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[
         ParameterError: A value that its parameter does not admit.
     """
     return {p.name: p.check(values.get(p.name, p.default)) for p in table}
+
+
+def table_values(parameters: Iterable[Parameter], tables: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the flat values, SI, that ``tables``, as a file has them, give to the ``parameters`` named after them.
+
+    One value stands for a list of it.
+
+    Raises:
+        ParameterError, QuantityError: A table, key or value that is not admitted, named.
+    """
+    known = {parameter.name: parameter for parameter in parameters}
+    values: dict[str, Any] = {}
+    for name, entries in tables.items():
+        if isinstance(entries, Mapping):
+            values |= table_values(known.values(), {f"{name}.{key}": entry for key, entry in entries.items()})
+            continue
+        if name not in known:
+            near = [other for other in known if other.rpartition(".")[0] == name.rpartition(".")[0]] or known
+            raise ParameterError(f"{name}: unknown key, expected one of {', '.join(near) or 'no table'}")
+        parameter = known[name]
+        listed = entries if isinstance(entries, list) else [entries]
+        if parameter.kind.startswith("double"):
+            listed = [parse_quantity(entry, parameter.unit or "1", name) for entry in listed]
+        several = parameter.kind.endswith("_array") or isinstance(entries, list)
+        values[name] = parameter.check(listed if several else listed[0])
+    return values

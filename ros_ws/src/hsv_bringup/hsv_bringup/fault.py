@@ -9,7 +9,7 @@ from hsv_msgs.msg import Actuator, Fault
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError, RunError
-from hsv.faults.actuator import FAULT_TYPES
+from hsv.faults.injector import read_parameters
 from hsv.graph.description import FAULT_INJECTOR
 from hsv.graph.exchange import fault_in
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
@@ -17,19 +17,18 @@ from hsv_node.qos import STEP
 
 
 def _inject(client: GraphClient, options: argparse.Namespace) -> None:
-    known = FAULT_TYPES.get(options.type)
-    names = [known.parameter] if known else []
+    parameters = read_parameters(",".join(options.parameters))
     fault = Fault(
         channel=options.channel,
         type=options.type,
-        parameter_names=names,
-        parameter_values=[options.value] * len(names),
+        parameter_names=list(parameters),
+        parameter_values=list(parameters.values()),
     )
     _change(client, options, InjectFault, InjectFault.Request(fault=fault, duration=options.duration))
 
 
 def _clear(client: GraphClient, options: argparse.Namespace) -> None:
-    _change(client, options, ClearFault, ClearFault.Request(channel=options.channel))
+    _change(client, options, ClearFault, ClearFault.Request(channel=options.channel, type=options.type))
 
 
 def _change(client: GraphClient, options: argparse.Namespace, kind: type, request: object) -> None:
@@ -58,17 +57,18 @@ def _list(client: GraphClient, options: argparse.Namespace) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the command."""
-    parser = OneLineParser(prog="fault", description="Inject, clear and list faults of the actuators in flight.")
+    parser = OneLineParser(prog="fault", description="Inject, clear and list faults in flight.")
     parser.add_argument("--json", action="store_true", help="print a JSON object")
     commands = parser.add_subparsers(required=True, metavar="{inject,clear,list}", parser_class=OneLineParser)
     inject = commands.add_parser("inject", help="begin a fault with the next step")
     inject.add_argument("channel", help="e.g. elevator_deflection")
     inject.add_argument("type", help="e.g. loss_of_effectiveness")
-    inject.add_argument("value", type=float, help="parameter of the type, e.g. 0.8")
+    inject.add_argument("parameters", nargs="*", help="of the type, SI, e.g. effectiveness=0.8")
     inject.add_argument("--duration", type=float, default=0.0, help="simulated seconds; 0: until it is cleared")
     inject.set_defaults(act=_inject)
     clear = commands.add_parser("clear", help="end faults with the next step")
     clear.add_argument("channel", nargs="?", default="", help="default: all channels")
+    clear.add_argument("type", nargs="?", default="", help="default: all types")
     clear.set_defaults(act=_clear)
     commands.add_parser("list", help="which faults act now").set_defaults(act=_list)
     return run_client(parser, lambda client, options: options.act(client, options), args)

@@ -9,10 +9,11 @@ from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError
-from hsv.faults.actuator import FAULT_PARAMETERS, NEVER, FaultInjector, first_step
+from hsv.faults.injector import FAULT_PARAMETERS, FaultInjector
 from hsv.graph.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
 from hsv.graph.exchange import fault_in, stamp_of
 from hsv.simulation.blocks import Signals
+from hsv.timing import NEVER, first_step
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
@@ -100,12 +101,13 @@ class FaultInjectorNode(BlockNode):
 
     def _clear(self, request: ClearFault.Request, response: ClearFault.Response) -> ClearFault.Response:
         try:
-            response.step = self._injector.clear(request.channel)
+            response.step = self._injector.clear(request.channel, request.type)
         except ParameterError as error:
             response.accepted, response.message = False, str(error)
             return response
         response.accepted = True
-        response.message = f"no fault of {request.channel or 'any channel'} from step {response.step} on"
+        what = f"no {request.type or 'fault'} of {request.channel or 'any channel'}"
+        response.message = f"{what} from step {response.step} on"
         self.get_logger().info(response.message)
         return response
 

@@ -19,6 +19,8 @@ from hsv.control.nominal_law import FamilyLaw
 from hsv.control.tube_law import TubeLaw
 from hsv.errors import RunError
 from hsv.export.controller import SOURCE, controller_source
+from hsv.faults.laws import FaultRows
+from hsv.faults.table import COMMAND, LOSS
 from hsv.simulation.closed_loop import Components, History
 
 FLAGS = ("-O3", "-ffp-contract=off")
@@ -39,8 +41,8 @@ class _Tube(Structure):
 class _Faults(Structure):
     _fields_ = [
         ("count", c_int64),
-        *((name, _Integers) for name in ("start", "stop", "channel", "code")),
-        ("value", _Doubles),
+        *((name, _Integers) for name in ("start", "stop", "channel")),
+        ("effectiveness", _Doubles),
     ]
 
 
@@ -50,6 +52,23 @@ class _Reference(Structure):
 
 class _History(Structure):
     _fields_ = [("rows", c_int64), *((name, _Doubles) for name in History._fields)]
+
+
+def _losses(components: Components) -> FaultRows:
+    """Return the losses of effectiveness, all that the C build knows of what is not ideal.
+
+    Raises:
+        RunError: There is more.
+    """
+    plant, known = components.plant, components.fault_injector.known
+    data = plant.data
+    if not (data.actuators.ideal and data.atmosphere.still and data.sensors.ideal):
+        raise RunError("C build: actuators, air and sensors are ideal in it, expected a scenario with these")
+    rows = components.fault_injector.rows((COMMAND,))
+    others = len(rows.start) < len(known) or np.any(rows.code != LOSS)
+    if others or rows.occurrence.any() or rows.parameters[:, 1].any():
+        raise RunError("C build: a fault that it does not know, expected a loss of effectiveness, at once and for good")
+    return rows
 
 
 class CFlight:
@@ -73,14 +92,14 @@ class CFlight:
         self._library.fly.restype = c_int64
         self._kept: list[np.ndarray] = []
         plant, tube = components.plant, law.kernel
-        faults, reference = components.fault_injector.schedule, nominal.reference.data
+        reference, faults = nominal.reference.data, _losses(components)
         parameters = np.array([[*tau, tube.integral_rate] for _, tau in law.factors])
         self._initial = plant.initial.state
         self._rows = plant.steps + 1
         self._arguments: list[Any] = [
             ctypes.byref((c_double * len(plant.vehicle))(*plant.vehicle)),
             c_double(plant.period),
-            c_int64(plant.substeps),
+            c_int64(plant.data.substeps),
             c_double(plant.vehicle.angle_limit),
             c_int64(len(sections)),
             ctypes.byref(
@@ -93,8 +112,8 @@ class CFlight:
             ctypes.byref(
                 _Faults(
                     len(faults.start),
-                    *(self._integers(a) for a in (faults.start, faults.stop, faults.channel, faults.code)),
-                    self._doubles(faults.value),
+                    *(self._integers(a) for a in (faults.start, faults.stop, faults.channel)),
+                    self._doubles(np.ascontiguousarray(faults.parameters[:, 0])),
                 )
             ),
             ctypes.byref(_Reference(reference.first, len(reference.state), *map(self._doubles, reference[1:]))),

@@ -37,8 +37,8 @@ typedef struct {
 
 typedef struct {
     int64_t count;
-    const int64_t *start, *stop, *channel, *code;
-    const double *value;
+    const int64_t *start, *stop, *channel;
+    const double *effectiveness;
 } Faults;
 
 typedef struct {
@@ -48,7 +48,7 @@ typedef struct {
 
 typedef struct {
     int64_t rows;
-    double *state, *filtered_pitch_rate, *deviation, *nominal_input, *gain_index, *u_unsaturated, *command, *actuator;
+    double *state, *measurement, *filtered_pitch_rate, *deviation, *nominal_input, *gain_index, *u_unsaturated, *command, *actuator;
 } History;
 
 static void derivative(const double *x, const double *u, const Vehicle *p, double *out)
@@ -134,8 +134,8 @@ static void apply_faults(const Faults *faults, int64_t step, const double *comma
 {
     memcpy(actuator, command, M * sizeof *actuator);
     for (int64_t row = 0; row < faults->count; row++)
-        if (faults->start[row] <= step && step < faults->stop[row] && faults->code[row] == 0)
-            actuator[faults->channel[row]] = faults->value[row] * command[faults->channel[row]];
+        if (faults->start[row] <= step && step < faults->stop[row])
+            actuator[faults->channel[row]] *= faults->effectiveness[row];
 }
 
 static int64_t reference_row(const Reference *reference, int64_t step)
@@ -205,6 +205,7 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
         apply_faults(faults, k, u, actuator);
 
         memcpy(history->state + k * N, x, sizeof(double[N]));
+        memcpy(history->measurement + k * N, x, sizeof(double[N]));
         history->filtered_pitch_rate[k] = filtered[0];
         memcpy(history->deviation + k * N, nominal, sizeof(double[N]));
         memcpy(history->nominal_input + k * M, nominal + N, sizeof(double[M]));

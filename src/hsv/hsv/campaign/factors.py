@@ -15,7 +15,6 @@ from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
 OPTIONAL = {
     "fault_start": ("fault[0].start", "s"),
-    "fault_value": ("fault[0].value", "1"),
     "initial_altitude": ("initial.altitude", "m"),
     "initial_velocity": ("initial.velocity", "m/s"),
 }

@@ -14,7 +14,7 @@ from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
 from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.errors import CampaignError, ControllerError
-from hsv.faults.actuator import FaultInjector
+from hsv.faults.injector import FaultInjector
 from hsv.simulation.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Flight, fly
 from hsv.simulation.metrics import FlightData, flight_metrics

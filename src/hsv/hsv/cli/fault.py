@@ -11,7 +11,7 @@ from hsv.cli.options import GraphNamespaceOption, JsonOption
 
 fault = typer.Typer(
     no_args_is_help=True,
-    help="""Inject, clear and list faults of the actuators in a flight that is on its way, whoever has started it.
+    help="""Inject, clear and list faults in a flight that is on its way, whoever has started it.
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8""",
 )
@@ -19,37 +19,43 @@ fault = typer.Typer(
 
 @fault.command(context_settings={"ignore_unknown_options": True})  # a value below zero is none
 def inject(
-    channel: Annotated[str, typer.Argument(help="Actuator, e.g. elevator_deflection.")],
+    channel: Annotated[str, typer.Argument(help="What fails, e.g. elevator_deflection, engine, pitch_rate.")],
     type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
-    value: Annotated[str, typer.Argument(help="Value of the type: 0.8 or '80 %' of the effectiveness is left.")],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Argument(help="Parameters of the type, e.g. 'amplitude=1 deg' 'frequency=2 Hz'; an only one as 0.8."),
+    ] = None,
     duration: Annotated[
         str, typer.Option(help="Simulated time after which it ends, such as '5 s'; default: until it is cleared.")
     ] = "0 s",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Begin a fault with the next step that is not flown yet; the answer says which one.
+    """Begin a fault with the next step that is not flown yet; the answer says which one. hsv faults lists the types.
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
+    from hsv.faults.table import read_fault
     from hsv.units import parse_quantity
 
-    share, time = parse_quantity(value, "1", "value"), parse_quantity(duration, "s", "duration")
-    options = ["--duration", repr(time)]
-    _ask("inject", channel, type, repr(share), options=options, namespace=namespace, json=json)
+    found = read_fault(channel, type, parameters or [])
+    options = ["--duration", repr(parse_quantity(duration, "s", "duration"))]
+    given = [f"{name}={value!r}" for name, value in found.parameters.items()]
+    _ask("inject", channel, type, *given, options=options, namespace=namespace, json=json)
 
 
 @fault.command()
 def clear(
-    channel: Annotated[str, typer.Argument(help="Actuator; default: all of them.")] = "",
+    channel: Annotated[str, typer.Argument(help="What fails; default: everything.")] = "",
+    type: Annotated[str, typer.Argument(help="Type of the fault; default: all of them.")] = "",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """End the faults of an actuator, or of all, with the next step that is not flown yet.
+    """End the faults of a channel, or of all, with the next step that is not flown yet.
 
     Example: hsv fault clear elevator_deflection
     """
-    _ask("clear", *([channel] if channel else []), namespace=namespace, json=json)
+    _ask("clear", *filter(None, (channel, type)), namespace=namespace, json=json)
 
 
 @fault.command(name="list")

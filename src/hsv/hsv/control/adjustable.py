@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from hsv.errors import ParameterError
-from hsv.faults.actuator import first_step
 from hsv.parameters import Parameter, check_all
+from hsv.timing import first_step
 from hsv.vehicle.dynamics import N_RIGID
 
 FACTORS = "one value, or one for each rigid state"

@@ -15,7 +15,6 @@ from __future__ import annotations
 import difflib
 import importlib
 from collections.abc import Mapping
-from functools import partial
 from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +22,6 @@ from hsv.control.controller import Controller, ControllerClass, ElsewhereControl
 from hsv.control.library import LibraryClass, library_place
 from hsv.errors import HsvError, ParameterError
 from hsv.parameters import Parameter, check_all
-from hsv.units import parse_quantity
 from hsv.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -105,31 +103,6 @@ def class_place(name: str) -> str:
         f"controller = {name!r}: expected one of {', '.join(controller_names())}, package.module:Class or "
         f"path/lib.so:symbol{hint}"
     )
-
-
-def table_values(kind: ControllerClass, tables: Mapping[str, Mapping[str, object]]) -> dict[str, Any]:
-    """Return the flat parameters, SI, that the ``tables`` of a scenario give to a controller of this class.
-
-    Raises:
-        ParameterError, QuantityError: A table, key or value that it does not admit, named.
-    """
-    known = {parameter.name: parameter for parameter in kind.PARAMETERS}
-    values = {}
-    for table, entries in tables.items():
-        for key, text in entries.items():
-            name = f"{table}.{key}"
-            if name not in known:
-                raise ParameterError(f"{name}: unknown key, expected one of {', '.join(known) or 'no table'}")
-            parameter = known[name]
-            numeric = parameter.kind.startswith("double")
-            convert = partial(parse_quantity, unit=parameter.unit or "1", field=name) if numeric else _as_it_is
-            given = [convert(entry) for entry in text] if isinstance(text, list) else convert(text)
-            values[name] = parameter.check(given)
-    return values
-
-
-def _as_it_is(value: Any) -> Any:
-    return value
 
 
 def build_controller(values: Mapping[str, Any], design: ControlDesign | None = None) -> Controller:

@@ -85,7 +85,7 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
         "reference.velocities": [point.velocity for point in points],
         "fault.channels": ["elevator_deflection"],
         "fault.types": ["loss_of_effectiveness"],
-        "fault.values": [1.0 - share * (1.0 - region.elevator_effectiveness)],
+        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - region.elevator_effectiveness)!r}"],
         "fault.starts": [region.fault_start],
     }
 

@@ -171,12 +171,11 @@ def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
 
 @njit(cache=True, error_model="numpy")
 def apply_command_faults(
-    rows: Any, memory: np.ndarray, trim: np.ndarray, step: int, seed: int, command: np.ndarray, actuator: np.ndarray
+    rows: Any, memory: np.ndarray, step: int, seed: int, command: np.ndarray, actuator: np.ndarray
 ) -> None:
     """Write into ``actuator`` (2) what becomes of ``command`` (2) on its way to the actuators in ``step``.
 
-    Loss of effectiveness, reversal, delay, dead zone, backlash, in this order (paper eq. 14, eq. 15). Dead zones lie
-    about ``trim`` (2).
+    Loss of effectiveness, reversal, delay, dead zone, backlash, in this order (paper eq. 14, eq. 15).
     """
     for i in range(len(command)):
         actuator[i] = command[i]
@@ -185,20 +184,22 @@ def apply_command_faults(
     for i in range(len(rows.start)):
         if memory[i, ACTING] == 1.0:
             channel = rows.channel[i]
-            actuator[channel] = _commanded(rows, memory[i], i, trim[channel], step, actuator[channel])
+            actuator[channel] = _commanded(rows, memory[i], i, step, actuator[channel])
 
 
 @njit(cache=True, error_model="numpy")
-def _commanded(rows: Any, memory: np.ndarray, i: int, trim: float, step: int, command: float) -> float:
+def _commanded(rows: Any, memory: np.ndarray, i: int, step: int, command: float) -> float:
     code, value = rows.code[i], rows.parameters[i, 0]
     fresh = memory[ONSET] == step
+    if fresh:
+        memory[KEPT] = command
     if code == LOSS:
         ramp, elapsed = rows.parameters[i, 1], (step - rows.start[i]) * rows.period
         if elapsed < ramp:
             value = 1.0 + (value - 1.0) * (elapsed / ramp)
         return value * command
     if code == REVERSAL:
-        return 2.0 * value * trim - command
+        return 2.0 * value * memory[KEPT] - command
     if code == DELAY:
         size = int(value) + 1
         if fresh:
@@ -207,13 +208,12 @@ def _commanded(rows: Any, memory: np.ndarray, i: int, trim: float, step: int, co
         memory[QUEUE + step % size] = command
         return memory[QUEUE + (step + 1) % size]
     if code == DEAD_ZONE:
-        off = command - trim
+        off = command - memory[KEPT]
         if abs(off) <= 0.5 * value:
-            return trim
+            return memory[KEPT]
         return command - 0.5 * value if off > 0.0 else command + 0.5 * value
     if code == BACKLASH:
-        before = command if fresh else memory[KEPT]
-        memory[KEPT] = min(max(before, command - 0.5 * value), command + 0.5 * value)
+        memory[KEPT] = min(max(memory[KEPT], command - 0.5 * value), command + 0.5 * value)
         return memory[KEPT]
     return command
 

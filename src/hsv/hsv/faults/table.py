@@ -9,12 +9,13 @@ wins. Any kind may come and go, see :data:`OCCURRENCE_PARAMETERS`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter
+from hsv.units import parse_quantity
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -160,7 +161,8 @@ FAULT_KINDS = {
         COMMAND,
         INPUT_NAMES,
         "the command changes its sign",
-        (_P("about_trim", "0: of the total command, 1: of its difference from the trim", "", 0.0, 1.0, 0.0),),
+        (_P("about_start", "0: of the whole command, 1: of its change since the start", "", 0.0, 1.0, 0.0),),
+        memory=True,
     ),
     "delay": FaultKind(
         DELAY,
@@ -170,7 +172,14 @@ FAULT_KINDS = {
         (_P("steps", "control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
         memory=True,
     ),
-    "dead_zone": FaultKind(DEAD_ZONE, COMMAND, INPUT_NAMES, "commands near the trim have no effect", (_WIDTH,)),
+    "dead_zone": FaultKind(
+        DEAD_ZONE,
+        COMMAND,
+        INPUT_NAMES,
+        "commands near the one at the start of the fault have no effect",
+        (_WIDTH,),
+        memory=True,
+    ),
     "backlash": FaultKind(
         BACKLASH, COMMAND, INPUT_NAMES, "the actuator follows with play, at first in its middle", (_WIDTH,), memory=True
     ),
@@ -315,6 +324,20 @@ OCCURRENCE_PARAMETERS = (
 """Of a fault of any kind: always there from its start to its stop, in a period, or as a Markov chain of two states."""
 
 
+def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
+    """Return the parameters of a kind of fault and then those of its occurrence.
+
+    Raises:
+        ParameterError: Unknown kind, or a channel that it does not support.
+    """
+    if kind not in FAULT_KINDS:
+        raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}")
+    described = FAULT_KINDS[kind]
+    if channel not in described.channels:
+        raise ParameterError(f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}")
+    return (*described.parameters, *OCCURRENCE_PARAMETERS)
+
+
 @dataclass(frozen=True)
 class Fault:
     """A fault of one channel: ``values``, SI, are the parameters of its kind and then those of its occurrence.
@@ -328,7 +351,7 @@ class Fault:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        table = self._table(self.channel, self.type)
+        table = fault_parameters(self.channel, self.type)
         for parameter, value in zip(table, self.values, strict=True):
             described = parameter.of(self.channel)
             given = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
@@ -347,17 +370,6 @@ class Fault:
         if bool(on) != bool(off):
             raise ParameterError(f"fault.random_off = {off!r}: expected above 0 where random_on is, and only there")
 
-    @staticmethod
-    def _table(channel: str, kind: str) -> tuple[FaultParameter, ...]:
-        if kind not in FAULT_KINDS:
-            raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}")
-        described = FAULT_KINDS[kind]
-        if channel not in described.channels:
-            raise ParameterError(
-                f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}"
-            )
-        return (*described.parameters, *OCCURRENCE_PARAMETERS)
-
     @classmethod
     def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
         """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out.
@@ -365,7 +377,7 @@ class Fault:
         Raises:
             ParameterError: As above, or a parameter is missing or not one of the kind.
         """
-        table = cls._table(channel, kind)
+        table = fault_parameters(channel, kind)
         optional = {p.name: p.default for p in table if p.default is not None}
         due = [p.name for p in table if p.default is None]
         given = {**optional, **parameters}
@@ -388,10 +400,29 @@ class Fault:
     @property
     def parameters(self) -> dict[str, float]:
         """Its parameters by name, SI: all of its kind, of its occurrence those that are not as without any."""
-        table = self._table(self.channel, self.type)
+        table = fault_parameters(self.channel, self.type)
         own = len(self.kind.parameters)
         return {
             p.name: value
             for i, (p, value) in enumerate(zip(table, self.values, strict=True))
             if i < own or value != p.default
         }
+
+
+def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
+    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; an only one without its name.
+
+    Raises:
+        ParameterError, QuantityError: As :meth:`Fault.of`, or a quantity is none.
+    """
+    known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
+    due = [parameter.name for parameter in FAULT_KINDS[kind].parameters if parameter.default is None]
+    given = {}
+    for text in parameters:
+        name, equals, quantity = text.partition("=")
+        if not equals and len(due) == 1:
+            name, quantity = due[0], text
+        if name not in known:
+            raise ParameterError(f"fault.{name}: unknown parameter, expected one of {', '.join(known)}")
+        given[name] = parse_quantity(quantity, known[name].unit or "1", f"fault.{name}")
+    return Fault.of(channel, kind, given)

@@ -54,7 +54,7 @@ the controller, see :func:`step_topics`."""
 CARRIED = {
     MEASUREMENT: (signals.MEASUREMENT, signals.STATUS),
     STATE: (signals.STATE, signals.STATUS),
-    FORCES: (signals.FORCES, signals.EFFECTOR),
+    FORCES: (signals.FORCES, signals.EFFECTOR, signals.AIR),
     FILTERED_STATE: (
         signals.MEASUREMENT,
         signals.ESTIMATE,

@@ -25,7 +25,8 @@ from hsv.graph.description import (
 )
 
 if TYPE_CHECKING:
-    from hsv.faults.actuator import Fault
+    from hsv.faults.schedule import ActiveFault
+    from hsv.faults.table import Fault
     from hsv.simulation.blocks import Signals
 
 Message = Any
@@ -115,6 +116,7 @@ def _read_command(message: Message, signals: Signals) -> None:
 def _read_actuator(message: Message, signals: Signals) -> None:
     _place(message, signals)
     signals.actuator = input_vector(message)
+    signals.active_faults = active_faults(message) if message.active else ()
 
 
 READ: dict[str, Callable[[Message, Signals], None]] = {
@@ -164,6 +166,7 @@ def _fill_forces(signals: Signals, forces: Message, _: MessageClass) -> None:
     _begin(signals, forces)
     forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = signals.forces
     fill_input(forces.effector, signals.effector)
+    forces.wind_forward, forces.wind_up, forces.density_factor = signals.air.tolist()
 
 
 def _fill_filtered_state(signals: Signals, filtered: Message, _: MessageClass) -> None:
@@ -213,12 +216,25 @@ def fault_in(message: Message) -> Fault:
     Raises:
         ParameterError: An unknown channel, type or parameter, or a value that is not admitted.
     """
-    from hsv.faults.actuator import Fault  # of the nodes, the fault injector alone needs it
+    from hsv.faults.table import Fault  # of most nodes, none needs it
 
     names, values = message.parameter_names, message.parameter_values
     if len(names) != len(values):
         raise ParameterError(f"fault.parameter_values: {len(values)} values, expected one a name, {len(names)}")
     return Fault.of(message.channel, message.type, dict(zip(names, map(float, values), strict=True)))
+
+
+def active_faults(message: Message) -> tuple[ActiveFault, ...]:
+    """Return the faults in a message Actuator, with their first steps.
+
+    Raises:
+        ParameterError: As :func:`fault_in`.
+    """
+    from hsv.faults.schedule import ActiveFault
+
+    return tuple(
+        ActiveFault(fault_in(fault), int(since)) for fault, since in zip(message.active, message.since, strict=True)
+    )
 
 
 def _fill_actuator(signals: Signals, actuator: Message, message_class: MessageClass) -> None:
@@ -232,8 +248,9 @@ def _fill_actuator(signals: Signals, actuator: Message, message_class: MessageCl
             parameter_names=list(acting.parameters),
             parameter_values=np.array([*acting.parameters.values()]),
         )
-        for acting in signals.active_faults
+        for acting, _ in signals.active_faults
     ]
+    actuator.since = np.array([since for _, since in signals.active_faults], np.uint64)
 
 
 FILL: dict[str, Callable[[Signals, Message, MessageClass], None]] = {

@@ -14,7 +14,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design_file import ControlDesign, find_design, read_design_parameters
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
-from hsv.faults.actuator import FaultInjector
+from hsv.faults.injector import FaultInjector
 from hsv.graph.description import (
     ACTUATOR,
     COMMAND,
@@ -26,7 +26,7 @@ from hsv.graph.description import (
     TUBE_MPC,
     TUBE_STATUS,
 )
-from hsv.graph.exchange import fault_in
+from hsv.graph.exchange import active_faults
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.graph.preparation import design_files
@@ -172,19 +172,17 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     command = np.zeros(2)
     changed = False
     for _, status in bag.decode(ACTUATOR):
-        recorded = [fault_in(message) for message in status.active]
-        planned = list(injector.acting(status.step))
+        recorded = active_faults(status)
+        planned = injector.acting(status.step)
         if planned != recorded:
             changed = True
-            for fault in planned:
-                if fault.channel not in {f.channel for f in recorded}:
-                    injector.clear(fault.channel)
-            kept = list(injector.acting(status.step))
-            same = next((i for i, f in enumerate(recorded) if i >= len(kept) or kept[i] != f), len(recorded))
-            for fault in recorded[same:]:
-                injector.inject(fault)
+            for fault, _ in set(planned) - set(recorded):
+                injector.clear(fault.channel, fault.type)
+            for fault, since in recorded:
+                if (fault, since) not in planned:
+                    injector.inject(fault)
         injector.step(status.step, command)
-    return injector.parameters(float(values["period"])) if changed else {}
+    return injector.parameters() if changed else {}
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:

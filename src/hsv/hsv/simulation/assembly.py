@@ -7,9 +7,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class, table_values
+from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
 from hsv.control.design_file import design_of, find_design, read_design, read_design_parameters
 from hsv.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
+from hsv.parameters import table_values
 from hsv.simulation.blocks import LOOP
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
@@ -45,7 +46,7 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
         for table in scenario.own:
             raise ParameterError(f"{table}: unknown table, expected none: a node brings its own parameters")
         return {}
-    return table_values(controller_class(scenario.controller), scenario.own)
+    return table_values(controller_class(scenario.controller).PARAMETERS, scenario.own)
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:

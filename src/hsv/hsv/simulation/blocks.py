@@ -25,7 +25,8 @@ if TYPE_CHECKING:  # a node imports its own component alone
     from hsv.control.design_file import ControlDesign
     from hsv.control.nominal_trajectory import NominalTrajectory
     from hsv.control.notch_filter import NotchFilter
-    from hsv.faults.actuator import Fault, FaultInjector
+    from hsv.faults.injector import FaultInjector
+    from hsv.faults.schedule import ActiveFault
     from hsv.parameters import Parameter
     from hsv.simulation.closed_loop import Components
     from hsv.vehicle.plant import Plant
@@ -51,7 +52,9 @@ class Signals:
     forces: tuple[float, float, float, float, float]
     """Lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa"""
     effector: np.ndarray
-    """(2), where the actuators are"""
+    """(2), where the effectors are"""
+    air: np.ndarray
+    """Wind forward and up (m/s), and the density for that of the model (3), over the period before"""
     measurement: np.ndarray
     """x (9) as measured"""
 
@@ -85,7 +88,7 @@ class Signals:
     """What the controller says beside its input"""
     actuator: np.ndarray
     """(2), what becomes of the command"""
-    active_faults: tuple[Fault, ...]
+    active_faults: tuple[ActiveFault, ...]
     """Of this step"""
 
 
@@ -144,14 +147,13 @@ class ControllerBlock(Block):
 def _fly(plant: Plant, signals: Signals) -> None:
     if signals.step < 0:
         result = plant.reset()
-        signals.effector = plant.initial.input
     else:
         plant.place(signals.step, signals.state)
-        result = plant.step(signals.actuator)
-        signals.effector = signals.actuator
+        result = plant.step(signals.actuator, signals.active_faults)
     signals.step, signals.period = result.step, plant.period
     signals.state, signals.forces, signals.status = result.state, result.forces, result.status
-    signals.measurement = result.state
+    signals.effector, signals.air = result.effector, result.air
+    signals.measurement = result.measurement
 
 
 def _filter(notch: NotchFilter, signals: Signals) -> None:
@@ -185,9 +187,9 @@ VEHICLE = Block(
     "plant",
     "hsv.vehicle.plant:Plant",
     inputs=(),
-    outputs=(types.MEASUREMENT, types.STATE, types.STATUS, types.FORCES, types.EFFECTOR),
+    outputs=(types.MEASUREMENT, types.STATE, types.STATUS, types.FORCES, types.EFFECTOR, types.AIR),
     step=_fly,
-    delayed=(types.ACTUATOR,),
+    delayed=(types.ACTUATOR, types.ACTIVE_FAULTS),
     state=(types.STATE,),
 )
 NOTCH_FILTER = Block(
@@ -224,7 +226,7 @@ CONTROLLER = ControllerBlock(
 )
 FAULT_INJECTOR = Block(
     "fault_injector",
-    "hsv.faults.actuator:FaultInjector",
+    "hsv.faults.injector:FaultInjector",
     inputs=(types.COMMAND,),
     outputs=(types.ACTUATOR, types.ACTIVE_FAULTS),
     step=_actuate,

@@ -21,15 +21,17 @@ from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import memory_of, no_tube, tube_step
 from hsv.errors import ControllerError, ProcessError
-from hsv.faults.actuator import FaultInjector, apply_faults
+from hsv.faults.injector import FaultInjector
+from hsv.faults.laws import apply_command_faults, fault_memory
+from hsv.faults.table import COMMAND
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
 from hsv.simulation.metrics import FlightData, flight_metrics
+from hsv.timing import NEVER
 from hsv.vehicle.dynamics import N_INPUTS, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
-from hsv.vehicle.integration import advance, workspace
-from hsv.vehicle.plant import FlightStatus, Plant
+from hsv.vehicle.plant import FlightStatus, Plant, PlantFaults, advance_plant, sense
 
 
 @dataclass
@@ -44,9 +46,7 @@ class Components:
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
         """Return the loop around the perturbed vehicle, relative changes by parameter name; the rest is shared."""
-        plant = self.plant
-        vehicle = plant.vehicle.perturbed(perturbation)
-        return replace(self, plant=Plant(vehicle, plant.initial, plant.period, plant.steps, plant.substeps))
+        return replace(self, plant=self.plant.perturbed(perturbation))
 
 
 class History(NamedTuple):
@@ -54,6 +54,8 @@ class History(NamedTuple):
 
     state: np.ndarray
     """x (n + 1, 9)"""
+    measurement: np.ndarray
+    """(n + 1, 9)"""
     filtered_pitch_rate: np.ndarray
     """q_f (n + 1), rad/s"""
     deviation: np.ndarray
@@ -98,7 +100,7 @@ class History(NamedTuple):
         return History(*(column[:rows] for column in self))
 
 
-_COLUMNS = (9, 0, 9, 2, 0, 2, 2, 2)
+_COLUMNS = (9, 9, 0, 9, 2, 0, 2, 2, 2)
 """Widths of the columns of a :class:`History`; 0: a number a step."""
 
 
@@ -135,18 +137,18 @@ def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, li
 @njit(cache=True, nogil=True)
 def _fly(
     x: np.ndarray,
-    vehicle: Any,
-    period: float,
-    substeps: int,
+    plant: Any,
+    plant_memory: Any,
+    plant_faults: Any,
     notch: Any,
     nominal: Any,
     nominal_call: Any,
     tube: Any,
     controller_call: Any,
     faults: Any,
+    remembered: np.ndarray,
     reference: Any,
     arrays: Any,
-    work: np.ndarray,
     history: Any,
 ) -> int:
     """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
@@ -156,22 +158,26 @@ def _fly(
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, gain_index, memory = arrays
     n, m = len(x), len(u_n)
     filter_state = np.zeros(len(s))
-    rest(notch, x[PITCH_RATE], filter_state)
+    measurement = np.empty(n)
+    sense(x, plant, plant_memory, plant_faults, 0, measurement)
+    rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
     S, new = np.empty(n * (n + m)), np.empty(n)
     planned = len(nominal.gains) > 0
     for i in range(n):
-        x_n[i] = x[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
+        x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
     u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     # Copied when another row holds: views of rows in every step take a twentieth of the loop's time.
     defect, row = np.empty(n), -1
     rows = len(history.filtered_pitch_rate)
     for k in range(rows):
         if k > 0:
-            advance(x, actuator, vehicle, period, substeps, work)
+            advance_plant(x, actuator, plant, plant_memory, plant_faults, k - 1)
+            sense(x, plant, plant_memory, plant_faults, k, measurement)
         for i in range(n):
             history.state[k, i] = x[i]
-            estimate[i] = x[i]
+            history.measurement[k, i] = measurement[i]
+            estimate[i] = measurement[i]
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
@@ -182,7 +188,7 @@ def _fly(
                 u_r[i] = reference.input[row, i]
         for i in range(len(s)):
             s[i] = filter_state[i]
-        q_f[0] = filter_step(notch, filter_state, x[PITCH_RATE])
+        q_f[0] = filter_step(notch, filter_state, measurement[PITCH_RATE])
         history.filtered_pitch_rate[k] = q_f[0]
         for i in range(n):
             history.deviation[k, i] = x_n[i]
@@ -212,11 +218,11 @@ def _fly(
         for i in range(m):
             history.command[k, i] = u[i]
         if planned:
-            nominal_advance(nominal.polytope, x[0], x[1], x_n, u_n, defect, S, new)
-        apply_faults(faults, k, u, actuator)
+            nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, S, new)
+        apply_command_faults(faults, remembered, k, plant.seed, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
-        if not in_model_range(x, vehicle.angle_limit):
+        if not in_model_range(x, plant.vehicle.angle_limit):
             return k + 1
     return rows
 
@@ -329,6 +335,8 @@ def fly_into(history: History, components: Components) -> int:
         ControllerError, ParameterError: As :func:`fly`.
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
+    injector = components.fault_injector
+    commanded = injector.rows((COMMAND,))
     tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
     given, cuts, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
     nominal_call = controller_call = NO_CALL
@@ -350,18 +358,18 @@ def fly_into(history: History, components: Components) -> int:
             controller.reset()
         rows = _fly(
             plant.initial.state.copy(),
-            plant.vehicle,
-            plant.period,
-            plant.substeps,
+            plant.data,
+            plant.memory(),
+            PlantFaults.of(injector.known, plant.period),
             components.notch_filter.data,
             nominal.data,
             nominal_call,
             tube,
             controller_call,
-            components.fault_injector.schedule,
+            commanded,
+            fault_memory(commanded),
             nominal.reference.data,
             arrays,
-            workspace(),
             history,
         )
     for callback in callbacks:
@@ -395,6 +403,6 @@ def _flight(components: Components, history: History) -> Flight:
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
-    starts = components.fault_injector.schedule.start
-    fault_start = float(starts.min() * plant.period) if len(starts) and starts.min() < len(history.state) else None
+    first = min((row.start for row in components.fault_injector.known), default=NEVER)
+    fault_start = first * plant.period if first < len(history.state) else None
     return Flight(plant.period, history, components.nominal_trajectory.reference, fault_start, status)

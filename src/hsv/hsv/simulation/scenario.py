@@ -8,17 +8,20 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tomli_w
-from pydantic import Field, ValidationError
+from pydantic import Field, StrictInt, ValidationError
 
 from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.library import inside
 from hsv.errors import HsvError, ParameterError, ScenarioError
-from hsv.faults.actuator import Fault
+from hsv.faults.injector import NEVER_TIME, written_parameters
+from hsv.faults.table import Fault, fault_parameters
 from hsv.inheritance import follow_extends, is_path
+from hsv.noise import SEED_PARAMETER
+from hsv.parameters import table_values
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope
 from hsv.simulation.distribution import KINDS, Distribution, read_distribution
 from hsv.simulation.fields import Reading, Table, Time
@@ -35,6 +38,7 @@ from hsv.simulation.tables import (
     VehicleTable,
 )
 from hsv.units import parse_quantity, si_unit_of, written
+from hsv.vehicle.plant import EQUIPMENT_PARAMETERS
 from hsv.vehicle.vehicle import (
     DEFAULT_VEHICLE,
     SHIPPED_VEHICLES,
@@ -63,6 +67,10 @@ class Scenario(Table):
     integral: IntegralTable = IntegralTable()
     robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
+    seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
+    """Key of all that is random"""
+    equipment: dict[str, Any] = Field(default_factory=dict)
+    """Parameters of what is not ideal, SI; in a file, tables of actuators, air and sensors"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
     limits: dict[str, float] = Field(default_factory=dict)
@@ -108,10 +116,17 @@ class Scenario(Table):
         if self.fault:
             values["fault.channels"] = [fault.channel for fault in self.fault]
             values["fault.types"] = [fault.type for fault in self.fault]
-            values["fault.values"] = [fault.value for fault in self.fault]
+            values["fault.parameters"] = [written_parameters(fault.parameters) for fault in self.fault]
             values["fault.starts"] = [fault.start for fault in self.fault]
-        return values
+            values["fault.stops"] = [NEVER_TIME if fault.stop is None else fault.stop for fault in self.fault]
+        return values | {"seed": self.seed} | self.equipment
 
+
+EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in EQUIPMENT_PARAMETERS)
+"""Tables of what is ideal unless they say otherwise."""
+
+_NO_KEYS = ("name", "own", "equipment")
+"""Fields that a file has not, or has otherwise."""
 
 REPLACED = ("limits",)
 """Tables that a scenario does not share with the one it extends: what is expected of a flight is its own."""
@@ -222,7 +237,7 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
 
     Args:
         name: Name or path.
-        changes: Values as a file has them, with their units, by field, such as ``{"fault[0].value": 0.8}``.
+        changes: Values as a file has them, with their units, by field, such as ``{"fault[0].effectiveness": 0.8}``.
 
     Raises:
         ScenarioError: Missing, or a field is wrong; the message names it, its value and what was expected.
@@ -255,9 +270,9 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
         elif isinstance(place, list) and isinstance(part, int) and part < len(place):
             place = place[part]
         else:
-            raise _refused(name, f"{field}: no such field, expected one such as fault[0].value")
+            raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
     if isinstance(place, dict) != isinstance(key, str) or (isinstance(key, int) and key >= len(place)):
-        raise _refused(name, f"{field}: no such field, expected one such as fault[0].value")
+        raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
     place[key] = value
 
 
@@ -284,18 +299,27 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
         raise ScenarioError(
             f"scenario {name!r}: vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition"
         )
-    for key in ("name", "own"):
+    for key in _NO_KEYS:
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
             raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
-    own = _own_tables(table)
-    table = {key: value for key, value in _with_definition(table, name).items() if key not in own}
+    equipment = {key: value for key, value in table.items() if key in EQUIPMENT}
+    own = {key: value for key, value in _own_tables(table).items() if key not in equipment}
+    table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | equipment)}
     vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
         found = reading.drawn
         own = {key: {k: _own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
-        given = {**table, "name": name, "own": own, "limits": _limits(table.get("limits", {})), "vehicle": vehicle}
+        given = {
+            **table,
+            "name": name,
+            "own": own,
+            "equipment": table_values(EQUIPMENT_PARAMETERS, _own_value("", equipment, found)),
+            "fault": _fault_rows(table.get("fault", ()), found),
+            "limits": _limits(table.get("limits", {})),
+            "vehicle": vehicle,
+        }
         scenario = Scenario.model_validate(given, context=reading)
         _check(scenario)
     except ValidationError as error:
@@ -316,7 +340,7 @@ def _tables_in(value: object, field: str = "") -> Iterator[tuple[str, dict[str, 
             yield from _tables_in(entry, f"{field}[{index}]")
 
 
-def _own_value(field: str, value: object, found: dict[int, Distribution]) -> object:
+def _own_value(field: str, value: object, found: dict[int, Distribution]) -> Any:
     """Return an entry of a controller's own table with means in the place of distributions, which go to ``found``.
 
     Which unit is due only the controller's class knows: it is taken from their first value.
@@ -325,10 +349,48 @@ def _own_value(field: str, value: object, found: dict[int, Distribution]) -> obj
         return [_own_value(field, entry, found) for entry in value]
     if not isinstance(value, dict):
         return value
+    if not value.keys() & KINDS:
+        return {key: _own_value(f"{field}.{key}".lstrip("."), entry, found) for key, entry in value.items()}
     pair = next(iter(value.values()), None)
     first = pair[0] if isinstance(pair, list) and pair else None
     drawn = found[id(value)] = read_distribution(value, si_unit_of(first), field)
     return written(drawn.middle, drawn.unit)
+
+
+def _fault_rows(rows: object, found: dict[int, Distribution]) -> object:
+    """Return the faults in a file as :class:`FaultTable` has them; distributions in them go to ``found``.
+
+    Raises:
+        ScenarioError, QuantityError: Names the field that is wrong.
+    """
+    if not isinstance(rows, list | tuple):
+        return rows
+    return [_fault_row(f"fault[{i}]", row, found) if isinstance(row, dict) else row for i, row in enumerate(rows)]
+
+
+def _fault_row(field: str, row: dict[str, Any], found: dict[int, Distribution]) -> dict[str, Any]:
+    common = {key: row[key] for key in FaultTable.model_fields if key in row and key != "parameters"}
+    channel, kind = (row.get(key) for key in ("channel", "type"))
+    if not (isinstance(channel, str) and isinstance(kind, str)):
+        return common  # which is refused
+    try:
+        table = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
+    except ParameterError as error:
+        raise ScenarioError(str(error).replace("fault.", f"{field}.", 1)) from error
+    parameters = {}
+    for key, value in row.items():
+        if key in common:
+            continue
+        if key not in table:
+            expected = ", ".join((*table, *(name for name in FaultTable.model_fields if name != "parameters")))
+            raise ScenarioError(f"{field}.{key}: unknown key, expected one of {expected}")
+        unit = table[key].unit or "1"
+        if isinstance(value, dict):
+            drawn = found[id(value)] = read_distribution(value, unit, f"{field}.{key}")
+            parameters[key] = drawn.middle
+        else:
+            parameters[key] = parse_quantity(value, unit, f"{field}.{key}")
+    return {**common, "parameters": parameters}
 
 
 def _shipped() -> Any:
@@ -373,7 +435,7 @@ def _check(scenario: Scenario) -> None:
             raise ScenarioError(str(error).removeprefix("parameter ")) from error
     for index, fault in enumerate(scenario.fault):
         try:
-            Fault(fault.channel, fault.type, fault.value)
+            Fault.of(fault.channel, fault.type, fault.parameters)
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
     check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
@@ -423,4 +485,4 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
         if isinstance(part, str):
             annotation = model.model_fields[part].annotation
             model = annotation if isinstance(annotation, type) else annotation.__args__[0]
-    return [name for name in model.model_fields if model is not Scenario or name not in ("name", "own")]
+    return [name for name in model.model_fields if model is not Scenario or name not in _NO_KEYS]

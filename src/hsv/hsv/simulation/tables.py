@@ -93,9 +93,11 @@ class RobustMpcTable(Table):
 
 
 class FaultTable(Table):
-    """A scheduled fault."""
+    """A scheduled fault; in a file its parameters stand beside the rest."""
 
     channel: str
     type: str
-    value: Annotated[float, quantity("1")]
     start: Time
+    stop: Time | None = None
+    parameters: dict[str, float] = Field(default_factory=dict)
+    """Of its type, SI"""

@@ -20,9 +20,9 @@ from numba import njit
 
 from hsv.elementary import exponential, sine
 from hsv.errors import ParameterError
-from hsv.faults.actuator import first_step
 from hsv.noise import STREAMS, normals
 from hsv.parameters import Parameter, check_all
+from hsv.timing import first_step
 from hsv.vehicle.envelope import FOOT
 
 _LENGTH = 1750.0 * FOOT

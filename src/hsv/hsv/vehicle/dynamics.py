@@ -82,7 +82,7 @@ def air_relative(velocity: Any, path_angle: Any, wind_x: float, wind_z: float) -
 
 @njit(cache=True, error_model="numpy")
 def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
-    """Return lift N, drag N, thrust N, pitching moment N m under ``conditions``, and the air's angle of attack rad.
+    """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa, and angle of attack rad of the air.
 
     Lift is across the inertial path and drag along it: those of the air, turned by the angle between the two paths.
 
@@ -109,6 +109,7 @@ def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
         drag * cos + lift * sin,
         thrust,
         moment + p.thrust_moment_arm * thrust,
+        conditions[2] * pressure,
         alpha,
     )
 
@@ -131,7 +132,7 @@ def derivative(x: Any, u: Any, p: Any, out: Any, conditions: Any = None) -> None
     if conditions is None:
         lift, drag, thrust, moment, _ = forces(x, u, p)
     else:
-        lift, drag, thrust, moment, alpha = forces_in(conditions, x, u, p)
+        lift, drag, thrust, moment, _, alpha = forces_in(conditions, x, u, p)
     alpha2 = alpha * alpha
     force_1 = p.elastic_force_1_alpha_squared * alpha2 + p.elastic_force_1_alpha * alpha + p.elastic_force_1_zero
     force_2 = (

@@ -2,18 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numba import njit
 
 from hsv.errors import ParameterError, QuantityError
+from hsv.faults.effectors import advance_equipped
+from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
+from hsv.faults.schedule import ActiveFault, ScheduledFault
+from hsv.faults.table import DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
+from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import forces
+from hsv.sensors import SENSOR_PARAMETERS, SensorData, measure, sensor_data, sensor_state
+from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, ActuatorData, actuator_data, actuators_at_rest
+from hsv.vehicle.atmosphere import (
+    ATMOSPHERE_PARAMETERS,
+    AtmosphereData,
+    atmosphere_data,
+    atmosphere_state,
+    atmosphere_step,
+    speed_of_sound,
+)
+from hsv.vehicle.dynamics import air_relative, forces, forces_in
 from hsv.vehicle.envelope import in_model_range
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.integration import workspace
 from hsv.vehicle.parameters import COEFFICIENT_UNITS, MODELS, VehicleParameters
 from hsv.vehicle.trim import Trim, trim
 from hsv.vehicle.vehicle import COUPLING_PARAMETER, VEHICLE_PARAMETERS, Vehicle
@@ -40,31 +56,186 @@ PLANT_PARAMETERS = (
         for name in COEFFICIENT_UNITS
     ),
 )
-"""Beside :data:`hsv.vehicle.vehicle.VEHICLE_PARAMETERS`."""
+"""Beside those of the vehicle, its actuators and sensors, and the air."""
+
+EQUIPMENT_PARAMETERS = (*ACTUATOR_PARAMETERS, *ATMOSPHERE_PARAMETERS, *SENSOR_PARAMETERS)
+"""Of what is ideal unless a scenario says otherwise; the tables of a scenario are called after them."""
+
+CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
+"""Conditions of :func:`hsv.vehicle.dynamics.forces_in` in still air, with an engine that works."""
+
+
+class PlantData(NamedTuple):
+    """The plant for compiled functions; ``period`` T (s)."""
+
+    vehicle: VehicleParameters
+    period: float
+    substeps: int
+    actuators: ActuatorData
+    atmosphere: AtmosphereData
+    sensors: SensorData
+    seed: int
+
+
+class PlantMemory(NamedTuple):
+    """What the plant keeps from step to step beside the state x, replaced in place.
+
+    Position and rate of the actuators (2, 2); what the vehicle was given last (2); the states of the atmosphere and of
+    the sensors; the conditions (7) of the last period; scratch.
+    """
+
+    actuators: np.ndarray
+    effector: np.ndarray
+    atmosphere: np.ndarray
+    sensors: np.ndarray
+    conditions: np.ndarray
+    work: np.ndarray
+
+
+class PlantFaults(NamedTuple):
+    """Faults of actuators and effectors, of the engine and of the sensors, with their memories."""
+
+    effector: FaultRows
+    effector_memory: np.ndarray
+    engine: FaultRows
+    engine_memory: np.ndarray
+    sensor: FaultRows
+    sensor_memory: np.ndarray
+
+    @classmethod
+    def of(cls, scheduled: Sequence[ScheduledFault], period: float, before: PlantFaults | None = None) -> PlantFaults:
+        """Return those among the ``scheduled``; what was known ``before`` keeps its memory."""
+        found: list[Any] = []
+        for i, sides in enumerate(((DYNAMICS, EFFECTOR), (ENGINE_SIDE,), (SENSOR,))):
+            rows = fault_rows(sides, scheduled, period)
+            earlier: Any = before[2 * i : 2 * i + 2] if before else (None, None)
+            found += rows, fault_memory(rows, *earlier)
+        return cls(*found)
+
+
+@njit(cache=True, error_model="numpy")
+def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, faults: Any, step: int) -> None:
+    """Replace ``x`` (9) in ``step`` by the state one period later.
+
+    Args:
+        x: State, replaced.
+        actuator: What reaches the actuators (2), held.
+        data: :class:`PlantData`.
+        memory: :class:`PlantMemory`.
+        faults: :class:`PlantFaults`.
+        step: k.
+    """
+    actuators, effector, atmosphere, _, conditions, work = memory
+    p, air = data.vehicle, data.atmosphere
+    if air.still and len(faults.engine.start) == 0:
+        advance_equipped(
+            x,
+            actuator,
+            p,
+            data.period,
+            data.substeps,
+            data.actuators,
+            actuators,
+            faults.effector,
+            faults.effector_memory,
+            step,
+            data.seed,
+            effector,
+            work,
+        )
+        return
+    if not air.still:
+        atmosphere_step(air, atmosphere, step, data.seed, x[0], x[1], conditions[:3])
+    speed, path_angle = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
+    mach = speed / speed_of_sound(x[0])
+    engine, engine_memory = faults.engine, faults.engine_memory
+    apply_engine_faults(engine, engine_memory, step, data.seed, x[3] - path_angle, mach, actuator[0], conditions[3:])
+    advance_equipped(
+        x,
+        actuator,
+        p,
+        data.period,
+        data.substeps,
+        data.actuators,
+        actuators,
+        faults.effector,
+        faults.effector_memory,
+        step,
+        data.seed,
+        effector,
+        work,
+        conditions,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measurement: np.ndarray) -> None:
+    """Write into ``measurement`` (9) what the sensors say of ``x`` (9) in ``step``; see :func:`advance_plant`."""
+    if data.sensors.ideal and len(faults.sensor.start) == 0:
+        for i in range(len(x)):
+            measurement[i] = x[i]
+    else:
+        measure(data.sensors, memory.sensors, faults.sensor, faults.sensor_memory, step, data.seed, x, measurement)
 
 
 @dataclass(frozen=True)
 class PlantResult:
-    """One state x (9); lift N, drag N, thrust N, pitching moment N m and dynamic pressure Pa there; the status."""
+    """The state x (9) of a step, what is measured of it (9), and what has led to it.
+
+    Lift N, drag N, thrust N, pitching moment N m and dynamic pressure Pa there; where the effectors (2) were last; wind
+    forward and up (m/s) and density for that of the model over the period before (3); the status.
+    """
 
     step: int
     state: np.ndarray
+    measurement: np.ndarray
     forces: tuple[float, float, float, float, float]
+    effector: np.ndarray
+    air: np.ndarray
     status: FlightStatus
 
 
 class Plant:
-    """The vehicle under held inputs. It starts in the trim of the *nominal* vehicle, perturbed or not."""
+    """The vehicle under held inputs, with its actuators and sensors, in its air.
 
-    PARAMETERS = (*PLANT_PARAMETERS, *VEHICLE_PARAMETERS)
+    It starts in the trim of the *nominal* vehicle in still air, perturbed or not.
+    """
 
-    def __init__(self, vehicle: VehicleParameters, initial: Trim, period: float, steps: int, substeps: int = 2) -> None:
+    PARAMETERS = (*PLANT_PARAMETERS, *VEHICLE_PARAMETERS, *EQUIPMENT_PARAMETERS, SEED_PARAMETER)
+
+    def __init__(
+        self,
+        vehicle: VehicleParameters,
+        initial: Trim,
+        period: float,
+        steps: int,
+        substeps: int = 2,
+        equipment: Mapping[str, object] | None = None,
+    ) -> None:
+        """Take the vehicle from its ``initial`` trim through so many ``steps`` of a ``period`` (s).
+
+        Args:
+            vehicle: Parameters.
+            initial: Where it starts.
+            period: T (s).
+            steps: Of the flight.
+            substeps: Runge-Kutta steps a period, while actuators are ideal.
+            equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; the rest is as by default: ideal.
+        """
         self.vehicle = vehicle
         self.initial = initial
         self.period = period
         self.steps = steps
-        self.substeps = substeps
-        self._work = workspace()
+        self._equipment = dict(equipment or {})
+        self.data = PlantData(
+            vehicle,
+            period,
+            substeps,
+            actuator_data(self._equipment, vehicle, period),
+            atmosphere_data(self._equipment, period),
+            sensor_data(self._equipment, period),
+            check_all((SEED_PARAMETER,), self._equipment)[SEED_PARAMETER.name],
+        )
         self.reset()
         self.step(initial.input)  # compile now: a cold cache must not stall a flight
         self.reset()
@@ -87,30 +258,59 @@ class Plant:
             nominal = nominal.decoupled()
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
         initial = trim(nominal, v["initial.altitude"], v["initial.velocity"])
-        return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"])
+        equipment = {p.name: values[p.name] for p in (*EQUIPMENT_PARAMETERS, SEED_PARAMETER) if p.name in values}
+        return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"], equipment)
+
+    def perturbed(self, perturbation: Mapping[str, float]) -> Plant:
+        """Return the same with another vehicle, relative changes by parameter name; it starts in the same trim."""
+        vehicle = self.vehicle.perturbed(perturbation)
+        return Plant(vehicle, self.initial, self.period, self.steps, self.data.substeps, self._equipment)
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
         self._state = self.initial.state.copy()
         self._step = 0
-        return self._result(self.initial.input)
+        self._memory = self.memory()
+        self._active: tuple[ActiveFault, ...] = ()
+        self._faults = PlantFaults.of((), self.period)
+        return self._result()
+
+    def memory(self) -> PlantMemory:
+        """Return the memory with which a flight begins: actuators at rest in trim, still air."""
+        held = self.initial.input
+        air = atmosphere_state(self.data.atmosphere)
+        return PlantMemory(actuators_at_rest(held), held.copy(), air, sensor_state(), CALM.copy(), workspace())
 
     def place(self, step: int, state: np.ndarray) -> None:
         """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""
         self._state[:] = state
         self._step = step
 
-    def step(self, actuator: np.ndarray) -> PlantResult:
-        """Hold ``actuator`` (2) over one period and return the state at its end."""
-        advance(self._state, actuator, self.vehicle, self.period, self.substeps, self._work)
-        self._step += 1
-        return self._result(actuator)
+    def step(self, actuator: np.ndarray, active: tuple[ActiveFault, ...] = ()) -> PlantResult:
+        """Hold what reaches the actuators (2) over one period and return the state at its end.
 
-    def _result(self, held: np.ndarray) -> PlantResult:
+        ``active``: the faults that are due; those of the command have acted already.
+        """
+        if active != self._active:
+            known = [ScheduledFault(fault, since) for fault, since in active]
+            self._faults = PlantFaults.of(known, self.period, self._faults)
+            self._active = active
+        advance_plant(self._state, actuator, self.data, self._memory, self._faults, self._step)
+        self._step += 1
+        return self._result()
+
+    def _result(self) -> PlantResult:
         if not in_model_range(self._state, self.vehicle.angle_limit):
             status = FlightStatus.DIVERGED
         elif self._step >= self.steps:
             status = FlightStatus.FINISHED
         else:
             status = FlightStatus.RUNNING
-        return PlantResult(self._step, self._state.copy(), forces(self._state, held, self.vehicle), status)
+        effector, conditions = self._memory.effector.copy(), self._memory.conditions.copy()
+        if np.array_equal(conditions, CALM):
+            felt = forces(self._state, effector, self.vehicle)
+        else:
+            *felt, _ = forces_in(conditions, self._state, effector, self.vehicle)
+        measurement = np.empty_like(self._state)
+        sense(self._state, self.data, self._memory, self._faults, self._step, measurement)
+        return PlantResult(self._step, self._state.copy(), measurement, tuple(felt), effector, conditions[:3], status)

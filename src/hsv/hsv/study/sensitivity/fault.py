@@ -36,7 +36,10 @@ def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: S
     shares = grid(0.3, 1.0, 0.025, coarseness)
     over = corners_of(1.0, coarseness)
     flown = (*FLOWN, *others)
-    along = {c: [Point(c.parameters() | {"fault.values": [float(left)]}, over) for left in shares] for c in flown}
+    along = {
+        c: [Point(c.parameters() | {"fault.parameters": [f"effectiveness={float(left)!r}"]}, over) for left in shares]
+        for c in flown
+    }
     strips = sweep("fault", along, folder, progress)
 
     figure = new_figure(7.2)

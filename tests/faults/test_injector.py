@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from hsv.faults.actuator import FAULT_PARAMETERS, FAULT_TYPES, Fault, FaultInjector, apply_faults, faulty, first_step
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from hsv.errors import ParameterError
-from hsv.faults.actuator import FAULT_PARAMETERS, FAULT_TYPES, Fault, FaultInjector, apply_faults, faulty, first_step
 from hsv.vehicle.dynamics import INPUT_NAMES
 
 COMMAND = np.array([0.4, 0.2])

@@ -1,0 +1,196 @@
+"""The fault injector: a schedule of faults, those injected and cleared in flight, and what they do to the command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from hsv.errors import ParameterError
+from hsv.faults.laws import FaultRows, apply_command_faults, fault_memory, fault_rows
+from hsv.faults.schedule import ActiveFault, ScheduledFault
+from hsv.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
+from hsv.noise import SEED_PARAMETER
+from hsv.parameters import Parameter, check_all
+from hsv.timing import NEVER, first_step
+from hsv.vehicle.dynamics import N_INPUTS
+
+FAULT_PARAMETERS = (
+    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    SEED_PARAMETER,
+    Parameter("fault.channels", ["none"], "channel of each scheduled fault, or one 'none'"),
+    Parameter("fault.types", ["none"], "type of each scheduled fault: " + ", ".join(FAULT_KINDS)),
+    Parameter("fault.parameters", ["none"], "parameters of each, SI, as 'effectiveness=0.9', commas between several"),
+    Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
+    Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
+)
+NEVER_TIME = 1e9
+"""Stop (s) of a fault that does not end, where others do."""
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """What reaches the actuators (2), and the faults that are due.
+
+    Those of command, actuators, effectors and engine are due in this step, those of sensors in the next: its
+    measurement is the first that can have heard of them.
+    """
+
+    actuator: np.ndarray
+    active: tuple[ActiveFault, ...]
+
+
+class FaultInjector:
+    """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on.
+
+    What acts on the command is applied here; the rest is told to the vehicle.
+    """
+
+    PARAMETERS: ClassVar = FAULT_PARAMETERS
+
+    def __init__(self, scheduled: Sequence[ScheduledFault] = (), period: float = 0.02, seed: int = 0) -> None:
+        # The first measurement is there before anybody can have told the sensors of a fault.
+        self.scheduled = tuple(
+            row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
+        )
+        self.period, self.seed = period, seed
+        self.reset()
+        self.step(0, np.zeros(N_INPUTS))  # compile now: a cold cache must not stall a flight
+        self.reset()
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+        """Build from :data:`FAULT_PARAMETERS`.
+
+        Raises:
+            ParameterError: A wrong value, or arrays of different lengths.
+        """
+        v = check_all(FAULT_PARAMETERS, values)
+        period, seed = v["period"], v[SEED_PARAMETER.name]
+        names = ("channels", "types", "parameters", "starts", "stops")
+        columns = [v[f"fault.{name}"] for name in names]
+        if columns[0] == ["none"]:
+            return cls((), period, seed)
+        columns[-1] = list(columns[-1]) or [NEVER_TIME] * len(columns[0])
+        for name, column in zip(names, columns, strict=True):
+            if len(column) != len(columns[0]):
+                raise ParameterError(
+                    f"parameter fault.{name}: {len(column)} values, "
+                    f"expected as many as fault.channels, {len(columns[0])}"
+                )
+        scheduled = [
+            ScheduledFault(
+                Fault.of(channel, kind, read_parameters(text)), first_step(start, period), first_step(stop, period)
+            )
+            for channel, kind, text, start, stop in zip(*columns, strict=True)
+        ]
+        return cls(scheduled, period, seed)
+
+    def reset(self) -> None:
+        """Return to the schedule: what was injected or cleared in flight is forgotten."""
+        self.known = list(self.scheduled)
+        self._next = 0
+        self._rows = self.rows((COMMAND,))
+        self._memory = fault_memory(self._rows)
+
+    def rows(self, sides: Sequence[str]) -> FaultRows:
+        """Return the faults of some sides that are known now, for compiled functions."""
+        return fault_rows(sides, self.known, self.period)
+
+    def parameters(self) -> dict[str, list[str] | list[float]]:
+        """Return the faults known now, those injected or cleared in flight included, as :data:`FAULT_PARAMETERS`."""
+        if not self.known:
+            return {"fault.channels": ["none"]}
+        return {
+            "fault.channels": [row.fault.channel for row in self.known],
+            "fault.types": [row.fault.type for row in self.known],
+            "fault.parameters": [written_parameters(row.fault.parameters) for row in self.known],
+            "fault.starts": [row.start * self.period for row in self.known],
+            "fault.stops": [min(row.stop * self.period, NEVER_TIME) for row in self.known],
+        }
+
+    def inject(self, fault: Fault, steps: int = NEVER) -> int:
+        """Start ``fault`` with the next step, for so many, in place of one of its type on its channel.
+
+        Returns:
+        -------
+        int
+            That step.
+        """
+        self.clear(fault.channel, fault.type)
+        start = self._first(fault)
+        self.known.append(ScheduledFault(fault, start, min(start + steps, NEVER)))
+        self._compile()
+        return start
+
+    def clear(self, channel: str = "", kind: str = "") -> int:
+        """End the faults acting on ``channel`` (all channels if empty), those of a kind alone where one is given.
+
+        Returns:
+        -------
+        int
+            The next step, the first without; of faults of sensors alone, the one after it.
+
+        Raises:
+            ParameterError: Unknown channel or kind.
+        """
+        if channel and channel not in CHANNELS:
+            raise ParameterError(f"channel = {channel!r}: expected one of {', '.join(CHANNELS)}, or empty for all")
+        if kind and kind not in FAULT_KINDS:
+            raise ParameterError(f"type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}, or empty for all")
+        ended = []
+        for i, (fault, start, stop) in enumerate(self.known):
+            if channel in ("", fault.channel) and kind in ("", fault.type) and start <= self._first(fault) < stop:
+                ended.append(self._first(fault))
+                self.known[i] = ScheduledFault(fault, start, ended[-1])
+        self._compile()
+        return min(ended, default=self._next)
+
+    def step(self, step: int, command: np.ndarray) -> FaultResult:
+        """Return what becomes of ``command`` (2) in ``step``."""
+        actuator = np.empty(N_INPUTS)
+        apply_command_faults(self._rows, self._memory, step, self.seed, command, actuator)
+        self._next = step + 1
+        return FaultResult(actuator, self.acting(step))
+
+    def acting(self, step: int) -> tuple[ActiveFault, ...]:
+        """Return the faults that are due after ``step``, see :class:`FaultResult`."""
+        return tuple(
+            ActiveFault(fault, start)
+            for fault, start, stop in self.known
+            if start <= (step + 1 if fault.kind.side == SENSOR else step) < stop
+        )
+
+    def _first(self, fault: Fault) -> int:
+        """Return the first step in which a fault can still be begun or ended."""
+        return self._next + 1 if fault.kind.side == SENSOR else self._next
+
+    def _compile(self) -> None:
+        rows = self.rows((COMMAND,))
+        self._memory = fault_memory(rows, self._rows, self._memory)
+        self._rows = rows
+
+
+def read_parameters(text: str) -> dict[str, float]:
+    """Return the parameters of a fault, SI, written as :func:`written_parameters` does.
+
+    Raises:
+        ParameterError: It is written otherwise.
+    """
+    found = {}
+    for entry in filter(None, text.split(",")):
+        name, equals, number = entry.partition("=")
+        try:
+            found[name.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise ParameterError(f"parameter fault.parameters: {text!r}, expected a form as 'effectiveness=0.9'")
+    return found
+
+
+def written_parameters(parameters: Mapping[str, Any]) -> str:
+    """Return parameters of a fault as text, every bit of them."""
+    return ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())
