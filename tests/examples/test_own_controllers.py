@@ -54,7 +54,7 @@ def hsv(tmp_path_factory):
     [("lqr", 1.0, 0.1), ("compiled", 30.0, 5.0)],
 )
 def test_it_flies_without_a_design_and_holds_the_commands(hsv, example, altitude, velocity):
-    ran = hsv("simulate", str(EXAMPLES / example / "scenario.toml"), "--json")
+    ran = hsv("simulate", str(EXAMPLES / example / f"{example}.toml"), "--json")
     assert ran.returncode == 0, ran.stderr
     flown = json.loads(ran.stdout)
     assert flown["diverged_at_s"] is None
@@ -67,7 +67,7 @@ def test_it_flies_without_a_design_and_holds_the_commands(hsv, example, altitude
 @pytest.mark.long
 @pytest.mark.parametrize("example", FLYABLE)
 def test_a_campaign_flies_it(hsv, example):
-    words = ["montecarlo", str(EXAMPLES / example / "scenario.toml"), "--samples", "100", "--seed", "1", "--no-page"]
+    words = ["montecarlo", str(EXAMPLES / example / f"{example}.toml"), "--samples", "100", "--seed", "1", "--no-page"]
     ran = hsv(*words, "--out", f"{example}.parquet", "--json")
     assert ran.returncode == 0, ran.stderr
     kept = json.loads(ran.stdout)
@@ -77,7 +77,7 @@ def test_a_campaign_flies_it(hsv, example):
 
 
 @pytest.mark.parametrize(
-    "part", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "scenario.toml")]
+    "part", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "compiled.toml")]
 )
 def test_it_flies_the_same_bytes_every_time(hsv, part):
     ran = hsv("check", part, "--json")
@@ -87,7 +87,7 @@ def test_it_flies_the_same_bytes_every_time(hsv, part):
 
 def test_what_an_example_refuses_is_said_in_a_line(hsv, tmp_path):
     path = tmp_path / "mine.toml"
-    path.write_text(f'extends = "{EXAMPLES / "compiled" / "scenario.toml"}"\n[scheduled]\nlow_velocity = "8200 ft/s"\n')
+    path.write_text(f'extends = "{EXAMPLES / "compiled" / "compiled.toml"}"\n[scheduled]\nlow_velocity = "8200 ft/s"\n')
     ran = hsv("simulate", str(path))
     assert ran.returncode == 2
     [line] = ran.stderr.splitlines()
@@ -119,13 +119,14 @@ def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout,
     assert abs(ours.metrics["altitude_end_error"]) < 30.0 and abs(ours.metrics["velocity_end_error"]) < 5.0
     assert ours.fingerprint != theirs.fingerprint
     assert Path("scheduled_and_tube.png").exists()
-    [result] = Path("campaigns").glob("*.parquet")
+    # An example's campaigns, bags and pages are called by its scenario's file: no two examples' are alike.
+    [result] = Path("campaigns").glob("c_gain_scheduled_*.parquet")
     assert len(parquet.read_table(result)) == 100
 
 
 def test_the_example_in_c_flies_the_same_bits_as_the_one_that_numba_compiles(checkout, monkeypatch):
     monkeypatch.syspath_prepend(EXAMPLES / "compiled")
-    path = str(checkout / "examples" / "c_gain_scheduled" / "scenario.toml")
+    path = str(checkout / "examples" / "c_gain_scheduled" / "c_gain_scheduled.toml")
     compiled = assemble_flight(load_scenario(path, {"controller": "hsv_scheduled:Scheduled"}))
     # Computed on another machine, the gains may differ in last bits from those that the C source has.
     gains = compiled.controller.kernel.parameters[2:].tolist()
@@ -140,7 +141,7 @@ def test_what_the_example_in_c_refuses_is_said_in_a_line(checkout, hsv, tmp_path
         "controller = '../scheduled.so:scheduled'": "expected a path inside the scenario's folder",
     }.items():
         path = tmp_path / "mine.toml"
-        path.write_text(f'extends = "{checkout}/examples/c_gain_scheduled/scenario.toml"\n{text}\n')
+        path.write_text(f'extends = "{checkout}/examples/c_gain_scheduled/c_gain_scheduled.toml"\n{text}\n')
         ran = hsv("simulate", str(path))
         assert ran.returncode == 2
         [line] = ran.stderr.splitlines()

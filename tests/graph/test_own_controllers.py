@@ -23,6 +23,7 @@ from hsv.replay.attached import complete_steps
 pytestmark = pytest.mark.graph
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENARIOS = {"compiled": "compiled/compiled.toml", "lqr": "lqr/lqr.toml", "node": "node/regulator.toml"}
 WRONG = Path(__file__).parents[1] / "support" / "wrong_controller.py"
 WRONG_STEP = 100
 SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
@@ -56,7 +57,7 @@ def processes(installed: dict[str, str], tmp_path: Path) -> Iterator[Processes]:
 def scenario(folder: Path, example: str, more: str = "", duration: float = 11.0) -> Path:
     """Write a shortened scenario of an example."""
     path = folder / f"{example}.toml"
-    path.write_text(SHORT.format(example=EXAMPLES / example / "scenario.toml", more=more, duration=duration))
+    path.write_text(SHORT.format(example=EXAMPLES / SCENARIOS[example], more=more, duration=duration))
     return path
 
 

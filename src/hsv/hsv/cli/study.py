@@ -24,7 +24,7 @@ def study(
 ) -> None:
     """Carry the results over what the paper leaves open, until each controller is lost; plot and say where.
 
-    Example: hsv study fault --with examples/lqr/scenario.toml --out study
+    Example: hsv study fault --with examples/lqr/lqr.toml --out study
     """
     import matplotlib
 
