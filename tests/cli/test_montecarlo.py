@@ -4,6 +4,7 @@ import pytest
 from node_processes import short_scenario
 
 from hsv.control.design_file import find_design
+from hsv.parameters import Parameter, check_all
 
 
 @pytest.fixture
@@ -116,3 +117,39 @@ def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
 def test_what_cannot_be_printed_is_named(drawn, hsv, words, expected):
     refused = hsv("montecarlo", "scenario", drawn, *words)
     assert refused.code == 2 and expected in refused.error
+
+
+class Failing:
+    """Holds the trim, and fails where the flight starts above an altitude."""
+
+    PARAMETERS = (Parameter("failing.above", 0.0, "altitude", "m", 0.0, 1e5),)
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        made = cls()
+        made.above = check_all(cls.PARAMETERS, values)["failing.above"]
+        return made
+
+    def reset(self):
+        pass
+
+    def step(self, inputs):
+        if inputs.estimate[0] > self.above:
+            raise ValueError("too high")
+        return inputs.reference_input
+
+
+@pytest.mark.parametrize(("above", "code"), [("0 ft", 1), ("85500 ft", 0)])
+def test_a_campaign_fails_only_where_every_flight_crashed(hsv, tmp_path, above, code):
+    short_scenario(tmp_path, duration=3, fault=2)
+    own = f'extends = "short.toml"\ncontroller = "{__name__}:Failing"\ndesign = ""\n[failing]\nabove = "{above}"\n'
+    (tmp_path / "own.toml").write_text(own)
+    words = ("--samples", "4", "--scale", "0", "--initial-altitude", "85400 ft", "85600 ft", "--workers", "1")
+    for flown in (4, 0):
+        ran = hsv("montecarlo", "own.toml", *words, "--out", "own.parquet", "--no-page", "--json")
+        assert (ran.code, ran.json["flown_now"]) == (code, flown)
+        [ended] = ran.json["limits"]
+        assert ended["within"] == 0 if code else 0 < ended["within"] < 4
+        said = [line for line in ran.err.splitlines() if "error" in line]
+        where = f"{__name__}:Failing, step 0: ValueError: too high"
+        assert said == ([f"hsv: error: all 4 flights crashed, the first: {where}"] if code else [])

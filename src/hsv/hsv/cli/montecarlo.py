@@ -69,6 +69,9 @@ def fly(
 ) -> None:
     """Fly a campaign. Interrupted, the same command goes on where it was left.
 
+    A flight that its controller crashes is recorded with the reason, and the others are flown. Exit code 1 where every
+    flight crashed.
+
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --fault-start "90 s" "110 s"
     """
     from hsv.campaign.campaign import plan
@@ -78,7 +81,7 @@ def fly(
     from hsv.campaign.summary import Results
     from hsv.cli.campaign_summary import announce, show
     from hsv.cli.progress import flights as flights_bar
-    from hsv.errors import CampaignError
+    from hsv.errors import CampaignError, RunError
     from hsv.graph.preparation import commit
 
     method = "corners" if corners else sampling.value
@@ -107,7 +110,10 @@ def fly(
         errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
         raise
     # The campaign in the file is the one that was asked for: its code is that of the user's own scenario.
-    show(Results(out, trust=True), units, json, page, flown)
+    results = Results(out, trust=True)
+    show(results, units, json, page, flown)
+    if results.crashed.all():
+        raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
 
 
 @montecarlo.command()
