@@ -6,8 +6,12 @@ from pathlib import Path
 
 import pytest
 
+from hsv.control.design_file import digest
 from hsv.errors import RecordingError
 from hsv.graph.preparation import prepare
+from hsv.simulation.assembly import design_parameters
+from hsv.simulation.fingerprint import as_published
+from hsv.simulation.scenario import parse_scenario
 
 
 def test_the_bag_is_made_here_so_that_a_second_run_of_its_name_is_refused(tmp_path: Path) -> None:
@@ -23,3 +27,15 @@ def test_the_bag_is_made_here_so_that_a_second_run_of_its_name_is_refused(tmp_pa
 def test_default_names_differ_within_a_second(tmp_path: Path) -> None:
     prepared = [prepare("case1", bags=tmp_path) for _ in range(5)]
     assert len({run.bag for run in prepared}) == 5
+
+
+@pytest.mark.parametrize("name", ["case1", "case1_rmpc", "case1_integral_heavy", "case2_tau1"])
+def test_the_bag_of_a_foreign_controller_keeps_the_scenario_that_is_flown(tmp_path: Path, name: str) -> None:
+    for external in (False, True):
+        folder = tmp_path / str(external)
+        prepared = prepare(name, bag=folder / "bag", folder=folder, external=external)
+        kept = parse_scenario((folder / "scenario.toml").read_text(), name)
+        assert kept == prepared.scenario and kept.controller.startswith("node:") == external
+        # Only the scenario's own controller is compared with the publication.
+        design = digest(design_parameters(kept))
+        assert as_published("v1:another", kept, design) is (None if external else False)

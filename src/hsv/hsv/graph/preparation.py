@@ -20,7 +20,7 @@ from hsv.graph.description import COMPOSED, CONTROLLER, NodeDescription, control
 from hsv.graph.launcher import executable
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
-from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text
+from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text, with_controller
 
 STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 2.5
 """Wall time (s) after which a silent node ends a run; nobody knows what a controller that is a node of its own does."""
@@ -81,9 +81,11 @@ def prepare(
     if step_timeout is not None and not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
     text = text or scenario_text(scenario_name)
-    scenario = parse_scenario(text, Path(scenario_name).stem)
+    name = Path(scenario_name).stem
     if external:
-        scenario = scenario.model_copy(update={"controller": NODE, "own": {}})
+        # What the bag keeps is what is flown: it is not the published flight of this scenario.
+        text = with_controller(text, NODE, name)
+    scenario = parse_scenario(text, name)
     with blamed_on(scenario):
         design_file = find_design(scenario.design) if scenario.design else None
         design = read_design_parameters(design_file) if design_file else {"design.name": NO_DESIGN}

@@ -128,6 +128,9 @@ EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in EQUIPMEN
 _NO_KEYS = ("name", "own", "equipment")
 """Fields that a file has not, or has otherwise."""
 
+_OF_A_CONTROLLER = ("tube", "integral", "robust_mpc")
+"""Tables of the bench's own controllers."""
+
 REPLACED = ("limits",)
 """Tables that a scenario does not share with the one it extends: what is expected of a flight is its own."""
 
@@ -274,6 +277,17 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
     if isinstance(place, dict) != isinstance(key, str) or (isinstance(key, int) and key >= len(place)):
         raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
     place[key] = value
+
+
+def with_controller(text: str, controller: str, name: str) -> str:
+    """Return a scenario's ``text`` with another controller, without the tables of the controller that it had.
+
+    Raises:
+        ScenarioError: ``text``, the scenario called ``name``, is no TOML.
+    """
+    table = scenario_table(text, name)
+    left = {key: value for key, value in table.items() if key not in (*_OF_A_CONTROLLER, *_own_tables(table))}
+    return tomli_w.dumps(left | {"controller": controller})
 
 
 def parse_scenario(text: str, name: str) -> Scenario:
