@@ -16,6 +16,7 @@ from hsv.control.controller import ControllerInput
 from hsv.control.library import library_digest, library_record
 from hsv.control.library_process import SharedMemory
 from hsv.errors import ControllerError, ScenarioError
+from hsv.graph.preparation import prepare
 from hsv.parameters import Parameter
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -273,6 +274,16 @@ def test_what_a_recorded_flight_keeps_is_the_library_s_hash_and_its_source(fligh
     (folder / "other.so").write_bytes((folder / "probe.so").read_bytes() + b"\0")
     assert library_digest(name.replace("probe.so", "other.so")) != before
     assert library_record("tube_mpc") is None and library_digest("package.module:Class") == ""
+
+
+def test_a_library_without_its_source_is_prepared_for_a_run_as_it_flies_in_process(tmp_path):
+    build_probe(tmp_path)
+    path, files = tmp_path / "mine.toml", tmp_path / "files"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    assert len(fly(assemble_flight(load_scenario(str(path)))).time) == 201
+    prepare(str(path), bag=tmp_path / "bag", folder=files)
+    assert {file.name for file in files.iterdir()} == {"scenario.toml", "scenario.yaml", "design.yaml", "run.yaml"}
+    assert f"controller_sha256={library_digest(f'{tmp_path}/probe.so:probe')}" in (files / "run.yaml").read_text()
 
 
 def test_the_controller_in_the_header_s_comment_is_built_and_flies(tmp_path):

@@ -70,7 +70,7 @@ class LibraryRecord:
     sha256: str
     """Of the file, hexadecimal"""
     source_name: str
-    """As the block says, from the library's folder; empty where it says nothing"""
+    """As the block says, from the library's folder; empty where it says nothing, or the file did not come along"""
     source: bytes
 
 
@@ -78,14 +78,18 @@ def library_record(controller: str) -> LibraryRecord | None:
     """Return what is to be kept of a scenario's ``controller``, nothing where it is not in a library.
 
     Raises:
-        ParameterError: The library, or the source that its block names, cannot be read.
+        ParameterError: The library cannot be read.
     """
     place = library_place(controller)
     if place is None:
         return None
     path, symbol = place
-    name = LibraryClass(controller, path, symbol).block.source
-    source = _content(path.parent / name, f"controller = {controller!r}: source = {name!r}") if name else b""
+    name, source = LibraryClass(controller, path, symbol).block.source, b""
+    if name:
+        try:
+            source = (path.parent / name).read_bytes()
+        except OSError:
+            name = ""  # A library flies without its source, wherever it is flown.
     return LibraryRecord(library_digest(controller), name, source)
 
 
@@ -96,14 +100,12 @@ def library_digest(controller: str) -> str:
         ParameterError: It cannot be read.
     """
     place = library_place(controller)
-    return hashlib.sha256(_content(place[0], f"controller = {controller!r}")).hexdigest() if place else ""
-
-
-def _content(path: Path, field: str) -> bytes:
+    if place is None:
+        return ""
     try:
-        return path.read_bytes()
+        return hashlib.sha256(place[0].read_bytes()).hexdigest()
     except OSError as error:
-        raise ParameterError(f"{field}: cannot be read ({reason(error)})") from error
+        raise ParameterError(f"controller = {controller!r}: cannot be read ({reason(error)})") from error
 
 
 class LibraryClass:
