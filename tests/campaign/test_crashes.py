@@ -69,7 +69,7 @@ def test_a_flight_that_crashes_is_recorded_and_the_others_are_flown(fly, tmp_pat
 def test_a_campaign_of_which_every_flight_fails_is_recorded(fly, tmp_path):
     failed = fly("failed", "fail_at = 5", 3)
     assert failed.crashed.all()
-    assert "step 5: returned an error" in failed.row(0)["crashed"]
+    assert "step 5: returned 7, expected 0" in failed.row(0)["crashed"]
     assert shares(failed)[0].within == 0
     write_page(failed, tmp_path / "page.html")
 

@@ -150,8 +150,8 @@ def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
         ("crash_at = 33", r"probe.so:probe, step 33: crashed \(SIGSEGV\)$"),
         ("exit_at = 200", r"probe.so:probe, step 200: ended its process with exit code 3$"),
         ("hang_at = 7", r"probe.so:probe, step 7: no answer for 1 s$"),
-        ("fail_at = 20", r"probe.so:probe, step 20: returned an error or answered"),
-        ("silent_at = 20", r"probe.so:probe, step 20: returned an error or answered \[nan, nan\]"),
+        ("fail_at = 20", r"probe.so:probe, step 20: returned 7, expected 0$"),
+        ("silent_at = 20", r"probe.so:probe, step 20: answered \[nan, nan\]"),
     ],
 )
 def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight, settings, message, monkeypatch):

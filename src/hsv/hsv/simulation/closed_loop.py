@@ -118,6 +118,8 @@ class LoopArrays(NamedTuple):
     nominal_input: np.ndarray
     filter_state: np.ndarray
     wanted: np.ndarray
+    returned: np.ndarray
+    """(1) what the function of a compiled controller returned"""
     gain_index: np.ndarray
     memory: np.ndarray
 
@@ -131,7 +133,7 @@ def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, li
     given = np.zeros(ends[-1])
     cuts = [slice(*cut) for cut in pairwise((0, *ends))]
     views = [given[cut] for cut in cuts]
-    return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), memory))
+    return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), np.zeros(1), memory))
 
 
 @njit(cache=True, nogil=True)
@@ -155,7 +157,7 @@ def _fly(
 
     Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k.
     """
-    estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, gain_index, memory = arrays
+    estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory = arrays
     n, m = len(x), len(u_n)
     filter_state = np.zeros(len(s))
     measurement = np.empty(n)
@@ -204,7 +206,8 @@ def _fly(
             _, inputs, outputs, state, parameters = controller_call
             for i in range(m):
                 wanted[i] = math.nan  # what is not answered is no answer, not the one before
-            if call_step(controller_call.function, k, inputs, outputs, state, parameters) != 0:
+            returned[0] = call_step(controller_call.function, k, inputs, outputs, state, parameters)
+            if returned[0] != 0:
                 return -1 - k
             for i in range(m):
                 if not math.isfinite(wanted[i]):
@@ -376,7 +379,9 @@ def fly_into(history: History, components: Components) -> int:
         if callback.error is not None:
             raise callback.error
     if rows < 0:
-        raise controller.failure(-1 - rows, f"returned an error or answered {arrays.wanted.tolist()}")
+        if code := int(arrays.returned[0]):
+            raise ControllerError(f"{controller.name}, step {-1 - rows}: returned {code}, expected 0")
+        raise controller.failure(-1 - rows, f"answered {arrays.wanted.tolist()}")
     return rows
 
 
