@@ -90,6 +90,17 @@ def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()) and not list(temporary.iterdir())
 
 
+def test_a_run_that_is_interrupted_before_its_first_step_leaves_no_bag(processes: Processes) -> None:
+    bag = processes.folder / "waiting"
+    run = processes.start("hsv", "run", "case1", "--external", "--composed", "--bag", bag)
+    # The recorder has its file, and waits with all others for a controller that nobody starts.
+    wait_until(lambda: (bag / "waiting_0.mcap").exists(), [run.pid])
+    run.send_signal(signal.SIGINT)
+    output = output_of(run)
+    assert run.returncode == 130 and output.splitlines()[-1] == "hsv: error: interrupted"
+    assert not bag.exists()
+
+
 def _refuse_to_disturb(processes: Processes, bag: Path) -> None:
     """Neither a second run nor a recovery touches a flight and its bag."""
     for words, refused in (

@@ -36,6 +36,8 @@ def run(
 ) -> None:
     """Fly a scenario with the graph of ROS 2 nodes as separate processes, recorded to an MCAP bag.
 
+    Interrupted, it leaves what was flown until then, and nothing before the first step.
+
     Example: hsv run case1 --units paper
     """
     import time

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from hsv.errors import RecordingError, RunError
-from hsv.graph.description import ROOT
+from hsv.graph.description import ROOT, TOPICS
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 
@@ -19,7 +20,7 @@ def fly_graph(
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
 ) -> None:
-    """Fly ``prepared`` with its processes, recorded to its bag.
+    """Fly ``prepared`` with its processes, recorded to its bag; interrupted before the first step, it leaves no bag.
 
     Args:
         prepared: What :func:`hsv.graph.preparation.prepare` returns.
@@ -38,8 +39,9 @@ def fly_graph(
     except RunError as error:
         failures.append(str(error))
     except BaseException:
-        with suppress(RunError):
+        with suppress(RunError, RecordingError):
             close_bag(prepared.bag)
+            _remove_without_steps(prepared.bag)
         raise
     close_bag(prepared.bag, failures)
 
@@ -61,6 +63,16 @@ def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
         words.insert(0, str(error))
     if words:
         raise RunError((f"{bag}: " if bag.is_dir() else "") + "; ".join(words))
+
+
+def _remove_without_steps(bag: Path) -> None:
+    from hsv.recording.reader import Bag
+
+    if not bag.is_dir():
+        return
+    opened = Bag(bag)
+    if not any(len(opened.times(topic)) for topic in TOPICS if topic in opened.roles):
+        shutil.rmtree(bag)
 
 
 def _mend(bag: Path) -> None:
