@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hsv_msgs.msg import Run
+
+from hsv.recording.former import INTERFACE_VERSION
 
 OLD = Path(__file__).parents[1] / "recording" / "old_bags" / "case1_4e00631"
 
@@ -43,3 +46,15 @@ def test_its_pages_and_tables_are_made(hsv: Hsv, tmp_path: Path, command: tuple[
 
 def test_diff_compares_it(hsv: Hsv) -> None:
     assert hsv("diff", str(OLD), str(OLD)).code == 0
+
+
+@pytest.mark.parametrize("options", [(), ("--rerun",), ("--over-dds", "--node", "tube_mpc")], ids=" ".join)
+def test_replay_tells_its_version_and_the_one_expected(hsv: Hsv, options: tuple[str, ...]) -> None:
+    done = hsv("replay", str(OLD), *options)
+    assert done.code == 2
+    commit = hsv("info", str(OLD), "--json").json["custom_data"]["commit"]
+    assert done.error.endswith(f": interface version 1, recorded by commit {commit}: expected version 2")
+
+
+def test_the_version_expected_is_that_of_the_messages() -> None:
+    assert Run.INTERFACE_VERSION == INTERFACE_VERSION

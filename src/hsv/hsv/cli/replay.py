@@ -40,6 +40,7 @@ def replay(
     from hsv.cli.progress import stages
     from hsv.errors import ParameterError, RunError
     from hsv.graph.description import CONTROLLER, controller_node
+    from hsv.recording.former import require_interface_version
     from hsv.recording.reader import Bag
     from hsv.replay import engine
     from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
@@ -47,6 +48,7 @@ def replay(
     from hsv.simulation.trust import require_trust
 
     opened = Bag(bag)
+    require_interface_version(opened)
     supply(opened, design, scenario)
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)

@@ -4,16 +4,36 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from hsv.graph.description import ACTUATOR, COMMAND, TUBE_STATUS
+from hsv.errors import RecordingError
+from hsv.graph.description import ACTUATOR, COMMAND, RUN, TUBE_STATUS
 
 if TYPE_CHECKING:
     from hsv.recording.reader import Bag
+
+INTERFACE_VERSION = 2
+"""Version of the messages that nodes exchange, as ``hsv_msgs/msg/Run`` has it; the first one did not say it."""
 
 FAULT_STATUS = "hsv/fault_status"
 """The topic of the faults of a step, now said with what the actuators do."""
 
 FORMER_TYPES = {ACTUATOR: "hsv_msgs/msg/ControlInput", FAULT_STATUS: "hsv_msgs/msg/FaultStatus"}
 """By role; that of the faults has no other."""
+
+
+def require_interface_version(bag: Bag) -> None:
+    """Refuse a bag that tells that its messages are of another interface version: no node of this one takes them.
+
+    Raises:
+        RecordingError: Names both versions.
+    """
+    if RUN not in bag.roles:
+        return
+    found = bag.constants(RUN).get("INTERFACE_VERSION", 1)
+    if found != INTERFACE_VERSION:
+        commit = bag.custom_data.get("commit", "unknown")
+        raise RecordingError(
+            f"{bag.path}: interface version {found}, recorded by commit {commit}: expected version {INTERFACE_VERSION}"
+        )
 
 
 def fault_topic(bag: Bag) -> str:
