@@ -10,9 +10,9 @@ import pytest
 from node_processes import short_scenario
 
 from hsv.campaign.campaign import Campaign, plan
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import OwnProcess
-from hsv.campaign.store import Store
+from hsv.campaign.executors import SerialExecutor
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
 from hsv.campaign.summary import Results
 
 
@@ -36,7 +36,7 @@ def planned(short: str) -> Callable[..., Campaign]:
 def results(planned: Callable[..., Campaign], tmp_path_factory: pytest.TempPathFactory) -> Results:
     """Return the results of a campaign that nothing disturbed."""
     out = tmp_path_factory.mktemp("campaign") / "short.parquet"
-    conduct(planned(), Store(out, planned()), OwnProcess())
+    run_campaign(planned(), ResultStore(out, planned()), SerialExecutor())
     return Results(out)
 
 

@@ -5,13 +5,13 @@ import pytest
 from c_libraries import build_probe
 from pyarrow import parquet
 
-from hsv.campaign.again import in_process
 from hsv.campaign.campaign import plan
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import OwnProcess
+from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.page import write_page
-from hsv.campaign.pilot import Pilot
-from hsv.campaign.store import Store
+from hsv.campaign.replay import replay_in_process
+from hsv.campaign.run import run_campaign
+from hsv.campaign.sample_runner import SampleRunner
+from hsv.campaign.store import ResultStore
 from hsv.campaign.summary import Results, shares, worst_flights
 from hsv.control.library import library_place
 from hsv.errors import CampaignError
@@ -40,7 +40,7 @@ def fly(tmp_path_factory):
         altitudes = (25950.0, 26350.0)
         campaign = plan(str(folder / f"{name}.toml"), samples=samples, scale=0.0, initial_altitude=altitudes)
         out = folder / f"{name}.parquet"
-        conduct(campaign, Store(out, campaign), OwnProcess())
+        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
         return Results(out, trust=True)
 
     return fly
@@ -60,7 +60,7 @@ def test_a_flight_that_crashes_is_recorded_and_the_others_are_flown(fly, tmp_pat
     assert shares(crashed)[0].within == 33 and shares(good)[0].within == 34
     first, second, *_ = worst_flights(crashed)
     assert (first.flight, first.limit) == (flight, "crashed") and second.limit != "crashed"
-    repeated = in_process(crashed, flight)
+    repeated = replay_in_process(crashed, flight)
     assert not repeated.differing and repeated.repeated["crashed"] == crashed.row(flight)["crashed"]
     write_page(crashed, tmp_path / "page.html")
     assert "crashed" in (tmp_path / "page.html").read_text()
@@ -78,4 +78,4 @@ def test_results_of_two_libraries_are_not_mixed(fly):
     campaign = fly("mixed", "", 2).campaign
     build_probe(library_place(campaign.scenario.controller)[0].parent, "-DSTATE_SIZE=3")
     with pytest.raises(CampaignError, match=r"not the library that the campaign began with, expected the one of SHA-"):
-        Pilot(campaign)
+        SampleRunner(campaign)

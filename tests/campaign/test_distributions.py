@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from hsv.campaign import again
 from hsv.campaign.campaign import METHODS, Campaign, plan
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import OwnProcess
+from hsv.campaign.executors import SerialExecutor
+from hsv.campaign.replay import replay_in_process
+from hsv.campaign.run import run_campaign
 from hsv.campaign.sampling import Sampler
-from hsv.campaign.store import Store
+from hsv.campaign.store import ResultStore
 from hsv.campaign.summary import Results
 from hsv.errors import ScenarioError
 from hsv.simulation.assembly import assemble_flight
@@ -49,7 +49,7 @@ def scenario(tmp_path_factory):
 def flown(scenario, tmp_path_factory):
     campaign = plan(scenario, samples=20, seed=5, scale=0.0)
     out = tmp_path_factory.mktemp("campaign") / "drawn.parquet"
-    conduct(campaign, Store(out, campaign), OwnProcess())
+    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
     return Results(out)
 
 
@@ -67,7 +67,7 @@ def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
 def test_a_flight_written_as_a_scenario_flies_by_itself_as_recorded_in_every_bit(flown, flight):
     alone = fly(assemble_flight(parse_scenario(flown.file(flight), "alone")))
     assert alone.fingerprint == flown.row(flight)["fingerprint"]
-    assert again.in_process(flown, flight).differing == []
+    assert replay_in_process(flown, flight).differing == []
 
 
 def test_every_number_drawn_is_flown(flown):
@@ -128,7 +128,7 @@ def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out
     path.write_text(SCENARIO.replace("altitude_change", ends, 1))
     campaign = plan(str(path), samples=40, scale=0.0)
     with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
-        conduct(campaign, Store(out, campaign), OwnProcess())
+        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
 
 
 def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from hsv.campaign.campaign import plan
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import OwnProcess
+from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.page import render
-from hsv.campaign.store import Store
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
 from hsv.campaign.summary import Results, clopper_pearson, distributions, shares, worst_flights
 
 
@@ -45,7 +45,7 @@ def lost(tmp_path_factory):
     """A campaign in which flights diverge."""
     campaign = plan("case1_derived_no_notch", samples=10, commit="test")
     out = tmp_path_factory.mktemp("lost") / "lost.parquet"
-    conduct(campaign, Store(out, campaign), OwnProcess())
+    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
     return Results(out)
 
 
@@ -62,10 +62,10 @@ def test_flights_that_diverge_are_within_no_limit_and_come_first(lost):
 
 def test_envelopes_hold_every_flight(results, planned):
     from hsv.campaign.envelope import signals
-    from hsv.campaign.pilot import Pilot
+    from hsv.campaign.sample_runner import SampleRunner
 
-    pilot, envelope = Pilot(planned()), results.envelope
-    curves = [signals(pilot.fly(sample).data()) for sample in pilot.sampler.draw(range(44))[0]]
+    runner, envelope = SampleRunner(planned()), results.envelope
+    curves = [signals(runner.fly(sample).data()) for sample in runner.sampler.draw(range(44))[0]]
     assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=0) for c in curves], axis=0))
     assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=0) for c in curves], axis=0))
     assert np.all(envelope.count[:151] == len(curves))

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from hsv.bench.figure import Figure
 from hsv.campaign.campaign import plan
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import fleet
-from hsv.campaign.store import Store
+from hsv.campaign.executors import make_executor
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
 
 
 def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:
@@ -40,8 +40,8 @@ def corners(workers: int) -> list[Figure]:
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         started = time.perf_counter()
         campaign = plan("case1", method="corners")
-        with fleet(workers) as flying:
-            conduct(campaign, Store(Path(folder, "corners.parquet"), campaign), flying)
+        with make_executor(workers) as flying:
+            run_campaign(campaign, ResultStore(Path(folder, "corners.parquet"), campaign), flying)
         seconds = time.perf_counter() - started
     what = f"1024 corners of Case 1, {workers} workers, their start included"
     return [Figure("corners", what, "", "s", (seconds,), (), "most", 15.0)]
@@ -56,9 +56,9 @@ def _pace(folder: Path, workers: int, samples: int, repeat: int) -> float:
         flown.append(done)
 
     campaign = plan("case1", samples=samples, seed=repeat)
-    with fleet(workers) as flying:
+    with make_executor(workers) as flying:
         if workers > 1:
             warm = plan("case1", samples=8 * workers, seed=10**6 + repeat)
-            conduct(warm, Store(folder / f"warm_{repeat}.parquet", warm), flying)
-        conduct(campaign, Store(folder / f"{workers}_{repeat}.parquet", campaign), flying, progress=progress)
+            run_campaign(warm, ResultStore(folder / f"warm_{repeat}.parquet", warm), flying)
+        run_campaign(campaign, ResultStore(folder / f"{workers}_{repeat}.parquet", campaign), flying, progress=progress)
     return flown[-1] / (times[-1] - times[0])

@@ -134,11 +134,11 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
     time = windows[reached] * plant.period
     flights = {}
     if results.flyable:
-        pilot = results.pilot
+        runner = results.sample_runner
         with suppress(ControllerError):
-            flights["unchanged"] = pilot.fly_unchanged()
+            flights["unchanged"] = runner.fly_unchanged()
         with suppress(ControllerError):
-            flights[f"flight {worst}"] = pilot.fly(pilot.sample(worst))
+            flights[f"flight {worst}"] = runner.fly(runner.sample(worst))
     return {
         "time": _packed(time),
         "signals": [

@@ -1,4 +1,4 @@
-"""Where results are kept: finished batches beside the result file while flying, one Parquet file in the end."""
+"""Storage of results: finished batches beside the result file during the run, one Parquet file in the end."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from hsv.errors import CampaignError, reason
 _CAMPAIGN_FILE = "campaign.json"
 
 
-class Store:
-    """Keeps the batches of one campaign; whatever happens to this process, what it has kept stays whole."""
+class ResultStore:
+    """Stores the batches of one campaign; a stored batch stays whole whatever happens to this process."""
 
     def __init__(self, out: Path, campaign: Campaign) -> None:
         self.out = out

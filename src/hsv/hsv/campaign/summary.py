@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
-from hsv.campaign.pilot import Pilot
+from hsv.campaign.sample_runner import SampleRunner
 from hsv.campaign.store import read_campaign
 from hsv.campaign.table import ENVELOPE, OUTCOMES, schema
 from hsv.control.controllers import names_code
@@ -58,7 +58,7 @@ class WorstFlight:
 
 
 class Results:
-    """The result file of a campaign, read back; only :attr:`pilot` loads a controller."""
+    """The result file of a campaign, read back; only :attr:`sample_runner` loads a controller."""
 
     def __init__(self, path: Path, *, trust: bool = False) -> None:
         """Read ``path``.
@@ -89,14 +89,14 @@ class Results:
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property
-    def pilot(self) -> Pilot:
-        """Who flies the campaign's flights again; with the first use, the controller is loaded.
+    def sample_runner(self) -> SampleRunner:
+        """The sample runner that replays flights of the campaign; its first use loads the controller.
 
         Raises:
             ParameterError: The file names the controller's code, and is not trusted.
         """
         require_trust(self.campaign.scenario.controller, self.path, self.trust)
-        return Pilot(self.campaign)
+        return SampleRunner(self.campaign)
 
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""

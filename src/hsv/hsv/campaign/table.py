@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
-from hsv.campaign.pilot import pilot
+from hsv.campaign.sample_runner import sample_runner
 from hsv.control.library import LibraryController
 from hsv.errors import ControllerError, ScenarioError
 from hsv.simulation.closed_loop import watched
@@ -46,26 +46,26 @@ def fly_batch(text: str, batch: int) -> bytes:
     Raises:
         ScenarioError: The scenario does not admit the values of a flight together; it is named.
     """
-    own = pilot(text)
-    if isinstance(own.controller, LibraryController):
+    runner = sample_runner(text)
+    if isinstance(runner.controller, LibraryController):
         # Whole batches in the library's process, and one by one only where a flight makes it crash.
-        with suppress(ControllerError), watched(own.controller, own.steps + 1) as (_, request):
+        with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
             return bytes(request("call", _flown_here, text, batch))
     return _flown_here(text, batch)
 
 
 def _flown_here(text: str, batch: int) -> bytes:
-    own = pilot(text)
-    campaign, envelope, rows = own.campaign, Envelope.empty(), []
+    runner = sample_runner(text)
+    campaign, envelope, rows = runner.campaign, Envelope.empty(), []
     flights = campaign.flights(batch)
-    for flight, sample, seed in zip(flights, *own.sampler.draw(flights), strict=True):
+    for flight, sample, seed in zip(flights, *runner.sampler.draw(flights), strict=True):
         try:
-            flown = own.fly(sample)
+            flown = runner.fly(sample)
             data = flown.data()
-            envelope.add(data, own.steps)
-            outcome = own.outcome(data, flown.fingerprint)
+            envelope.add(data, runner.steps)
+            outcome = runner.outcome(data, flown.fingerprint)
         except ControllerError as error:
-            outcome = own.crashed(error)
+            outcome = runner.crashed(error)
         except ScenarioError as error:
             raise ScenarioError(f"flight {flight}: {error}") from error
         rows.append(row(sample, flight, int(seed), campaign, outcome))

@@ -75,9 +75,9 @@ def fly(
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --fault-start "90 s" "110 s"
     """
     from hsv.campaign.campaign import plan
-    from hsv.campaign.conduct import conduct
-    from hsv.campaign.fleet import fleet
-    from hsv.campaign.store import Store
+    from hsv.campaign.executors import make_executor
+    from hsv.campaign.run import run_campaign
+    from hsv.campaign.store import ResultStore
     from hsv.campaign.summary import Results
     from hsv.cli.campaign_summary import announce, show
     from hsv.cli.progress import flights as flights_bar
@@ -99,13 +99,13 @@ def fly(
     if out.suffix != ".parquet":
         raise CampaignError(f"out = {str(out)!r}: expected a file that ends in .parquet")
     check_target(out, "out")
-    store = Store(out, campaign)
+    store = ResultStore(out, campaign)
     try:
         with (
-            fleet(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
+            make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
             flights_bar(campaign.scenario_name, campaign.samples) as progress,
         ):
-            flown = conduct(campaign, store, flying, restart=restart, expect=announce, progress=progress)
+            flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
     except KeyboardInterrupt:
         errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
         raise
@@ -148,7 +148,7 @@ def replay(
 
     Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
     """
-    from hsv.campaign import again
+    from hsv.campaign.replay import replay_in_process, replay_over_dds
     from hsv.campaign.summary import Results
     from hsv.campaign.table import OUTCOMES
     from hsv.cli.campaign_summary import sample_words
@@ -160,9 +160,9 @@ def replay(
     if over_dds:
         target = bag or Path("bags", f"{result.stem}_flight_{flight}")
         with stages() as bar:
-            repeated = again.over_dds(results, flight, target, lambda step, steps: bar("over DDS", step, steps))
+            repeated = replay_over_dds(results, flight, target, lambda step, steps: bar("over DDS", step, steps))
     else:
-        repeated = again.in_process(results, flight)
+        repeated = replay_in_process(results, flight)
     sample = results.sample(flight)
     quantities = {
         name: (float(value), unit)
@@ -216,7 +216,7 @@ def scenario(
 
     Example: hsv montecarlo scenario campaigns/case1_corners.parquet --flight 17 > worst.toml
     """
-    from hsv.campaign.again import require_design
+    from hsv.campaign.replay import require_design
     from hsv.campaign.summary import Results
     from hsv.cli.targets import writing
     from hsv.control.library import seen_from

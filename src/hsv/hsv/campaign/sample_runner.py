@@ -1,4 +1,4 @@
-"""Flying the samples of a campaign, one at a time: what is common to all flights is built once."""
+"""Flies the samples of a campaign one at a time; components that all flights share are built once."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
 """Beginnings of parameters on which the bench's own controllers do not depend."""
 
 
-class Pilot:
+class SampleRunner:
     """Flies any flight of one campaign, alone or in any order, always with the same bits."""
 
     def __init__(self, campaign: Campaign) -> None:
@@ -83,7 +83,7 @@ class Pilot:
         return self._parts.controller
 
     def outcome(self, flight: FlightData, fingerprint: str | None) -> Outcome:
-        """Return what a campaign keeps of a flight: its end, worst tube level, metrics (SI), ``fingerprint``."""
+        """Return what a campaign records of a flight: its end, worst tube level, metrics (SI), ``fingerprint``."""
         return {
             "diverged": not in_model_range(flight.state[-1], self._parts.plant.vehicle.angle_limit),
             "end_time": float(flight.time[-1]),
@@ -94,11 +94,11 @@ class Pilot:
         }
 
     def crashed(self, error: ControllerError) -> Outcome:
-        """Return what a campaign keeps of a flight that its controller ended: why, and nothing else."""
+        """Return the outcome of a flight that its controller ended: the reason, and no metrics."""
         return {"diverged": False, "crashed": str(error)}
 
 
 @lru_cache(maxsize=1)
-def pilot(text: str) -> Pilot:
-    """Return the pilot of the campaign written in ``text``; a worker keeps the last one."""
-    return Pilot(Campaign.from_text(text))
+def sample_runner(text: str) -> SampleRunner:
+    """Return the sample runner of the campaign written in ``text``; a worker process caches the last one."""
+    return SampleRunner(Campaign.from_text(text))

@@ -1,4 +1,4 @@
-"""Who flies: this process, or the workers of a Dask cluster, on this machine or on many."""
+"""Execution back ends of campaigns: this process, or the workers of a Dask cluster on one machine or on many."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from hsv.campaign.table import fly_batch
 from hsv.errors import CampaignError, RunError, reason
 
 _AHEAD = 4
-"""Batches a core that wait at the workers: enough that none is idle, few enough that a lost worker loses little."""
+"""Batches per core that are queued at the workers: enough that none is idle, few enough that a lost worker costs
+little."""
 
 _LOCAL = {
     # Without Dask's MALLOC_TRIM_THRESHOLD_, with which every flight's arrays are given back and faulted in again.
@@ -28,19 +29,19 @@ _LOCAL = {
 """Settings of workers on this machine; together they give a sixth more flights a second."""
 
 
-class Fleet(Protocol):
-    """Flies batches."""
+class Executor(Protocol):
+    """An execution back end, which flies the batches of a campaign."""
 
     @property
     def cores(self) -> int:
-        """Number of flights at a time."""
+        """Number of flights that are flown at the same time."""
 
     def fly(self, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield number and content of each batch of the campaign written in ``text``, in any order."""
 
 
-class OwnProcess:
-    """Flies here, one flight after the other."""
+class SerialExecutor:
+    """Flies the batches in this process, one flight after the other."""
 
     cores = 1
 
@@ -50,8 +51,8 @@ class OwnProcess:
             yield batch, fly_batch(text, batch)
 
 
-class DaskWorkers:
-    """Flies on the workers of a Dask scheduler; what a lost worker had in hand is flown by another."""
+class DaskExecutor:
+    """Flies the batches on the workers of a Dask scheduler; batches of a lost worker are flown by another."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
@@ -97,11 +98,11 @@ class DaskWorkers:
 
 
 @contextmanager
-def fleet(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambda: None) -> Iterator[Fleet]:
-    """Yield who flies: the workers of the ``scheduler`` at this address, or so many processes of this machine.
+def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambda: None) -> Iterator[Executor]:
+    """Yield the executor for the ``scheduler`` at an address, or for a number of processes of this machine.
 
     Args:
-        workers: 0: one a processor; 1 flies in this process.
+        workers: Number of processes; 0: one per processor; 1 flies in this process.
         scheduler: Address of a Dask scheduler, e.g. ``"tcp://10.0.0.1:8786"``; empty: this machine.
         on_wait: Called if the scheduler has no workers yet, before they are waited for.
 
@@ -112,11 +113,11 @@ def fleet(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambd
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
     if scheduler:
         with connected(scheduler, on_wait) as client:
-            yield DaskWorkers(client)
+            yield DaskExecutor(client)
         return
     workers = workers or os.cpu_count() or 1
     if workers == 1:
-        yield OwnProcess()
+        yield SerialExecutor()
         return
     import dask
     from distributed import Client, LocalCluster
@@ -133,4 +134,4 @@ def fleet(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambd
         ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
-        yield DaskWorkers(client)
+        yield DaskExecutor(client)

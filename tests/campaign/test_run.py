@@ -11,15 +11,15 @@ from full_disk import files_no_larger_than
 from pyarrow import parquet
 from waiting import wait_until
 
-from hsv.campaign.conduct import capacity, conduct
-from hsv.campaign.fleet import OwnProcess
-from hsv.campaign.store import Store, read_campaign
+from hsv.campaign.executors import SerialExecutor
+from hsv.campaign.run import capacity, run_campaign
+from hsv.campaign.store import ResultStore, read_campaign
 from hsv.campaign.summary import Results
 from hsv.campaign.table import CAMPAIGN
 from hsv.errors import CampaignError
 
 
-class Counting(OwnProcess):
+class Counting(SerialExecutor):
     """Flies here and notes what."""
 
     def __init__(self):
@@ -40,13 +40,13 @@ def interrupted_at(flights):
 
 
 def test_interrupted_twice_and_resumed_gives_the_same_file_and_flies_nothing_twice(planned, results, out):
-    campaign, fleet = planned(), Counting()
+    campaign, executor = planned(), Counting()
     for flights in (8, 24):
         with pytest.raises(KeyboardInterrupt):
-            conduct(campaign, Store(out, campaign), fleet, progress=interrupted_at(flights))
+            run_campaign(campaign, ResultStore(out, campaign), executor, progress=interrupted_at(flights))
         assert not out.exists()
-    conduct(campaign, Store(out, campaign), fleet)
-    assert fleet.flown == list(range(campaign.batches))
+    run_campaign(campaign, ResultStore(out, campaign), executor)
+    assert executor.flown == list(range(campaign.batches))
     assert out.read_bytes() == results.path.read_bytes()
     assert sorted(path.name for path in out.parent.iterdir()) == [out.name]
 
@@ -55,13 +55,13 @@ DRIVER = """
 import sys
 from pathlib import Path
 from hsv.campaign.campaign import Campaign
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import OwnProcess
-from hsv.campaign.store import Store
+from hsv.campaign.run import run_campaign
+from hsv.campaign.executors import SerialExecutor
+from hsv.campaign.store import ResultStore
 campaign = Campaign.from_text(Path(sys.argv[1]).read_text())
 print("ready", flush=True)
 sys.stdin.readline()
-conduct(campaign, Store(Path(sys.argv[2]), campaign), OwnProcess())
+run_campaign(campaign, ResultStore(Path(sys.argv[2]), campaign), SerialExecutor())
 """
 
 
@@ -77,7 +77,7 @@ def test_a_killed_process_loses_no_finished_batch(planned, tmp_path, out):
     process.stdout.readline()
     process.stdin.write("go\n")
     process.stdin.flush()
-    store = Store(out, campaign)
+    store = ResultStore(out, campaign)
 
     def finished_batches():
         assert process.poll() is None
@@ -88,35 +88,35 @@ def test_a_killed_process_loses_no_finished_batch(planned, tmp_path, out):
     process.wait()
     with store.opened() as finished:
         assert finished
-    fleet = Counting()
-    conduct(campaign, store, fleet)
-    assert set(fleet.flown) == set(range(campaign.batches)) - finished
+    executor = Counting()
+    run_campaign(campaign, store, executor)
+    assert set(executor.flown) == set(range(campaign.batches)) - finished
     assert np.array_equal(Results(out).column("flight"), np.arange(800))
 
 
 def test_a_finished_campaign_is_not_flown_again(planned, results):
-    fleet = Counting()
-    assert conduct(planned(), Store(results.path, planned()), fleet) == 0
-    assert fleet.flown == []
+    executor = Counting()
+    assert run_campaign(planned(), ResultStore(results.path, planned()), executor) == 0
+    assert executor.flown == []
 
 
 @pytest.mark.parametrize("change", [{"seed": 4}, {"samples": 45}, {"scale": 0.5}, {"commit": "later"}])
 def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out, change):
     other = planned(**change)
     with pytest.raises(CampaignError, match="holds another campaign"):
-        conduct(other, Store(results.path, other), OwnProcess())
+        run_campaign(other, ResultStore(results.path, other), SerialExecutor())
     with pytest.raises(KeyboardInterrupt):
-        conduct(planned(), Store(out, planned()), OwnProcess(), progress=interrupted_at(8))
+        run_campaign(planned(), ResultStore(out, planned()), SerialExecutor(), progress=interrupted_at(8))
     with pytest.raises(CampaignError, match="holds another campaign"):
-        conduct(other, Store(out, other), OwnProcess())
-    assert conduct(other, Store(out, other), OwnProcess(), restart=True) == other.samples
+        run_campaign(other, ResultStore(out, other), SerialExecutor())
+    assert run_campaign(other, ResultStore(out, other), SerialExecutor(), restart=True) == other.samples
 
 
 def test_two_processes_do_not_fly_the_same_campaign(planned, out):
     with (
-        Store(out, planned()).opened(),
+        ResultStore(out, planned()).opened(),
         pytest.raises(CampaignError, match="in use"),
-        Store(out, planned()).opened(),
+        ResultStore(out, planned()).opened(),
     ):
         pass
 
@@ -126,11 +126,11 @@ def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, o
 
     def restart_from_elsewhere(done):
         if 0 < done < campaign.samples:
-            with pytest.raises(CampaignError, match="in use") as error, Store(out, campaign).opened(restart=True):
+            with pytest.raises(CampaignError, match="in use") as error, ResultStore(out, campaign).opened(restart=True):
                 pass
             refused.append(error)
 
-    conduct(campaign, Store(out, campaign), OwnProcess(), progress=restart_from_elsewhere)
+    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=restart_from_elsewhere)
     assert refused
     assert out.read_bytes() == results.path.read_bytes()
     assert list(out.parent.iterdir()) == [out]
@@ -138,7 +138,7 @@ def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, o
 
 def test_a_lock_left_by_a_killed_process_stops_nobody(planned, out):
     out.with_name(out.name + ".lock").touch()
-    with Store(out, planned()).opened():
+    with ResultStore(out, planned()).opened():
         pass
 
 
@@ -156,19 +156,19 @@ def damage(path, how):
 def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out, how):
     campaign = planned(samples=44)
     with pytest.raises(KeyboardInterrupt):
-        conduct(campaign, Store(out, campaign), OwnProcess(), progress=interrupted_at(32))
-    store = Store(out, campaign)
+        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=interrupted_at(32))
+    store = ResultStore(out, campaign)
     first = store.folder / "00000000.parquet"
     (store.folder / "foo.parquet").write_text("nothing")
     damage(first, how)
-    fleet = Counting()
-    conduct(campaign, store, fleet)
-    assert fleet.flown == [0, 1]
+    executor = Counting()
+    run_campaign(campaign, store, executor)
+    assert executor.flown == [0, 1]
     assert out.read_bytes() == results.path.read_bytes()
 
 
 def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, results, out):
-    campaign, store = planned(), Store(out, planned())
+    campaign, store = planned(), ResultStore(out, planned())
 
     def spoil(done):
         if done == campaign.samples:
@@ -178,8 +178,8 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
             path.write_bytes(content)
 
     with pytest.raises(CampaignError, match=r"00000001\.parquet: damaged"):
-        conduct(campaign, store, OwnProcess(), progress=spoil)
-    assert conduct(campaign, store, OwnProcess()) == len(campaign.flights(1))
+        run_campaign(campaign, store, SerialExecutor(), progress=spoil)
+    assert run_campaign(campaign, store, SerialExecutor()) == len(campaign.flights(1))
     assert out.read_bytes() == results.path.read_bytes()
 
 
@@ -193,9 +193,9 @@ def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results,
                 disk.enter_context(files_no_larger_than(20_000))
 
         with pytest.raises(CampaignError, match=r"cannot be written \(File too large\); finished batches are kept"):
-            conduct(campaign, Store(out, campaign), OwnProcess(), progress=fill_the_disk)
+            run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=fill_the_disk)
     assert not list(out.parent.rglob("*.unfinished"))
-    assert conduct(campaign, Store(out, campaign), OwnProcess()) == campaign.samples - flights
+    assert run_campaign(campaign, ResultStore(out, campaign), SerialExecutor()) == campaign.samples - flights
     assert out.read_bytes() == results.path.read_bytes()
 
 

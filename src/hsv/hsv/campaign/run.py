@@ -1,4 +1,4 @@
-"""Flying a campaign to its end, from wherever it was left."""
+"""Running a campaign to its end, from the batches that are finished already."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
-from hsv.campaign.fleet import Fleet
-from hsv.campaign.pilot import pilot
-from hsv.campaign.store import Store
+from hsv.campaign.executors import Executor
+from hsv.campaign.sample_runner import sample_runner
+from hsv.campaign.store import ResultStore
 from hsv.campaign.table import schema
 from hsv.errors import ControllerError
 
 
 @dataclass(frozen=True)
 class Capacity:
-    """What is still to be flown, and what it takes: wall time (s) on ``cores``, and bytes on the disk."""
+    """The flights that are still to be flown, and their cost: wall time (s) on ``cores``, and bytes on the disk."""
 
     flights: int
     cores: int
@@ -26,27 +26,27 @@ class Capacity:
     bytes: int
 
 
-def conduct(
+def run_campaign(
     campaign: Campaign,
-    store: Store,
-    fleet: Fleet,
+    store: ResultStore,
+    executor: Executor,
     *,
     restart: bool = False,
     expect: Callable[[Capacity], None] = lambda capacity: None,
     progress: Callable[[int], None] = lambda flights: None,
 ) -> int:
-    """Fly what is missing of ``campaign`` and make its result file; return how many flights were flown.
+    """Fly the missing flights of ``campaign`` and write its result file; return how many were flown.
 
     Args:
-        campaign: What to fly.
+        campaign: The campaign.
         store: Where results are kept; batches that are there already are not flown again.
-        fleet: Who flies.
-        restart: Begin anew.
-        expect: Called once, before the first flight, with what is to come.
+        executor: The back end that flies the batches.
+        restart: Whether to discard existing results first.
+        expect: Called once, before the first flight, with the capacity that the run needs.
         progress: Called with the number of finished flights, those found at the start included.
 
     Raises:
-        CampaignError, RunError: See :class:`hsv.campaign.store.Store` and :mod:`hsv.campaign.fleet`.
+        CampaignError, RunError: See :class:`hsv.campaign.store.ResultStore` and :mod:`hsv.campaign.executors`.
     """
     flown = 0
     with store.opened(restart) as finished:
@@ -55,9 +55,9 @@ def conduct(
         missing = [batch for batch in range(campaign.batches) if batch not in finished]
         done = sum(len(campaign.flights(batch)) for batch in finished)
         if missing:
-            expect(capacity(campaign, campaign.samples - done, fleet.cores))
+            expect(capacity(campaign, campaign.samples - done, executor.cores))
         progress(done)
-        for batch, content in fleet.fly(campaign.text, missing):
+        for batch, content in executor.fly(campaign.text, missing):
             store.keep(batch, content)
             flown += len(campaign.flights(batch))
             progress(done + flown)
@@ -66,15 +66,15 @@ def conduct(
 
 
 def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
-    """Return what ``flights`` take on so many cores as fast as this one, measured on the scenario itself."""
-    own = pilot(campaign.text)
+    """Return the cost of ``flights`` on so many cores as fast as this one, measured by flying the scenario."""
+    runner = sample_runner(campaign.text)
     with suppress(ControllerError):
-        flown = own.fly_unchanged()
-        own.outcome(flown.data(), flown.fingerprint)
+        flown = runner.fly_unchanged()
+        runner.outcome(flown.data(), flown.fingerprint)
     started = time.perf_counter()
     with suppress(ControllerError):
-        flown = own.fly(own.sample(0))
-        own.outcome(flown.data(), flown.fingerprint)
+        flown = runner.fly(runner.sample(0))
+        runner.outcome(flown.data(), flown.fingerprint)
     seconds = time.perf_counter() - started
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
     rows = flights * 8 * len(schema(campaign))

@@ -1,4 +1,4 @@
-"""One flight of a campaign again, alone: in this process, or by the graph of node processes over DDS."""
+"""Replay of a single flight of a campaign, in this process or by the graph of node processes over DDS."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.campaign.pilot import Outcome
+from hsv.campaign.sample_runner import Outcome
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
@@ -20,8 +20,8 @@ from hsv.simulation.trust import require_path_inside
 
 
 @dataclass(frozen=True)
-class Repetition:
-    """A flight again: what the campaign recorded, what came out now (SI), and the bag if it was recorded."""
+class ReplayedFlight:
+    """A replayed flight: its outcome in the campaign and now (SI), and the bag where it was recorded."""
 
     flight: int
     recorded: Outcome
@@ -34,25 +34,25 @@ class Repetition:
         return [name for name in self.recorded if not _same(self.recorded[name], self.repeated.get(name))]
 
 
-def in_process(results: Results, flight: int) -> Repetition:
+def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     """Fly ``flight`` again with the design kept in the results.
 
     Raises:
         CampaignError: No such flight.
         ParameterError: The results name code, and are not trusted.
     """
-    row, pilot = results.row(flight), results.pilot
+    row, runner = results.row(flight), results.sample_runner
     try:
-        flown = pilot.fly(pilot.sample(flight))
-        repeated = pilot.outcome(flown.data(), flown.fingerprint)
+        flown = runner.fly(runner.sample(flight))
+        repeated = runner.outcome(flown.data(), flown.fingerprint)
     except ControllerError as error:
-        repeated = pilot.crashed(error)
-    return Repetition(flight, _outcome(row), repeated)
+        repeated = runner.crashed(error)
+    return ReplayedFlight(flight, _outcome(row), repeated)
 
 
-def over_dds(
+def replay_over_dds(
     results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
-) -> Repetition:
+) -> ReplayedFlight:
     """Fly ``flight`` again with the node processes, recorded to ``bag``.
 
     Args:
@@ -71,26 +71,26 @@ def over_dds(
     from hsv.recording.flight import flight_data, flight_fingerprint
     from hsv.recording.reader import Bag
 
-    row, pilot = results.row(flight), results.pilot
+    row, runner = results.row(flight), results.sample_runner
     require_design(results)
     prepared = prepare(f"{results.campaign.scenario_name}_flight_{flight}", text=results.file(flight), bag=bag)
     fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
     recorded = Bag(bag)
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
-    data = replace(data, time=np.arange(len(data.time)) * pilot.period)
-    repeated = pilot.outcome(data, flight_fingerprint(recorded))
+    data = replace(data, time=np.arange(len(data.time)) * runner.period)
+    repeated = runner.outcome(data, flight_fingerprint(recorded))
     if repeated["tube_level"] is not None:
         # What the controller itself published, not what is computed from its messages.
         repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
-    return Repetition(flight, _outcome(row), repeated, bag)
+    return ReplayedFlight(flight, _outcome(row), repeated, bag)
 
 
 def require_design(results: Results) -> None:
-    """Refuse results whose design is not, by its name or path, the one that is kept in them.
+    """Refuse results where the file of their design no longer holds the design that the campaign flew.
 
     Raises:
-        CampaignError, DesignError: It is not what it was, or is not there.
+        CampaignError, DesignError: It holds another design, or is missing.
         ParameterError: The results name one in another folder, and are not trusted.
     """
     name = results.campaign.scenario.design

@@ -6,16 +6,16 @@ import socket
 import pytest
 from distributed import LocalCluster
 
-from hsv.campaign.conduct import conduct
-from hsv.campaign.fleet import fleet
-from hsv.campaign.store import Store
+from hsv.campaign.executors import make_executor
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
 from hsv.errors import CampaignError, RunError
 
 
 def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, results, out):
     campaign, killed = planned(), []
 
-    with fleet(2) as workers:
+    with make_executor(2) as workers:
         pids = workers._client.run(os.getpid)
         assert len(pids) == 2
 
@@ -24,7 +24,7 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
                 killed.append(next(iter(pids.values())))
                 os.kill(killed[0], signal.SIGKILL)
 
-        assert conduct(campaign, Store(out, campaign), workers, progress=progress) == campaign.samples
+        assert run_campaign(campaign, ResultStore(out, campaign), workers, progress=progress) == campaign.samples
     assert killed
     assert out.read_bytes() == results.path.read_bytes()
 
@@ -33,7 +33,10 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
 def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
     # Without asking anybody: it would take until the end of the tests.
     monkeypatch.setattr("hsv.campaign.scheduler.ANSWER", 1e6)
-    with pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"), fleet(1, address):
+    with (
+        pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"),
+        make_executor(1, address),
+    ):
         pass
 
 
@@ -42,7 +45,7 @@ def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(CampaignError, match=f"'{address}': no answer"), fleet(1, address):
+        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(1, address):
             pass
     assert capfd.readouterr().err == ""
 
@@ -61,14 +64,14 @@ def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkey
     waited = []
     with (
         pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
-        fleet(1, cluster.scheduler_address, lambda: waited.append(True)),
+        make_executor(1, cluster.scheduler_address, lambda: waited.append(True)),
     ):
         pass
     assert waited
 
 
 def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
-    campaign, store = planned(samples=320), Store(out, planned(samples=320))
+    campaign, store = planned(samples=320), ResultStore(out, planned(samples=320))
     cluster.scale(1)
 
     def lose(done):
@@ -76,15 +79,15 @@ def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, o
             cluster.close()
 
     with (
-        fleet(1, cluster.scheduler_address) as workers,
+        make_executor(1, cluster.scheduler_address) as workers,
         pytest.raises(RunError, match="the scheduler is lost"),
     ):
-        conduct(campaign, store, workers, progress=lose)
+        run_campaign(campaign, store, workers, progress=lose)
     with store.opened() as finished:
         assert finished
 
 
 @pytest.mark.parametrize("workers", [-1, 100_000])
 def test_an_impossible_number_of_workers_is_refused(workers):
-    with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), fleet(workers):
+    with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), make_executor(workers):
         pass
