@@ -14,8 +14,8 @@ from rclpy.parameter import Parameter as RosParameter
 from ros_domain import own_domain
 
 from hsv.errors import ParameterError
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 from hsv_node.parameters import declare
 

@@ -14,7 +14,7 @@ from rclpy.node import Node
 
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
-from hsv.graph.part_parameters import PEER_EMULATOR_PARAMETERS
+from hsv.graph.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.reader import Bag

@@ -26,7 +26,7 @@ from hsv.graph.description import (
     graph,
     step_topics,
 )
-from hsv.graph.part_parameters import RECORDER_PARAMETERS
+from hsv.graph.infrastructure_parameters import RECORDER_PARAMETERS
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic

@@ -13,7 +13,7 @@ from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCal
 from hsv.control.controllers import class_place
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode

@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter as RosParameter
 
 from hsv.errors import ParameterError
 from hsv.graph.description import CONTROLLER, CONTROLLERS
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.vehicle.vehicle import VEHICLE_PARAMETERS, named_parameters
 

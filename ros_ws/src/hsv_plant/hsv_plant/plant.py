@@ -29,7 +29,7 @@ from hsv.graph.description import (
     peers,
 )
 from hsv.graph.exchange import FILL, READ
-from hsv.graph.part_parameters import PACE_PARAMETERS
+from hsv.graph.infrastructure_parameters import PACE_PARAMETERS
 from hsv.graph.progress import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES

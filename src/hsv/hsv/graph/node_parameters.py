@@ -6,7 +6,7 @@ from hsv.control.controllers import controller_class
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.graph.description import RECORDER, ROBUST_MPC, TUBE_MPC
-from hsv.graph.part_parameters import PACE_PARAMETERS, RECORDER_PARAMETERS
+from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.simulation.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
 
@@ -34,5 +34,5 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     FAULT_INJECTOR.name: FAULT_INJECTOR.parameters,
     RECORDER.name: RECORDER_PARAMETERS,
 }
-"""By node, but that of a controller of one's own; those of every node,
-:data:`hsv.graph.part_parameters.LOCKSTEP_PARAMETERS`, come to each."""
+"""Parameter tables by node, without that of a controller of one's own. Every node also declares
+:data:`hsv.graph.infrastructure_parameters.LOCKSTEP_PARAMETERS`."""

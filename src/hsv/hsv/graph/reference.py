@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from hsv.control.design_file import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.graph.description import CARRIED
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.signals import VARYING
 from hsv.simulation.blocks import LOOP

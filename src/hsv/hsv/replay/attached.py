@@ -27,8 +27,8 @@ from hsv.graph.description import (
     TUBE_STATUS,
 )
 from hsv.graph.exchange import active_faults
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.graph.parameter_sections import ParameterSections
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.graph.preparation import design_files
 from hsv.parameters import check_all
 from hsv.recording.flight import input_columns

@@ -11,7 +11,7 @@ from typing import Any
 from hsv.control.design_file import parse_parameters
 from hsv.errors import HsvError, RecordingError
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.graph.part_parameters import LOCKSTEP_PARAMETERS
+from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.recording.flight import flight_data, labels
 from hsv.recording.info import describe
 from hsv.recording.reader import Bag

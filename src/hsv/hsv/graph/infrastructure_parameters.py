@@ -1,6 +1,7 @@
-"""Parameters of the nodes' parts in the graph; those of their components are :mod:`hsv.graph.node_parameters`.
+"""Parameters of the nodes' infrastructure: lockstep, pace, recorder and peer emulator.
 
-Apart, so that a node does not import every other node's component: five start at the same time.
+Those of the components are in :mod:`hsv.graph.node_parameters`. These are kept apart so that a node imports them
+without the components of all other nodes: five nodes start at the same time.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ LOCKSTEP_PARAMETERS = (
     Parameter("recorder", True, "whether a recorder belongs to the graph"),
     *CONTROLLER_PARAMETERS,
 )
-"""Of every node."""
+"""Parameters that every node declares."""
 
 PACE_PARAMETERS = (
     Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
@@ -20,7 +21,7 @@ PACE_PARAMETERS = (
     Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
-"""Of the plant, which owns time."""
+"""Parameters of the plant, which owns simulated time."""
 
 RECORDER_PARAMETERS = (
     Parameter("bag.directory", "", "bag to write, a new directory; empty: bags/run_<UTC>"),
@@ -34,4 +35,4 @@ PEER_EMULATOR_PARAMETERS = (
     Parameter("peer_emulator.directory", "", "bag to write with its answers, a new directory"),
     Parameter("peer_emulator.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
 )
-"""Of the emulator of all other nodes, in a replay over DDS."""
+"""Parameters of the peer emulator, which takes the place of all other nodes in a replay over DDS."""
