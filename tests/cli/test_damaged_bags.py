@@ -13,8 +13,8 @@ from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
 from hsv.errors import RecordingError
+from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.reader import Bag
-from hsv.recording.shortcomings import shortcomings
 
 Hsv = Callable[..., Any]
 REFERENCES = Path(__file__).parents[2] / "bags" / "reference"
@@ -55,7 +55,7 @@ def test_every_whole_chunk_is_read_and_what_is_lost_is_said(
         if source.defines(data):
             assert source.whole(data) <= found, f"{what}: a whole chunk is not read"
         assert found <= source.messages, f"{what}: messages that nobody recorded"
-        said = shortcomings(bag)
+        said = bag_warnings(bag)
         lost = (source.messages - found).total()
         if lost:
             assert said, what

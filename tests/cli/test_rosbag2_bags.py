@@ -148,7 +148,7 @@ def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
     out = ran.out
     assert said in ran.err and said in out and "Metrics of an incomplete bag: 1601 of 2001 steps" in out
     report = hsv("info", str(path), "--json").json
-    assert not report["metrics_complete"] and said in report["shortcomings"]
+    assert not report["metrics_complete"] and said in report["warnings"]
     page = (tmp_path / "out.html").read_text()
     assert said in page and page.count("incomplete: 1601 of 2001 steps") >= 2
     assert "within all" not in page or "in what is recorded" in page

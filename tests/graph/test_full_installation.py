@@ -213,7 +213,7 @@ def test_a_bag_of_ros2_bag_record_gives_the_metrics_of_the_flights_own(
 ) -> None:
     ours, theirs = (told(shared_processes, "info", bag) for bag in recorded)
     assert "Messages: " in shared_processes.run("bash", "-c", the_printed(PAGE, "ros2 bag info")).stdout
-    assert theirs["complete"] and not theirs["shortcomings"], theirs["shortcomings"]
+    assert theirs["complete"] and not theirs["warnings"], theirs["warnings"]
     assert theirs["metrics"].keys() == ours["metrics"].keys()
     for name, value in ours["metrics"].items():
         assert theirs["metrics"][name] == pytest.approx(value, rel=1e-9, abs=1e-9), name

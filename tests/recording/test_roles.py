@@ -12,11 +12,11 @@ from flown_bags import flown_bag
 
 from hsv.errors import ParameterError, RecordingError
 from hsv.graph.description import ACTUATOR, COMMAND, STATE, TOPICS, checked_namespace, resolved
+from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.compare import compare
 from hsv.recording.flight import flight_fingerprint
 from hsv.recording.reader import Bag
 from hsv.recording.roles import naming, roles
-from hsv.recording.shortcomings import shortcomings
 from hsv.recording.viewers import LAYOUTS, layout_for
 from hsv.replay.attached import controller_of, flown_parameters
 from hsv.replay.engine import rerun
@@ -36,7 +36,7 @@ def test_a_bag_in_a_namespace_is_like_any_other(flown: Path, tmp_path: Path) -> 
     original, bag = Bag(flown), Bag(moved(flown, tmp_path / "moved", lambda name: f"/lab/veh1{name}"))
     assert bag.namespace == "/lab/veh1" and bag.name_of(STATE) == "/lab/veh1/hsv/state"
     assert flight_fingerprint(bag) == flight_fingerprint(original) is not None
-    assert shortcomings(bag) == shortcomings(original)
+    assert bag_warnings(bag) == bag_warnings(original)
     for role in TOPICS:
         assert bag.messages(role) == bag.messages(bag.name_of(role)) == original.messages(role)
         assert compare(original.track(role), bag.track(role)).identical

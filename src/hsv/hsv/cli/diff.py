@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 if TYPE_CHECKING:
     from hsv.recording.compare import Comparison, Difference
@@ -67,7 +67,7 @@ def diff(
         for topic, bag in alone.items():
             console.print(f"{bag.name_of(topic)} is in {bag.path} only", soft_wrap=True)
         _print(compared, earliest)
-    warn_of_shortcomings(*bags)
+    print_bag_warnings(*bags)
     raise typer.Exit(1 if earliest or alone else 0)
 
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import print_written
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def export(
@@ -41,4 +41,4 @@ def export(
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
     topics = topic or [name for name in TOPICS if name in opened.roles]
     print_written(tables.export(opened, topics, chosen[0], out), json)
-    warn_of_shortcomings(opened)
+    print_bag_warnings(opened)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption, UnitsOption
 from hsv.cli.output import Units, console, print_json, print_table, to_json
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
@@ -23,10 +23,10 @@ def info(
     Example: hsv info bags/case1_20260101T000000Z
     """
     from hsv.errors import RecordingError
+    from hsv.recording.bag_warnings import completeness
     from hsv.recording.flight import flight_data
     from hsv.recording.info import describe
     from hsv.recording.reader import Bag
-    from hsv.recording.shortcomings import completeness
     from hsv.simulation.metrics import METRICS, flight_metrics
 
     opened = Bag(bag)
@@ -47,7 +47,7 @@ def info(
             print_table(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", quantities, units)
     if problem:
         raise problem
-    warn_of_shortcomings(opened)
+    print_bag_warnings(opened)
 
 
 def _print(description: dict[str, Any]) -> None:
@@ -59,7 +59,7 @@ def _print(description: dict[str, Any]) -> None:
         "path": description["path"],
         "duration": f"{description['duration_s']:.6g} s",
         "messages": description["messages"],
-        "complete": f"no: {'; '.join(description['shortcomings'])}" if description["shortcomings"] else "yes",
+        "complete": f"no: {'; '.join(description['warnings'])}" if description["warnings"] else "yes",
         "ending": description["ending"] or "not recorded",
         **description["custom_data"],
         "fingerprint": in_words(description["fingerprint"], description["as_published"]),

@@ -6,8 +6,8 @@ from typing import Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 def play(
@@ -29,7 +29,7 @@ def play(
     from hsv.graph.launcher import become
     from hsv.recording.reader import Bag
 
-    warn_of_shortcomings(Bag(bag))
+    print_bag_warnings(Bag(bag))
     words = [str(bag), "--rate", str(rate), "--delay", str(delay)]
     if topic:
         words += ["--topics", *topic]

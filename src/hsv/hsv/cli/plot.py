@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import Units, print_written
-from hsv.cli.shortcomings import warn_of_shortcomings
 from hsv.cli.targets import check_target, writing
 
 
@@ -24,10 +24,10 @@ def plot(
     Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
     """
     from hsv.errors import QuantityError
+    from hsv.recording.bag_warnings import bag_warnings
     from hsv.recording.flight import flight_data, labels
     from hsv.recording.plots import flight_figure, save_figure
     from hsv.recording.reader import Bag
-    from hsv.recording.shortcomings import shortcomings
 
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")
@@ -35,8 +35,8 @@ def plot(
     opened = [Bag(path) for path in bags]
     named = dict(zip(labels(opened), opened, strict=True))
     flights = {name: flight_data(bag) for name, bag in named.items()}
-    remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := shortcomings(bag))]
+    remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := bag_warnings(bag))]
     with writing(out, "out"):
         save_figure(flight_figure(flights, units is Units.paper, remarks), out)
     print_written([out], json)
-    warn_of_shortcomings(*opened)
+    print_bag_warnings(*opened)

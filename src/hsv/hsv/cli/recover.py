@@ -24,9 +24,9 @@ def recover(
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
+    from hsv.recording.bag_warnings import loss_in_words
     from hsv.recording.reader import Bag
     from hsv.recording.recover import recover as mend
-    from hsv.recording.shortcomings import loss_in_words
     from hsv.recording.steps import irregularities, lost_seconds
 
     recovery = mend(bag, out)

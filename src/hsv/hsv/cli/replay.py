@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
 from hsv.cli.output import console, print_json
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 if TYPE_CHECKING:
     from hsv.replay.engine import ProcessComparison
@@ -91,7 +91,7 @@ def replay(
                 _print(result)
     if json:
         print_json({"bag": str(bag), "passed": not failed, "processes": report})
-    warn_of_shortcomings(opened)
+    print_bag_warnings(opened)
     if failed:
         raise RunError(f"{', '.join(failed)}: not what {bag} recorded")
 

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
 from hsv.cli.output import Units, print_written
-from hsv.cli.shortcomings import warn_of_shortcomings
 from hsv.cli.targets import check_target
 
 
@@ -42,4 +42,4 @@ def report(
             supply(bag, design, scenario)
     write_report(opened, out, paper_units=units is Units.paper)
     print_written([out], json)
-    warn_of_shortcomings(*opened)
+    print_bag_warnings(*opened)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
+from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, print_json
-from hsv.cli.shortcomings import warn_of_shortcomings
 
 
 class Program(StrEnum):
@@ -58,7 +58,7 @@ def view(
                 console.print(f"opening {mcap} with {viewer.name}", soft_wrap=True)
                 if layout:
                     console.print(f"layout to import there: {layout}", soft_wrap=True)
-            warn_of_shortcomings(opened)
+            print_bag_warnings(opened)
             return
     sources = "; ".join(f"{viewer.name}: {viewer.source}" for viewer in wanted)
     raise RecordingError(

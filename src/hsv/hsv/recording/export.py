@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.errors import RecordingError, reason
+from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.reader import Bag
-from hsv.recording.shortcomings import shortcomings
 from hsv.recording.units import Units, units_of
 
 INCOMPLETE = "incomplete"
@@ -45,7 +45,7 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
         )
     npz = form is Format.npz
     topics = [bag.name_of(topic) for topic in topics]
-    lacking = "; ".join(shortcomings(bag))
+    lacking = "; ".join(bag_warnings(bag))
     contents: dict[str, Any] = (
         _arrays(bag, topics) if npz else {topic: table(bag.columns(topic), _units(bag, topic)) for topic in topics}
     )

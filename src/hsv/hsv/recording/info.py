@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from hsv.errors import HsvError, RecordingError
 from hsv.graph.description import STATE, TUBE_STATUS
+from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.flight import flight_fingerprint
 from hsv.recording.former import fault_parameters, fault_topic, saturation_topic
 from hsv.recording.reader import Bag
-from hsv.recording.shortcomings import shortcomings
 from hsv.recording.steps import complete_stamps, cut_off
 from hsv.simulation.fingerprint import as_published
 from hsv.simulation.scenario import Scenario, parse_scenario
@@ -24,7 +24,7 @@ def describe(bag: Bag) -> dict[str, Any]:
     Returns:
     -------
     dict
-        ``path``, ``folder``, ``complete``, ``shortcomings`` (in words), ``start_s``, ``duration_s``, ``messages``,
+        ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
         entry per interval of a channel), ``saturation`` and ``tube``; the last four are None without the topic that
@@ -37,7 +37,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "path": str(bag.path),
         "folder": str(bag.folder),
         "complete": bag.complete,
-        "shortcomings": shortcomings(bag),
+        "warnings": bag_warnings(bag),
         "start_s": start / 1e9,
         "duration_s": (end - start) / 1e9,
         "messages": sum(topic["messages"] for topic in topics),

@@ -10,8 +10,9 @@ from typing import Any
 
 from hsv.control.design_file import parse_parameters
 from hsv.errors import HsvError, RecordingError
-from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.graph.node_parameters import NODE_PARAMETERS
+from hsv.recording.bag_warnings import completeness
 from hsv.recording.flight import flight_data, labels
 from hsv.recording.info import describe
 from hsv.recording.reader import Bag
@@ -19,7 +20,6 @@ from hsv.recording.report.curves import FlightCurves, flight_curves
 from hsv.recording.report.events import Event, flight_events
 from hsv.recording.report.panels import INPUTS
 from hsv.recording.report.values import Value, parameters, tree
-from hsv.recording.shortcomings import completeness
 from hsv.simulation.limits import Verdict, verdicts
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import Scenario, parse_scenario
@@ -70,9 +70,9 @@ class ReportedRun:
         return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
 
     @property
-    def shortcomings(self) -> list[str]:
+    def warnings(self) -> list[str]:
         """What the bag lacks, in words."""
-        return list(self.description["shortcomings"])
+        return list(self.description["warnings"])
 
     @property
     def good(self) -> bool:

@@ -1,4 +1,4 @@
-"""What a bag lacks although it can be read, in words: for every page, plot, table and line that is made of it."""
+"""Warnings about readable but incomplete bags, for every page, plot, table and line that is made of one."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _NAMED = 3
 """Files and damages that are named; of more, how many there are."""
 
 
-def shortcomings(bag: Bag) -> list[str]:
-    """Say that a bag is damaged or cut off, which topics of the steps it lacks, and which steps of a topic."""
+def bag_warnings(bag: Bag) -> list[str]:
+    """Return the warnings of a bag in words: damage, a missing end, missing topics, missing steps of a topic."""
     words = loss_in_words(bag.loss)
     if any(map(being_recorded, bag.files)):
         words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
