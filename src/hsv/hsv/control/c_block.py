@@ -1,6 +1,6 @@
 """Blocks in C, as ``hsv_block.h`` defines them, read from a shared library.
 
-A library is loaded with care for nothing: do it in a process that may crash, see :mod:`hsv.control.library_process`.
+Loading runs the library's code, which may crash: it is left to a child process, see :mod:`hsv.control.library_process`.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ class _Block(Structure):
 
 
 @dataclass(frozen=True)
-class Block:
-    """What a library says of a block, checked."""
+class CBlock:
+    """The description of a block that a library exports, checked."""
 
     name: str
     source: str
@@ -78,7 +78,7 @@ def include_folder() -> Path:
     return Path(str(files("hsv.control").joinpath("include")))
 
 
-def load_block(path: Path, symbol: str) -> Block:
+def load_block(path: Path, symbol: str) -> CBlock:
     """Load a library and return the block that it exports under a symbol.
 
     Raises:
@@ -98,7 +98,7 @@ def load_block(path: Path, symbol: str) -> Block:
     if not found.step:
         raise ParameterError("step = NULL, expected a function")
     name = _name(found.name, "name")
-    return Block(
+    return CBlock(
         name,
         _text(found.source, "source") if found.source else "",
         found.step,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.c_block import Block
+from hsv.control.c_block import CBlock
 from hsv.control.controller import (
     CONTROLLER_INPUTS,
     CONTROLLER_OUTPUTS,
@@ -119,7 +119,7 @@ class LibraryClass:
         """
         self._name, self._path, self._symbol = name, path, symbol
         try:
-            self.block: Block = library_user(path).describe(symbol)
+            self.block: CBlock = library_user(path).describe(symbol)
             # The size of the last one is that of the notch filter it is flown with.
             size = self.block.inputs[-1].size if self.block.inputs else 0
             _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])

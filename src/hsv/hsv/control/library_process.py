@@ -23,7 +23,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hsv.control.c_block import Block
+from hsv.control.c_block import CBlock
 from hsv.errors import ProcessError
 
 NO_PROGRESS = 20.0
@@ -60,10 +60,10 @@ class LibraryProcess:
         self._child: subprocess.Popen[bytes] | None = None
         self._connection: Connection[Any, Any]
         self._file: tuple[int, ...] = ()
-        self._blocks: dict[str, Block] = {}
+        self._blocks: dict[str, CBlock] = {}
         self._memory = SharedMemory()
 
-    def describe(self, symbol: str) -> Block:
+    def describe(self, symbol: str) -> CBlock:
         """Return the block under a symbol of the library.
 
         Raises:
@@ -176,7 +176,7 @@ class LibraryProcess:
 class LibraryUser(Protocol):
     """What uses a library, in a child or in this process."""
 
-    def describe(self, symbol: str) -> Block:
+    def describe(self, symbol: str) -> CBlock:
         """As :meth:`LibraryProcess.describe`."""
 
     def request(

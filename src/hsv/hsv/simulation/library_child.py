@@ -23,7 +23,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hsv.control.c_block import Block, load_block
+from hsv.control.c_block import CBlock, load_block
 from hsv.control.controller import call_step_function
 from hsv.control.library import LibraryController
 from hsv.control.library_process import SharedMemory, use_in_this_process
@@ -50,7 +50,7 @@ class LoadedLibrary:
         """Do what is requested, by the name of the method."""
         return getattr(self, name)(*arguments, **(kept or {}))
 
-    def describe(self, symbol: str) -> Block:
+    def describe(self, symbol: str) -> CBlock:
         """Load the library, where it is not loaded yet, and return its block.
 
         Raises:
