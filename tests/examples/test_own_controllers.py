@@ -77,10 +77,10 @@ def test_a_campaign_flies_it(hsv, example):
 
 
 @pytest.mark.parametrize(
-    "part", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "compiled.toml")]
+    "flown", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "compiled.toml")]
 )
-def test_it_flies_the_same_bytes_every_time(hsv, part):
-    ran = hsv("check", part, "--json")
+def test_it_flies_the_same_bytes_every_time(hsv, flown):
+    ran = hsv("check", flown, "--json")
     assert ran.returncode == 0, ran.stderr
     assert all(check["same"] and check["flights"] >= 2 for check in json.loads(ran.stdout)["checks"])
 

@@ -89,9 +89,9 @@ class Stage:
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    for number, patience in ((signal.SIGINT, 3.0), (signal.SIGKILL, 3.0)):
+    for number, wait_timeout in ((signal.SIGINT, 3.0), (signal.SIGKILL, 3.0)):
         try:
             os.killpg(process.pid, number)
-            process.wait(timeout=patience)
+            process.wait(timeout=wait_timeout)
         except (ProcessLookupError, subprocess.TimeoutExpired):
             continue

@@ -12,9 +12,11 @@ from hsv.cli.output import console, print_json, report_error
 
 
 def check(
-    part: Annotated[
+    flown: Annotated[
         str,
-        typer.Argument(metavar="PART", help="A controller as a scenario names it, flown in case1, or a scenario."),
+        typer.Argument(
+            metavar="CONTROLLER|SCENARIO", help="A controller as a scenario names it, flown in case1, or a scenario."
+        ),
     ],
     json: JsonOption = False,
 ) -> None:
@@ -27,7 +29,7 @@ def check(
     from hsv.cli.progress import stages
     from hsv.simulation.repeatability import findings, scenario_of
 
-    scenario = scenario_of(part)
+    scenario = scenario_of(flown)
     found = []
     with stages() as progress:
         for finding in findings(scenario):
