@@ -12,8 +12,9 @@ from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.claims import tracking
 from hsv.study.claims.catalogue import GROUPS
-from hsv.study.claims.claim import Finding, Judged, Reading, Verdict, shown
+from hsv.study.claims.claim import Judged
 from hsv.study.claims.evidence import Evidence, nominal, worst
+from hsv.study.claims.finding import Finding, Reading, Verdict, shown
 from hsv.study.claims.page import page
 from hsv.study.claims.ranking import METRICS, Rank
 from hsv.vehicle.vehicle import load_vehicle

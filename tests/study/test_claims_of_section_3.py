@@ -3,9 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from hsv.study.claims import controller, notch, notch_loop
-from hsv.study.claims.claim import Verdict
+from hsv.study.claims import controller, notch_loop
+from hsv.study.claims.catalogue import GROUPS
 from hsv.study.claims.evidence import Evidence
+from hsv.study.claims.finding import Verdict
 from hsv.vehicle.vehicle import load_vehicle
 
 CORNERS = [
@@ -13,7 +14,7 @@ CORNERS = [
     {"mass": 0.1, "moment_of_inertia": -0.1},
     {"mass": -0.1, "moment_of_inertia": 0.1},
 ]
-CLAIMS = {claim.name: claim for claim in (*controller.CLAIMS, *notch.CLAIMS)}
+CLAIMS = {claim.name: claim for group in ("Baseline controller", "Notch filter") for claim in GROUPS[group]}
 
 
 @pytest.fixture(scope="module")

@@ -108,7 +108,7 @@ def _shorter(location: str) -> str:
 
 
 def _verdict(entry: Judged) -> Text:
-    from hsv.study.claims.claim import Verdict
+    from hsv.study.claims.finding import Verdict
 
     colours = {Verdict.HOLDS: "green", Verdict.CONDITIONS: "yellow", Verdict.FAILS: "red"}
     return Text(str(entry.finding.verdict), colours[entry.finding.verdict])

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
+from importlib.resources import files
 
-from hsv.study.claims import (
-    adjustable,
-    attitude,
-    case2,
-    codesign,
-    controller,
-    elastic,
-    inputs,
-    modelling,
-    notch,
-    tracking,
-)
 from hsv.study.claims.claim import Claim, Judged
 from hsv.study.claims.evidence import Evidence
 
-GROUPS: dict[str, tuple[Claim, ...]] = {
-    "Polytopic model and disturbances": modelling.CLAIMS,
-    "Baseline controller": controller.CLAIMS,
-    "Notch filter": notch.CLAIMS,
-    "Case 1": (*tracking.CLAIMS, *attitude.CLAIMS, *elastic.CLAIMS, *inputs.CASE_1),
-    "Adjustable controller": (*codesign.CLAIMS, *adjustable.CLAIMS),
-    "Case 2": (*case2.CLAIMS, *inputs.CASE_2),
+GROUPS = {
+    group: tuple(map(Claim.model_validate, claims))
+    for group, claims in tomllib.loads(files(__package__).joinpath("claims.toml").read_text(encoding="utf-8")).items()
 }
 
 

@@ -14,7 +14,6 @@ from hsv.control.notch_filter import NotchSection
 from hsv.design.region import Corner, corners
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
-from hsv.study.claims.spread import Spread
 from hsv.study.corner_flights import Table, corner_table, fly_over
 from hsv.study.figures.figure import Design
 from hsv.study.flights import Flights
@@ -64,15 +63,26 @@ class Evidence:
         values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
         return self._flown(values)
 
-    def spread(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> Spread:
-        """Return the magnitude of one measure with the uncertain parameters of Case 1 and 2, nominal, at all corners.
+    def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
+        """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; nan where not defined.
 
         The uncertain flight of ``case1_...`` is that of ``case1_uncertain_...``, and so for Case 2.
         """
         case, _, rest = scenario.partition("_")
-        uncertain = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
-        over = self.corners(scenario, *changes)[measure]
-        return Spread(abs(uncertain.get(measure, np.nan)), np.abs(over))
+        flight = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
+        return abs(flight.get(measure, np.nan))
+
+    def magnitudes(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> np.ndarray:
+        """Return the magnitude (vehicles) of a measure, the nominal vehicle first."""
+        return np.abs(self.corners(scenario, *changes)[measure])
+
+    def certified(self, entry: str) -> np.ndarray:
+        """Return the numbers in an entry of a certificate, ``design:path.to.entry``, those of all elements of lists."""
+        design, _, path = entry.partition(":")
+        found = [self.design(design).certificate]
+        for key in path.split("."):
+            found = [item for value in found for item in np.atleast_1d(value[key])]
+        return np.array(found)
 
     def adjustable_step(self) -> dict[str, float]:
         """Return what was measured on the step of Case 1 with the adjustable design."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
-from hsv.study.claims.claim import Judged, Verdict, shown
+from hsv.study.claims.claim import Judged
+from hsv.study.claims.finding import Verdict, shown
 from hsv.study.claims.ranking import METRICS, Rank
 from hsv.study.claims.thresholds import REASONS
 from hsv.vehicle.vehicle import load_vehicle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.study.claims.claim import shown
+from hsv.study.claims.finding import shown
 from hsv.vehicle.envelope import FOOT
 
 HALF_DEGREE = float(np.radians(0.5))
@@ -22,11 +22,26 @@ ALTITUDE_BAND, VELOCITY_BAND = BAND * ALTITUDE_STEP, BAND * VELOCITY_STEP
 SOON = 20.0
 """s: a tenth of the flight that the paper's figures show."""
 
+EVER = float(np.finfo(float).max)
+"""s: what has not settled by then has not settled by the end of the flight."""
+
 A_LOT = 1.5
 """Ratio from which on something is a lot more."""
 
 SIGNIFICANT, SLIGHT = 0.5, 0.75
 """What is left of something: after a significant reduction at most, after a slight one at least."""
+
+CLEARLY = 0.95
+"""Times what it was: a change of 5 % can be seen in a figure."""
+
+RAISED = 3.0
+"""dB: from here on a change of the response counts as one, of its power by a factor of two."""
+
+GAIN_UNCHANGED, PHASE_UNCHANGED = 0.5, float(np.radians(5.0))
+"""dB, rad: 6 % of a gain, 5 deg of phase: less is lost in the uncertainty of the vehicle."""
+
+ONE_LINE_MAGNITUDE, ONE_LINE_PHASE = 1.0, 5.0
+"""dB, deg: how far apart two lines of a Bode diagram of the paper's size may be and look like one."""
 
 REASONS = f"""Thresholds of ours that return: *accurate*, within {100 * BAND:g} % of the step (the usual band of a
 settled response: {shown(ALTITUDE_BAND, "m")}, {shown(VELOCITY_BAND, "m/s")}); *soon*, within {SOON:g} s (a tenth of

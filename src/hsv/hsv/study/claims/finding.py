@@ -1,0 +1,77 @@
+"""Numbers with thresholds, and the verdict that follows from them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from hsv.units import to_paper
+
+
+class Verdict(StrEnum):
+    """What became of a claim."""
+
+    HOLDS = "holds"
+    CONDITIONS = "holds under conditions"
+    FAILS = "does not hold"
+
+
+def shown(value: float, unit: str) -> str:
+    """Return a number (SI) in the paper's unit, with the unit; a time that is infinite lies beyond the flight."""
+    if not math.isfinite(value):
+        return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
+    number, name = to_paper(value, unit)
+    return f"{number:.4g}" + ("" if name == "1" else f" {name}")
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read a claim: a number (SI) that is to be at most, or at least, a threshold."""
+
+    what: str
+    value: float
+    unit: str
+    at_most: float | None = None
+    at_least: float | None = None
+
+    @property
+    def measured(self) -> str:
+        """The number in the paper's unit."""
+        return shown(self.value, self.unit)
+
+    @property
+    def threshold(self) -> str:
+        """The threshold in words."""
+        if self.at_most is not None:
+            return f"at most {shown(self.at_most, self.unit)}"
+        assert self.at_least is not None
+        return f"at least {shown(self.at_least, self.unit)}"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the number keeps to the threshold; what is not a number does not."""
+        if self.at_most is not None:
+            return bool(self.value <= self.at_most)
+        return bool(self.at_least is not None and self.value >= self.at_least)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The readings of a claim, and why they come out as they do.
+
+    The first ``leading`` readings are the statement itself under the paper's own conditions, one a number it speaks of;
+    the others ask the same under further conditions.
+    """
+
+    readings: tuple[Reading, ...]
+    why: str
+    leading: int = 1
+
+    @property
+    def verdict(self) -> Verdict:
+        """Holds everywhere; as stated but not under all further conditions; not as stated, whatever else holds."""
+        kept = [reading.holds for reading in self.readings]
+        if not all(kept[: self.leading]):
+            return Verdict.FAILS
+        return Verdict.HOLDS if all(kept) else Verdict.CONDITIONS
