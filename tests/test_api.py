@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import hsv
-from hsv.control.design_file import digest
+from hsv.control.design_parameters import digest
 from hsv.errors import ScenarioError
 from hsv.simulation.assembly import design_parameters
 from hsv.simulation.fingerprint import as_published

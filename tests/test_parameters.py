@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import DESIGN_PARAMETERS
+from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS

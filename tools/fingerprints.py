@@ -7,7 +7,7 @@ from pathlib import Path
 import tomli_w
 
 import hsv
-from hsv.control.design_file import find_design, read_design_parameters
+from hsv.control.design_file import find_design, read_design
 from hsv.simulation import fingerprint
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -23,9 +23,9 @@ def main() -> None:
     for name in scenario_names():
         scenario = load_scenario(name)
         if scenario.nominal.law == "family":
-            design = read_design_parameters(find_design(scenario.design))
+            design = read_design(find_design(scenario.design))
             flight = fly(assemble_flight(scenario, design))
-            table[name] = {"design_hash": design["design.hash"], "fingerprint": flight.fingerprint}
+            table[name] = {"design_hash": design.digest, "fingerprint": flight.fingerprint}
     path = Path(hsv.__file__).parent / "simulation" / fingerprint.TABLE
     path.write_text(HEADER + tomli_w.dumps(table), encoding="utf-8")
     print(f"{path.name}: {len(table)} scenarios")

@@ -4,9 +4,7 @@ from flights import components
 
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.controller import ControllerInput
-from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
 
 
 def published_levels(parts, flight):
@@ -29,16 +27,16 @@ def published_levels(parts, flight):
 def test_the_worst_level_is_the_largest_that_the_controller_publishes_in_every_bit(scenario):
     parts = components(scenario, duration=110.0)
     flight = fly(parts)
-    worst = TubeLevels(flight_parameters(load_scenario(scenario))).worst(flight.data())
+    worst = TubeLevels(parts).worst(flight.data())
     assert worst == max(published_levels(parts, flight))
 
 
 def test_without_the_filter_in_the_loop_no_set_holds():
     flight = fly(components("case1_no_notch", duration=1.0))
-    assert TubeLevels(flight_parameters(load_scenario("case1_no_notch"))).worst(flight.data()) is None
+    assert TubeLevels(components("case1_no_notch")).worst(flight.data()) is None
 
 
 def test_a_state_that_is_no_number_has_no_level():
     data = fly(components("case1", duration=1.0)).data()
     data.state[20, 4] = np.nan
-    assert np.isnan(TubeLevels(flight_parameters(load_scenario("case1"))).worst(data))
+    assert np.isnan(TubeLevels(components("case1")).worst(data))

@@ -8,15 +8,9 @@ import pytest
 import yaml
 from numpy.testing import assert_array_equal
 
-from hsv.control.design_file import (
-    ControlDesign,
-    digest,
-    find_design,
-    find_file,
-    read_design,
-    read_parameters,
-    write_design,
-)
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, find_file, read_design, read_parameters, write_design
+from hsv.control.design_parameters import digest
 from hsv.errors import DesignError
 
 SHIPPED = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))

@@ -1,7 +1,8 @@
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.control.design_file import ControlDesign, find_design, read_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.errors import DesignError
 
 VALUES = read_parameters(find_design("baseline"))

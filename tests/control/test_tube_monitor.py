@@ -6,7 +6,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.control.controller import ControllerInput
-from hsv.control.design_file import ControlDesign, find_design, read_design
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.control.tube_set import TubeSet

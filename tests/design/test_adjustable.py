@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.adjustable import design_adjustable
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.error_system import error_system, union

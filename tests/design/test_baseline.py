@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains
 from hsv.errors import DesignError
 

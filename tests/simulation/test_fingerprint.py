@@ -5,7 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.control.design_file import digest, find_design, read_parameters
+from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design_parameters import digest
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.fingerprint import _table, as_published, fingerprint, in_words

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flights import step_by_step
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario

@@ -1,9 +1,10 @@
 import sys
+from pathlib import Path
 
 import pytest
 
 from hsv.errors import ScenarioError
-from hsv.study.sources import drop_older, flight_digest, nodes_digest
+from hsv.study.sources import drop_older, flight_digest, kept, nodes_digest
 
 
 def test_a_digest_is_of_the_scenario_flown():
@@ -40,3 +41,19 @@ def test_only_the_newest_of_a_name_is_kept(tmp_path):
     drop_older(tmp_path / f"case1_{new}.npz")
     kept = {path.name.removesuffix(".npz") for path in tmp_path.iterdir()}
     assert kept == {f"case1_{new}", f"case1_no_notch_{old}"}
+
+
+def test_what_is_kept_is_made_once_for_a_digest(tmp_path):
+    made = []
+
+    def get(digest):
+        def make():
+            made.append(digest)
+            return digest
+
+        return kept(tmp_path / "new" / f"probe_{digest}.txt", make, Path.write_text, Path.read_text)
+
+    first, second = "0123456789ab", "ba9876543210"
+    assert [get(first), get(first), get(second)] == [first, first, second]
+    assert made == [first, second]
+    assert [path.name for path in (tmp_path / "new").iterdir()] == [f"probe_{second}.txt"]

@@ -8,7 +8,7 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
-from hsv.control.design_file import find_design, read_design_parameters
+from hsv.control.design_file import find_design, read_design
 from hsv.simulation.fingerprint import as_published
 from hsv.simulation.scenario import load_scenario
 from portability import Environment, own
@@ -63,7 +63,7 @@ def changed_flights(report: dict[str, Any]) -> dict[str, str]:
     changed = {}
     for name in SCENARIOS:
         found, scenario = report["fingerprints"][name], load_scenario(name)
-        design = read_design_parameters(find_design(scenario.design))
-        if not as_published(found, scenario, design["design.hash"]):
+        design = read_design(find_design(scenario.design))
+        if not as_published(found, scenario, design.digest):
             changed[name] = found
     return changed

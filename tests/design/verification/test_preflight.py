@@ -7,7 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from hsv.control.design_file import ControlDesign, find_design, read_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.design.certificate import certificate_path, read_certificate, write_certificate
 from hsv.design.verification.preflight import preflight
 from hsv.errors import DesignError

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.certificate import read_certificate, write_certificate
 from hsv.design.verification.claims import require
 from hsv.design.verification.verifier import verify

@@ -133,6 +133,7 @@ class RecorderNode(PeerNode):
             )
             return
         # Not at the top: the components' tables take their time, and a prepared run does without.
+        from hsv.control.design_parameters import digest
         from hsv.graph.parameter_sections import disagreements
         from hsv.graph.preparation import provenance, recorded_files
 
@@ -143,7 +144,7 @@ class RecorderNode(PeerNode):
         for name, text in recorded_files(values, design).items():
             self._attach(name, text.encode())
         self.bag.add_custom_data(
-            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), design)}
+            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), digest(design))}
         )
 
     def _attach(self, name: str, data: bytes) -> None:

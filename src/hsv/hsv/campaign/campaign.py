@@ -186,7 +186,7 @@ def _check_ends(campaign: Campaign) -> None:
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
         flown = campaign.flown(ends)
-        with blamed_on(flown, design_read=False):
+        with blamed_on(flown):
             assemble({**campaign.design, **scenario_parameters(flown)})
         for index, value in enumerate(ends):
             campaign.flown([*mean[:index], value, *mean[index + 1 :]])

@@ -11,6 +11,7 @@ from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.control.controller import Controller
 from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
+from hsv.control.design import design_of
 from hsv.control.library import library_digest
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.errors import CampaignError, ControllerError
@@ -40,8 +41,9 @@ class SampleRunner:
                 f"the one of SHA-256 {campaign.library}"
             )
         self._nominal = campaign.parameters
-        self._parts = assemble_flight(self.scenario, campaign.design)
-        self._levels = TubeLevels(self._nominal)
+        self._design = design_of(campaign.design)
+        self._parts = assemble_flight(self.scenario, self._design)
+        self._levels = TubeLevels(self._parts)
         self._kept_for = _NOT_OF_SHIPPED if self.scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
         self.period = self._parts.plant.period
         """Control period, s."""
@@ -63,7 +65,7 @@ class SampleRunner:
             return fly(assemble(values))
         trajectory = parts.nominal_trajectory
         if any(name.startswith("reference.") for name in changed):
-            trajectory = NominalTrajectory.from_parameters(values)
+            trajectory = NominalTrajectory.from_parameters(values, self._design)
         return fly(
             replace(
                 parts,

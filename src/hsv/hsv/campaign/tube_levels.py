@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numba import njit
 
-from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import design_of
 from hsv.control.nominal_law import level
-from hsv.control.notch_filter import NOTCH_PARAMETERS, discretise, filter_step, flown_sections, rest
-from hsv.parameters import check_all
+from hsv.control.notch_filter import filter_step, rest
+from hsv.control.tube_law import TubeLaw
+from hsv.simulation.closed_loop import Components
 from hsv.simulation.metrics import FlightData
 from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
 
@@ -46,16 +44,11 @@ def _worst(
 class TubeLevels:
     """Levels in the set of one design, for flights that have its filter in the loop and its tube law at the end."""
 
-    def __init__(self, values: Mapping[str, Any]) -> None:
-        """Read design, controller and filter from flat flight parameters."""
-        design = design_of(values)
-        controller = check_all(CONTROLLER_PARAMETERS, values)["controller"]
-        self._tube = None
-        if design is None:
-            return
-        in_loop = check_all(NOTCH_PARAMETERS, values)["notch.enabled"] and flown_sections(values) == design.notch
-        self._tube = design.tube if controller == "tube_mpc" and in_loop else None
-        self._notch = discretise(design.notch, design.period)
+    def __init__(self, parts: Components) -> None:
+        """Read the set from the tube law among the components of the flights, where it is one."""
+        law, notch = parts.controller, parts.notch_filter
+        self._tube = law.design.tube if isinstance(law, TubeLaw) and notch.sections == law.design.notch else None
+        self._notch = notch.data
 
     def worst(self, flight: FlightData) -> float | None:
         """Return the largest level (e - c)' P (e - c) of the flight, ``None`` where no set holds for it."""

@@ -13,7 +13,7 @@ from hsv.cli.output import console, print_json, report_error
 from hsv.cli.targets import check_target, writing
 
 if TYPE_CHECKING:
-    from hsv.control.design_file import ControlDesign
+    from hsv.control.design import ControlDesign
     from hsv.design.baseline import DesignResult
     from hsv.design.inputs import DesignInputs
     from hsv.design.sets.compare import Row

@@ -27,8 +27,9 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import report_flight
-    from hsv.control.design_file import digest
-    from hsv.simulation.assembly import assemble_flight, blamed_on, design_parameters
+    from hsv.control.design_file import find_design, read_design
+    from hsv.control.design_parameters import digest
+    from hsv.simulation.assembly import assemble_flight, blamed_on
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import load_scenario
@@ -38,7 +39,7 @@ def simulate(
         check_target(out, "out")
     loaded = load_scenario(scenario)
     with blamed_on(loaded):
-        design = design_parameters(loaded)
+        design = read_design(find_design(loaded.design)) if loaded.design else None
     components = assemble_flight(loaded, design)
     started = time.perf_counter()
     flight = fly(components)
@@ -50,7 +51,7 @@ def simulate(
         loaded,
         flight_metrics(flight.data()),
         fingerprint=flight.fingerprint,
-        design_hash=digest(design),
+        design_hash=design.digest if design else digest({}),
         ending="diverged" if flight.status is FlightStatus.DIVERGED else "finished",
         wall_time=wall,
         simulated_time=float(flight.time[-1]),

@@ -36,7 +36,7 @@ from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
 from hsv.vehicle.parameters import VehicleParameters
 
 if TYPE_CHECKING:
-    from hsv.control.design_file import ControlDesign
+    from hsv.control.design import ControlDesign
 
 
 STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void_p] * 4)

@@ -25,7 +25,7 @@ from hsv.parameters import Parameter, check_all
 from hsv.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from hsv.control.design_file import ControlDesign
+    from hsv.control.design import ControlDesign
 
 GROUP = "hsv.controllers"
 """The entry points of controllers."""

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numba import njit
 
-from hsv.control.design_file import ControlDesign, design_of
+from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory

@@ -62,7 +62,7 @@ class NotchSection:
 
 def default_sections() -> tuple[NotchSection, ...]:
     """Return the filter that the parameters describe when none is given."""
-    return NotchFilter.from_parameters({}).sections
+    return flown_sections({})
 
 
 class NotchData(NamedTuple):

@@ -11,7 +11,7 @@ import numpy as np
 import piqp
 from scipy.linalg import solve_discrete_are
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.errors import DesignError

@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from hsv.control.controller import Controller, ControllerInput
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step
 from hsv.errors import ParameterError

@@ -18,7 +18,7 @@ from numba import njit
 
 from hsv.control.adjustable import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
     NotchData,

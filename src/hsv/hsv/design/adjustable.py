@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.baseline import (
     DesignResult,
     Progress,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import NotchSection
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs

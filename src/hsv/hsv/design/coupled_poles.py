@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import continuous, series
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.dynamics import N_RIGID, N_STATES

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system
 from hsv.design.rounding import BOUND_DIGITS, rounded

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import continuous, series
 from hsv.design.coupled_poles import largest_real_parts
 from hsv.design.feedback import feedback_gain

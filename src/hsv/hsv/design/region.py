@@ -7,20 +7,19 @@ step from the design's start to its target, the fault; parameters nominal and at
 from __future__ import annotations
 
 import itertools
-import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
 from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import Flight, fly
+from hsv.threads import over_threads
 from hsv.vehicle.plant import FlightStatus
 
 Corner = Mapping[str, float]
@@ -129,12 +128,7 @@ class Region:
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
         """Return ``job`` of every flight, in order; compiled flights run in as many threads as there are processors."""
-        results = []
-        with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-            for result in pool.map(lambda corner: job(self.fly(corner)), over):
-                results.append(result)
-                progress(len(results))
-        return results
+        return over_threads(lambda corner: job(self.fly(corner)), over, progress)
 
 
 def record(flight: Flight) -> Record:

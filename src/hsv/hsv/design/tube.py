@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership

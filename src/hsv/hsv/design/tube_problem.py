@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
 from hsv.design.error_system import error_system, union

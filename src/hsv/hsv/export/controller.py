@@ -11,7 +11,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hsv.control.c_block import include_folder
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import MEMBERSHIP_TOLERANCE, NominalStatus
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.errors import DesignError

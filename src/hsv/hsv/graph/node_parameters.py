@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsv.control.controllers import controller_class
-from hsv.control.design_file import DESIGN_PARAMETERS
+from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.graph.description import RECORDER, ROBUST_MPC, TUBE_MPC
 from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, RECORDER_PARAMETERS

@@ -9,7 +9,8 @@ from typing import Any, Self
 import yaml
 
 from hsv.control.adjustable import TAU
-from hsv.control.design_file import DESIGN_PARAMETERS, parse_sections
+from hsv.control.design_file import parse_sections
+from hsv.control.design_parameters import DESIGN_PARAMETERS
 
 _ALL = "/**"
 

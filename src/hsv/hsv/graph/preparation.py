@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from hsv.control.controllers import NODE
-from hsv.control.design_file import DESIGN_PARAMETERS, NO_DESIGN, digest, find_design, read_design_parameters
+from hsv.control.design_file import find_design, read_design
+from hsv.control.design_parameters import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.library import library_digest, library_record
 from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
@@ -21,6 +22,8 @@ from hsv.graph.launcher import executable
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text, with_controller
+
+_NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})
 
 STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 2.5
 """Wall time (s) after which a silent node ends a run; nobody knows what a controller that is a node of its own does."""
@@ -88,7 +91,7 @@ def prepare(
     scenario = parse_scenario(text, name)
     with blamed_on(scenario):
         design_file = find_design(scenario.design) if scenario.design else None
-        design = read_design_parameters(design_file) if design_file else {"design.name": NO_DESIGN}
+        design = read_design(design_file) if design_file else None
         nodes = _started(scenario.controller, composed)
         own = own_parameters(scenario)
         foreign = controller_node(scenario.controller).foreign
@@ -106,7 +109,7 @@ def prepare(
     files = {
         "scenario.toml": text,
         "scenario.yaml": ParameterSections(scenario.parameters(), {CONTROLLER.name: own} if own else {}).to_yaml(),
-        **(design_files(design_file) if design_file else {"design.yaml": ParameterSections(design).to_yaml()}),
+        **(design_files(design_file) if design_file else {"design.yaml": _NO_DESIGN.to_yaml()}),
     }
     if library and library.source_name:
         files[f"controller_{Path(library.source_name).name}"] = library.source.decode(errors="replace")
@@ -133,7 +136,7 @@ def prepare(
                 "run_id": run_id,
                 "scenario": scenario.name,
                 "title": scenario.title,
-                **provenance(scenario.controller, scenario.design, design if design_file else {}),
+                **provenance(scenario.controller, scenario.design, design.digest if design else digest({})),
             }.items()
         ],
     }
@@ -158,7 +161,7 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
     return tuple(node for node in nodes if node.executable)
 
 
-def provenance(controller: str, name: str, design: Mapping[str, Any]) -> dict[str, str]:
+def provenance(controller: str, name: str, design_hash: str) -> dict[str, str]:
     """Return what a bag says of where its flight comes from: controller, design with its ``name``, and when: now."""
     library = library_digest(controller)
     return {
@@ -166,7 +169,7 @@ def provenance(controller: str, name: str, design: Mapping[str, Any]) -> dict[st
         "controller": controller,
         **({"controller_sha256": library} if library else {}),
         "design": name,
-        "design_hash": digest(design),
+        "design_hash": design_hash,
         "seed": "none",
         "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }

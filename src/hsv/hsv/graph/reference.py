@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hsv.control.design_file import DESIGN_PARAMETERS
+from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.graph.description import CARRIED
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS

@@ -11,7 +11,8 @@ import numpy as np
 
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_file import ControlDesign, find_design, read_design_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.injector import FaultInjector
@@ -74,7 +75,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
         with blamed_on(parsed):
             design = design or find_design(parsed.design)
     if design is not None:
-        read_design_parameters(design)
+        read_design(design)
         files |= design_files(design)
     for name, content in files.items():
         bag.attachments[name] = content.encode()
@@ -110,7 +111,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
         except (DesignError, ParameterError) as error:
             raise RecordingError(f"{bag.path}: attached {error}") from error
     if design is not None:
-        values = ParameterSections(read_design_parameters(design)).overlaid(scenario)
+        values = ParameterSections(read_design(design).to_parameters()).overlaid(scenario)
     return values.overlaid(ParameterSections({}, changed))
 
 

@@ -7,8 +7,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from hsv.control.adjustable import TAU
 from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
-from hsv.control.design_file import design_of, find_design, read_design, read_design_parameters
+from hsv.control.design import ControlDesign, design_of
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
 from hsv.parameters import table_values
 from hsv.simulation.blocks import LOOP
@@ -50,12 +52,12 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the parameters of the scenario's design, checked; none where it has none.
+    """Return the parameters in the file of the scenario's design, none where it has none.
 
     Raises:
-        DesignError: There is no such design, or it is not acceptable.
+        DesignError: There is no such design, or its file cannot be read.
     """
-    return read_design_parameters(find_design(scenario.design)) if scenario.design else {}
+    return read_parameters(find_design(scenario.design)) if scenario.design else {}
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
@@ -67,27 +69,31 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
     return {**design_parameters(scenario), **scenario_parameters(scenario)}
 
 
-def assemble(values: Mapping[str, Any]) -> Components:
+def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
     """Return the five components that these parameters describe; each checks its own.
+
+    ``design``: the one in ``values``, where it is known already.
 
     Raises:
         ParameterError, DesignError, TrimError: Names the parameter that is wrong.
     """
-    design = design_of(values)
+    design = design or design_of(values)
     return Components(**{block.name: block.build(values, design) for block in LOOP})
 
 
-def assemble_flight(scenario: Scenario, design: Mapping[str, Any] | None = None) -> Components:
-    """Return the components that fly ``scenario``, with its own design or with these parameters of one.
-
-    With parameters of a design, no file is read.
+def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> Components:
+    """Return the components that fly ``scenario``, with ``design`` or, where none is given, with its own.
 
     Raises:
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
     """
     with blamed_on(scenario, design_read=design is None):
-        values = {**(design_parameters(scenario) if design is None else design), **scenario_parameters(scenario)}
-        components = assemble(values)
+        if design is None and scenario.design:
+            design = read_design(find_design(scenario.design))
+        own = scenario_parameters(scenario)
+        if design and TAU.name in own:
+            design = design.with_tau(own[TAU.name])
+        components = assemble({**(design.to_parameters() if design else {}), **own}, design)
         plant = components.plant
         if plant.steps < 1:
             raise ScenarioError(f"duration = {scenario.duration:g} s: expected at least a period, {plant.period:g} s")

@@ -22,7 +22,7 @@ from hsv.signals import SignalType
 from hsv.vehicle.dynamics import PITCH_RATE
 
 if TYPE_CHECKING:  # a node imports its own component alone
-    from hsv.control.design_file import ControlDesign
+    from hsv.control.design import ControlDesign
     from hsv.control.nominal_trajectory import NominalTrajectory
     from hsv.control.notch_filter import NotchFilter
     from hsv.faults.injector import FaultInjector

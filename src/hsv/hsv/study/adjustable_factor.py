@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.factor import certified_loops, relaxed_bound

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +15,9 @@ from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.study.measures import flight_measures
-from hsv.study.sources import DIGITS, digest_of, drop_older, file_bytes, flight_digest
+from hsv.study.sources import DIGITS, digest_of, flight_digest, kept, measuring_code
+from hsv.threads import over_threads
 from hsv.vehicle.plant import FlightStatus
-
-_MEASURING = ("study/corner_flights.py", "study/measures.py", "campaign/tube_levels.py")
-"""What is measured hangs on these beside what the flight hangs on."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -43,7 +39,8 @@ def fly_over(
         half_width: (5) as for :func:`hsv.study.measures.flight_measures`.
         progress: Called with the number of flights done.
     """
-    levels, parts = TubeLevels(values), assemble(values)
+    parts = assemble(values)
+    levels = TubeLevels(parts)
 
     def job(corner: Corner) -> dict[str, float]:
         flight = fly(parts.perturbed(corner))
@@ -56,11 +53,7 @@ def fly_over(
             **flight_measures(data, half_width),
         }
 
-    rows = []
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        for row in pool.map(job, over):
-            rows.append(row)
-            progress(len(rows))
+    rows = over_threads(job, over, progress)
     names = list(dict.fromkeys(name for row in rows for name in row))
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
 
@@ -84,20 +77,20 @@ def corner_table(
         changes: Flat parameters in place of the scenario's.
     """
     asked = json.dumps([list(map(dict, over)), changes]).encode()
-    modules = (file_bytes(module) for module in _MEASURING)
-    digest = digest_of([flight_digest(scenario).encode(), half_width.tobytes(), asked, *modules])
+    digest = digest_of([flight_digest(scenario).encode(), half_width.tobytes(), asked, *measuring_code()])
     what = " ".join((scenario, *(f"{name}={value}" for name, value in changes)))
     path = folder / f"{len(over)}_vehicles_{what.replace(' ', '_')}_{digest[:DIGITS]}.npz"
-    if path.is_file():
-        with np.load(path) as kept:
-            return dict(kept)
-    progress(f"{what}, all vehicles", 0, len(over))
-    values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
-    table = fly_over(values, over, half_width, lambda done: progress(f"{what}, all vehicles", done, len(over)))
-    folder.mkdir(parents=True, exist_ok=True)
-    new = path.with_suffix(".tmp")
-    with new.open("wb") as stream:
-        np.savez_compressed(stream, **table)  # type: ignore[arg-type]
-    new.rename(path)
-    drop_older(path)
-    return table
+
+    def flown() -> Table:
+        progress(f"{what}, all vehicles", 0, len(over))
+        values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
+        return fly_over(values, over, half_width, lambda done: progress(f"{what}, all vehicles", done, len(over)))
+
+    def save(new: Path, table: Table) -> None:
+        np.savez_compressed(new, **table)  # type: ignore[arg-type]
+
+    def load(old: Path) -> Table:
+        with np.load(old) as table:
+            return dict(table)
+
+    return kept(path, flown, save, load)

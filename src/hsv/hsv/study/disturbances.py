@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import flown_sections
 from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Corner, record
@@ -17,6 +15,7 @@ from hsv.design.tube_problem import channel_model
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
+from hsv.threads import over_threads
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -36,6 +35,5 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
     def largest(corner: Corner) -> np.ndarray:
         return np.asarray(np.abs(model.signals(record(fly(parts.perturbed(corner)))).channels).max(axis=0))
 
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        rows = np.array(list(pool.map(largest, over)))
+    rows = np.array(over_threads(largest, over))
     return {channel.name: column for channel, column in zip(CHANNELS, rows.T, strict=True)}

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from typing import TypeVar
 
 from hsv.control.design_file import find_design
 from hsv.simulation.scenario import load_scenario, scenario_text
+
+Result = TypeVar("Result")
 
 _FLOWN = ("control", "faults", "lpv", "simulation", "vehicle")
 """Packages whose code a flight runs through; the vehicle's table is among them."""
@@ -34,9 +37,14 @@ def package_digest(*names: str) -> str:
 @cache
 def code_digest() -> str:
     """Return the digest of the code and the vehicle table that a flight runs through."""
-    root = Path(str(files("hsv")))
-    paths = [path for name in _FLOWN for path in root.joinpath(name).glob("*") if path.suffix in (".py", ".toml")]
-    return digest_of(path.read_bytes() for path in (*sorted(paths), root / "units.py"))
+    modules = sorted(Path(str(files("hsv"))).glob("*.py"))
+    return digest_of([package_digest(*_FLOWN).encode(), *(path.read_bytes() for path in modules)])
+
+
+def measuring_code(*further: str) -> list[bytes]:
+    """Return the code on which what is measured of flights hangs, beside what they hang on; ``further``: modules."""
+    modules = ("hsv.study.corner_flights", "hsv.study.measures", "hsv.campaign.tube_levels", *further)
+    return [Path(str(spec.origin)).read_bytes() for spec in map(find_spec, modules) if spec]
 
 
 @cache
@@ -75,17 +83,30 @@ def flight_digest(scenario: str, *, graph: bool = False) -> str:
     return digest_of((scenario_text(scenario).encode(), design, *(digest.encode() for digest in code)))
 
 
+def kept(
+    path: Path, make: Callable[[], Result], save: Callable[[Path, Result], None], load: Callable[[Path], Result]
+) -> Result:
+    """Return what is kept in the file ``path``, whose name ends in a digest; if nothing is, make and keep it.
+
+    A file is there only when it is whole, and what was kept under another digest is dropped.
+    """
+    if path.is_file():
+        return load(path)
+    made = make()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    new = path.with_name(f".{path.name}")
+    save(new, made)
+    new.rename(path)
+    drop_older(path)
+    return made
+
+
 def drop_older(path: Path) -> None:
     """Remove what was kept beside ``path`` under the same name and another digest: what it depended on is gone."""
     name, _, rest = path.name.rpartition("_")
     for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
         if other != path:
             shutil.rmtree(other) if other.is_dir() else other.unlink()
-
-
-def file_bytes(name: str) -> bytes:
-    """Return the contents of a file of this package, ``name`` below its root."""
-    return files("hsv").joinpath(name).read_bytes()
 
 
 def digest_of(parts: Iterable[bytes]) -> str:

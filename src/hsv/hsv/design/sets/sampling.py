@@ -7,14 +7,13 @@ vertices for random times and picks the signs that push outwards most, every twe
 
 from __future__ import annotations
 
-import os
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
+from hsv.threads import over_threads
 
 KINDS = ("iid", "held", "switching", "adversarial")
 """Sequence j is of kind j mod 4."""
@@ -41,8 +40,7 @@ def sample(found: EllipsoidSet, sequences: int, steps: int, seed: int) -> dict[s
         _run(columns, len(factor), begin, first, min(first + _BATCH, sequences), steps, np.uint64(seed), worst)
         return worst
 
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        worst = np.max(list(pool.map(batch, range(0, sequences, _BATCH))), axis=0)
+    worst = np.max(over_threads(batch, range(0, sequences, _BATCH)), axis=0)
     return {
         "sequences": sequences,
         "steps": steps,

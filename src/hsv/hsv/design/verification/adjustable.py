@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.baseline import nominal_problem
 from hsv.design.coupled_poles import largest_real_parts
 from hsv.design.factor import relaxed_bound

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.verification.claims import Subject
 from hsv.design.verification.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.errors import DesignError
 from hsv.vehicle.vehicle import Vehicle, load_vehicle

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, Extremes
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.certificate import find_certificate, read_certificate
 from hsv.design.verification.claims import Subject, gathered, require
 from hsv.design.verification.quick import QUICK

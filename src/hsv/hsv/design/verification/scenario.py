@@ -35,7 +35,7 @@ def scenario_claims(
     """
     if scenario.controller != "tube_mpc":
         raise DesignError(f"scenario {scenario.name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
-    parts = assemble_flight(scenario, subject.design.to_parameters())
+    parts = assemble_flight(scenario, subject.design)
     found, model = certified_set(subject), channel_model(subject.design, subject.vehicle)
     flown: list[FlightEvidence] = []
     for corner in over:

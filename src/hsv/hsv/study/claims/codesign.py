@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.inputs import DesignInputs, inputs_from_report
 from hsv.design.lmi import spectral_radii

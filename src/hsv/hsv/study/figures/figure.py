@@ -9,7 +9,8 @@ from typing import Any, Protocol
 
 from matplotlib.figure import Figure
 
-from hsv.control.design_file import ControlDesign, find_design, read_design
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design
 from hsv.design.certificate import certificate_path, read_certificate
 from hsv.simulation.metrics import FlightData
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import hadamard
 
-from hsv.control.design_file import ControlDesign, find_design, read_parameters
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection, flown_sections
 from hsv.design.region import Corner
 from hsv.simulation.assembly import assemble_flight, scenario_parameters

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign, find_design, read_design, write_design
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design, write_design
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.simulation.scenario import load_scenario
@@ -16,7 +17,7 @@ from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_l
 from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, package_digest
+from hsv.study.sources import DIGITS, code_digest, digest_of, kept, package_digest
 from hsv.units import to_paper
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -117,15 +118,15 @@ def _design(period: float, folder: Path, progress: Progress) -> ControlDesign:
     parts = source.read_text(encoding="utf-8"), code_digest(), package_digest("design"), str(period)
     digest = digest_of(part.encode() for part in parts)
     path = folder / f"design_{1e3 * period:.0f}ms_{digest[:DIGITS]}.yaml"
-    if not path.is_file():
-        folder.mkdir(parents=True, exist_ok=True)
+
+    def made() -> ControlDesign:
         changed = inputs.model_copy(update={"model": inputs.model.model_copy(update={"period": period})})
-        design = design_gains(
+        return design_gains(
             changed, lambda what, done, of: progress(f"design at {period:g} s: {what}", done, of)
         ).design
-        write_design(path, design, f"The baseline's gains at a period of {period:g} s, for hsv study sampling.")
-        drop_older(path)
-    return read_design(path)
+
+    comment = f"The baseline's gains at a period of {period:g} s, for hsv study sampling."
+    return kept(path, made, lambda new, design: write_design(new, design, comment), read_design)
 
 
 STUDY = Study("sampling", "Sampling period", run)

@@ -15,15 +15,7 @@ from hsv.study.corner_flights import fly_over
 from hsv.study.sensitivity.controllers import Controller
 from hsv.study.sensitivity.strip import Strip, strip
 from hsv.study.sensitivity.study import Progress
-from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, file_bytes
-
-_MEASURING = (
-    "study/corner_flights.py",
-    "study/measures.py",
-    "study/sensitivity/strip.py",
-    "campaign/tube_levels.py",
-)
-"""What is measured hangs on these beside what the flights hang on."""
+from hsv.study.sources import DIGITS, code_digest, digest_of, kept, measuring_code
 
 _HALF_WIDTH = np.ones(5)
 """The strips use no measure that weighs rigid errors against each other."""
@@ -51,17 +43,16 @@ def sweep(
     total, done = sum(map(len, along.values())), 0
     strips = {}
     for number, (controller, points) in enumerate(along.items()):
-        path = folder / f"strip_{name}_{number}_{_digest(points)[:DIGITS]}.json"
-        if controller.kept and path.is_file():
-            strips[controller] = json.loads(path.read_text(encoding="utf-8"))
-        else:
+
+        def flown(points: Sequence[Point] = points, before: int = done) -> Strip:
             tables = []
             for index, point in enumerate(points):
-                progress(f"{name}, flights", done + index, total)
+                progress(f"{name}, flights", before + index, total)
                 tables.append(fly_over(dict(point.values), point.over, _HALF_WIDTH))
-            strips[controller] = strip(tables)
-            if controller.kept:
-                _keep(path, strips[controller])
+            return strip(tables)
+
+        path = folder / f"strip_{name}_{number}_{_digest(points)[:DIGITS]}.json"
+        strips[controller] = kept(path, flown, _save, _load) if controller.kept else flown()
         done += len(points)
     progress(f"{name}, flights", total, total)
     return strips
@@ -70,12 +61,13 @@ def sweep(
 def _digest(points: Sequence[Point]) -> str:
     flown = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
     text = json.dumps(flown, sort_keys=True, default=np.ndarray.tolist)
-    return digest_of([text.encode(), code_digest().encode(), *map(file_bytes, _MEASURING)])
+    return digest_of([text.encode(), code_digest().encode(), *measuring_code(strip.__module__)])
 
 
-def _keep(path: Path, columns: Strip) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    new = path.with_suffix(".tmp")
-    new.write_text(json.dumps(columns), encoding="utf-8")
-    new.rename(path)
-    drop_older(path)
+def _save(path: Path, columns: Strip) -> None:
+    path.write_text(json.dumps(columns), encoding="utf-8")
+
+
+def _load(path: Path) -> Strip:
+    columns: Strip = json.loads(path.read_text(encoding="utf-8"))
+    return columns

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign, find_design, read_design
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import disturbance_columns, nominal_family, nominal_problem, with_family
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs, InputSize, RigidScale, find_inputs, read_inputs
