@@ -261,79 +261,79 @@ def measure(
     for back in range(N_STATES):
         i = N_STATES - 1 - back  # the error of the pitch angle is known before the angle of attack's
         if data.on[i]:
-            error = _error(data, state[i], i, step, seed)
+            error = _error(data, state, i, step, seed)
             if i == PITCH:
                 pitch_error = error
             elif i == ALPHA and data.inertial_angle_of_attack:
                 error += pitch_error
-            measurement[i] = _sampled(data, state[i], i, step, seed, x[i], error)
+            measurement[i] = _sampled(data, state, i, step, seed, x[i], error)
         else:
             measurement[i] = x[i]
     if failing > 0:
         for j in range(len(rows.start)):
             if memory[j, ACTING] == 1.0:
                 i = rows.channel[j]
-                measurement[i] = _failed(rows, memory[j], j, step, seed, measurement[i], state[i, GIVEN])
+                measurement[i] = _failed(rows, memory, j, step, seed, measurement[i], state[i, GIVEN])
     for i in range(N_STATES):
         state[i, GIVEN] = measurement[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _error(data: Any, state: np.ndarray, i: int, step: int, seed: int) -> float:
     """Return bias and noise of a step; draw what is drawn once in step 0."""
     if step == 0:
         first, second = normals(seed, 0, _CONSTANTS + i)
-        state[BIAS] = data.bias[i] + data.bias_sigma[i] * first
-        state[SCALE] = data.scale[i] + data.scale_sigma[i] * second
-        state[WALK] = 0.0
-    error = state[BIAS]
+        state[i, BIAS] = data.bias[i] + data.bias_sigma[i] * first
+        state[i, SCALE] = data.scale[i] + data.scale_sigma[i] * second
+        state[i, WALK] = 0.0
+    error = state[i, BIAS]
     if data.noise[i] > 0.0 or data.drift_sigma[i] > 0.0:
         white, driving = normals(seed, step, _NOISE + i)
         error += data.noise[i] * white
         if data.drift_sigma[i] > 0.0:
             decay = data.drift_decay[i]
             if step == 0:
-                state[DRIFT] = data.drift_sigma[i] * driving
+                state[i, DRIFT] = data.drift_sigma[i] * driving
             else:
                 share = np.sqrt(max(1.0 - decay * decay, 0.0))
-                state[DRIFT] = decay * state[DRIFT] + data.drift_sigma[i] * share * driving
-            error += state[DRIFT]
+                state[i, DRIFT] = decay * state[i, DRIFT] + data.drift_sigma[i] * share * driving
+            error += state[i, DRIFT]
     if data.walk[i] > 0.0 and step > 0:
         driving, _ = normals(seed, step, _NOISE + i, 1)
-        state[WALK] += data.walk[i] * driving
-    return error + state[WALK]
+        state[i, WALK] += data.walk[i] * driving
+    return error + state[i, WALK]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: float, error: float) -> float:
     """Return the measurement of a sensor that works."""
-    true = (1.0 + state[SCALE]) * x
-    state[LAGGED] = true if step == 0 else true + data.lag_decay[i] * (state[LAGGED] - true)
-    value = state[LAGGED] + error
+    true = (1.0 + state[i, SCALE]) * x
+    state[i, LAGGED] = true if step == 0 else true + data.lag_decay[i] * (state[i, LAGGED] - true)
+    value = state[i, LAGGED] + error
     if data.latency[i] > 0:
         size = data.latency[i] + 1
         if step == 0:
             for j in range(size):
-                state[QUEUE + j] = value
-        state[QUEUE + step % size] = value
-        value = state[QUEUE + (step + 1) % size]
+                state[i, QUEUE + j] = value
+        state[i, QUEUE + step % size] = value
+        value = state[i, QUEUE + (step + 1) % size]
     if data.drop_out[i] > 0.0 and step > 0:
         drawn, _ = uniforms(seed, step, _DROP_OUT + i)
         if drawn < data.drop_out[i]:
-            state[AGE] += 1.0
-            return state[HELD]
-        state[AGE] = 0.0
+            state[i, AGE] += 1.0
+            return state[i, HELD]
+        state[i, AGE] = 0.0
     if data.quantum[i] > 0.0:
         value = data.quantum[i] * float(math.floor(value / data.quantum[i] + 0.5))
-    state[HELD] = min(max(value, data.minimum[i]), data.maximum[i])
-    return state[HELD]
+    state[i, HELD] = min(max(value, data.minimum[i]), data.maximum[i])
+    return state[i, HELD]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _failed(rows: Any, memory: np.ndarray, j: int, step: int, seed: int, value: float, given: float) -> float:
     """Return what becomes of a measurement; ``given`` is the one of the step before."""
     code, first = rows.code[j], rows.parameters[j, 0]
-    fresh = memory[ONSET] == step
+    fresh = memory[j, ONSET] == step
     if code == SENSOR_SCALE:
         return first * value
     if code == SENSOR_NOISE:
@@ -346,13 +346,13 @@ def _failed(rows: Any, memory: np.ndarray, j: int, step: int, seed: int, value: 
         return value + min(max(first * ((step - rows.start[j]) * rows.period), -limit), limit)
     if code == SENSOR_DROP_OUT:
         if fresh:
-            memory[KEPT] = given if step > 0 else value
+            memory[j, KEPT] = given if step > 0 else value
         drawn, _ = uniforms(seed, step, _FAULT_DROP_OUT + rows.channel[j], rows.start[j])
         if drawn >= first:
-            memory[KEPT] = value
-        return memory[KEPT]
+            memory[j, KEPT] = value
+        return memory[j, KEPT]
     if code == SENSOR_FREEZE:
         if fresh:
-            memory[KEPT] = value
-        return memory[KEPT]
+            memory[j, KEPT] = value
+        return memory[j, KEPT]
     return value

@@ -69,15 +69,14 @@ def move_effectors(
         slowed = False
         for i in range(n):
             if memory[i, ACTING] == 1.0 and rows.channel[i] == channel:
-                values = rows.parameters[i]
-                if rows.code[i] == BANDWIDTH and values[0] < frequency:
-                    frequency = values[0]
+                if rows.code[i] == BANDWIDTH and rows.parameters[i, 0] < frequency:
+                    frequency = rows.parameters[i, 0]
                     order = max(order, 1)
                     slowed = True
                 elif rows.code[i] == RATE_LIMIT:
-                    rate = min(rate, values[0])
+                    rate = min(rate, rows.parameters[i, 0])
                 elif rows.code[i] == STOP_LIMIT:
-                    minimum, maximum = max(minimum, values[0]), min(maximum, values[1])
+                    minimum, maximum = max(minimum, rows.parameters[i, 0]), min(maximum, rows.parameters[i, 1])
         if slowed:
             map = actuator_map(order, frequency, damping, data.substep)
         after, speed, position = actuator_step(
@@ -99,7 +98,7 @@ def move_effectors(
                     memory[i, KEPT] = effector[channel]
                 if rows.code[i] >= LOCK:
                     replaced = rows.code[i] != FLOAT
-                position = _deflected(rows, memory[i], i, step, middle, angle_of_attack, position)
+                position = _deflected(rows, memory, i, step, middle, angle_of_attack, position)
         position = min(max(position, data.minimum[channel]), data.maximum[channel])
         if replaced:  # the actuator itself is held, and goes on from there when it is free
             after, speed = position, 0.0
@@ -107,29 +106,29 @@ def move_effectors(
         effector[channel] = position
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _deflected(rows: Any, memory: np.ndarray, i: int, step: int, middle: float, alpha: float, position: float) -> float:
     """Return what the effector does, ``position`` without this fault, ``middle`` s after the beginning of ``step``."""
-    code, values = rows.code[i], rows.parameters[i]
+    code = rows.code[i]
     elapsed = (step - rows.start[i]) * rows.period + middle
     if code == SCALE:
-        return values[0] * position
+        return rows.parameters[i, 0] * position
     if code == BIAS:
-        return position + values[0]
+        return position + rows.parameters[i, 0]
     if code == DRIFT:
-        return position + min(max(values[0] * elapsed, -values[1]), values[1])
+        return position + min(max(rows.parameters[i, 0] * elapsed, -rows.parameters[i, 1]), rows.parameters[i, 1])
     if code in (OSCILLATION, SOLID_OSCILLATION):
-        turns = values[1] * elapsed
-        wave = values[0] * sine(_TWO_PI * (turns - math.floor(turns)) + values[2])
-        return (position if code == OSCILLATION else memory[KEPT]) + wave
+        turns = rows.parameters[i, 1] * elapsed
+        wave = rows.parameters[i, 0] * sine(_TWO_PI * (turns - math.floor(turns)) + rows.parameters[i, 2])
+        return (position if code == OSCILLATION else memory[i, KEPT]) + wave
     if code == LOCK:
-        return memory[KEPT]
+        return memory[i, KEPT]
     if code == LOCK_AT:
-        return values[0]
+        return rows.parameters[i, 0]
     if code == FLOAT:
-        return -values[0] * alpha
+        return -rows.parameters[i, 0] * alpha
     if code == HARD_OVER:
-        return memory[KEPT] + values[0] * ((step - memory[ONSET]) * rows.period + middle)
+        return memory[i, KEPT] + rows.parameters[i, 0] * ((step - memory[i, ONSET]) * rows.period + middle)
     return position
 
 

@@ -184,37 +184,37 @@ def apply_command_faults(
     for i in range(len(rows.start)):
         if memory[i, ACTING] == 1.0:
             channel = rows.channel[i]
-            actuator[channel] = _commanded(rows, memory[i], i, step, actuator[channel])
+            actuator[channel] = _commanded(rows, memory, i, step, actuator[channel])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _commanded(rows: Any, memory: np.ndarray, i: int, step: int, command: float) -> float:
     code, value = rows.code[i], rows.parameters[i, 0]
-    fresh = memory[ONSET] == step
+    fresh = memory[i, ONSET] == step
     if fresh:
-        memory[KEPT] = command
+        memory[i, KEPT] = command
     if code == LOSS:
         ramp, elapsed = rows.parameters[i, 1], (step - rows.start[i]) * rows.period
         if elapsed < ramp:
             value = 1.0 + (value - 1.0) * (elapsed / ramp)
         return value * command
     if code == REVERSAL:
-        return 2.0 * value * memory[KEPT] - command
+        return 2.0 * value * memory[i, KEPT] - command
     if code == DELAY:
         size = int(value) + 1
         if fresh:
             for j in range(size):
-                memory[QUEUE + j] = command
-        memory[QUEUE + step % size] = command
-        return memory[QUEUE + (step + 1) % size]
+                memory[i, QUEUE + j] = command
+        memory[i, QUEUE + step % size] = command
+        return memory[i, QUEUE + (step + 1) % size]
     if code == DEAD_ZONE:
-        off = command - memory[KEPT]
+        off = command - memory[i, KEPT]
         if abs(off) <= 0.5 * value:
-            return memory[KEPT]
+            return memory[i, KEPT]
         return command - 0.5 * value if off > 0.0 else command + 0.5 * value
     if code == BACKLASH:
-        memory[KEPT] = min(max(memory[KEPT], command - 0.5 * value), command + 0.5 * value)
-        return memory[KEPT]
+        memory[i, KEPT] = min(max(memory[i, KEPT], command - 0.5 * value), command + 0.5 * value)
+        return memory[i, KEPT]
     return command
 
 
@@ -250,9 +250,7 @@ def apply_engine_faults(
     for i in range(len(rows.start)):
         if memory[i, ACTING] == 1.0:
             values = rows.parameters[i]
-            if rows.code[i] == UNSTART_OUTSIDE and not _unstarted(
-                rows, memory[i], i, step, angle_of_attack, mach, fuel
-            ):
+            if rows.code[i] == UNSTART_OUTSIDE and not _unstarted(rows, memory, i, step, angle_of_attack, mach, fuel):
                 continue
             engine[0] *= values[0]
             if rows.code[i] != THRUST_LOSS:
@@ -260,20 +258,20 @@ def apply_engine_faults(
                 engine[3] = values[3] + values[4] * angle_of_attack
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def _unstarted(rows: Any, memory: np.ndarray, i: int, step: int, alpha: float, mach: float, fuel: float) -> bool:
     """Tell whether the inlet is unstarted; KEPT says that it was, SINCE from which step on."""
     values = rows.parameters[i]
-    if memory[ONSET] == step:
-        memory[KEPT] = 0.0
+    if memory[i, ONSET] == step:
+        memory[i, KEPT] = 0.0
     off_alpha, off_mach = (alpha - values[5]) / values[6], (mach - values[7]) / values[8]
     distance, limit = off_alpha * off_alpha + off_mach * off_mach, values[9]
-    if memory[KEPT] == 0.0:
+    if memory[i, KEPT] == 0.0:
         if distance > 1.0 or fuel > limit:
-            memory[KEPT], memory[SINCE] = 1.0, step
+            memory[i, KEPT], memory[i, SINCE] = 1.0, step
     else:
         regained = 1.0 - values[10]
-        long_enough = (step - memory[SINCE]) * rows.period >= values[11]
+        long_enough = (step - memory[i, SINCE]) * rows.period >= values[11]
         if long_enough and distance < regained * regained and fuel < regained * limit:
-            memory[KEPT] = 0.0
-    return memory[KEPT] == 1.0
+            memory[i, KEPT] = 0.0
+    return memory[i, KEPT] == 1.0

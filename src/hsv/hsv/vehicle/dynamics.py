@@ -74,10 +74,15 @@ def forces(x: Any, u: Any, p: Any) -> Any:
 
 @njit(cache=True, error_model="numpy")
 def air_relative(velocity: Any, path_angle: Any, wind_x: float, wind_z: float) -> Any:
-    """Return speed (m/s) and path angle (rad) relative to air that moves at ``wind_x`` forward, ``wind_z`` up (m/s)."""
+    """Return speed (m/s) relative to moving air, turn (rad) of its path from the inertial one, its sine and cosine.
+
+    That is V_a and e = gamma_a - gamma for air that moves at ``wind_x`` forward and ``wind_z`` up (m/s).
+    """
     sin, cos = sine_cosine(path_angle)
-    forward, up = velocity * cos - wind_x, velocity * sin - wind_z
-    return np.sqrt(forward * forward + up * up), arctangent2(up, forward)
+    along = velocity - (wind_x * cos + wind_z * sin)
+    across = wind_x * sin - wind_z * cos
+    speed = np.sqrt(along * along + across * across)
+    return speed, arctangent2(across, along), across / speed, along / speed
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,9 +98,8 @@ def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
         u: Input (2).
         p: Parameters.
     """
-    path_angle = x[3] - x[2]
-    speed, air_angle = air_relative(x[1], path_angle, conditions[0], conditions[1])
-    alpha = x[3] - air_angle
+    speed, turn, sin, cos = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
+    alpha = x[2] - turn
     lift, drag, thrust, moment, pressure = forces((x[0], speed, alpha), u, p)
     moment = conditions[2] * (
         moment - p.thrust_moment_arm * thrust + pressure * p.reference_area * p.mean_aerodynamic_chord * conditions[6]
@@ -103,7 +107,6 @@ def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
     thrust *= conditions[3]
     lift *= conditions[2] * conditions[4]
     drag *= conditions[2] * conditions[5]
-    sin, cos = sine_cosine(air_angle - path_angle)
     return (
         lift * cos - drag * sin,
         drag * cos + lift * sin,
