@@ -44,6 +44,7 @@ ON_THE_PATH = (
     "control/adjustable.py",
     "control/controller.py",
     "control/controllers.py",
+    "control/estimator.py",
     "control/nominal_law.py",
     "control/nominal_trajectory.py",
     "control/notch_filter.py",

@@ -1,0 +1,107 @@
+"""The estimator against the Riccati equation as scipy solves it, and in flight on noise that it was made for."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import expm, solve_discrete_are
+
+from hsv.control.estimator import ESTIMATOR_PARAMETERS, estimate_step, estimator_data, steady_gain, transition
+from hsv.errors import ParameterError
+from hsv.faults.laws import fault_memory, fault_rows
+from hsv.faults.table import SENSOR
+from hsv.sensors import measure, sensor_data, sensor_state
+from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.trim import trim
+from hsv.vehicle.vehicle import load_vehicle
+
+T = 0.02
+VEHICLE = load_vehicle().coupled()
+START = trim(VEHICLE, 26060.4, 2407.92)
+A, B = jacobian(START.state, START.input, VEHICLE)
+SENSORS = sensor_data({"sensors.set": "ghv"}, T)
+PROCESS = np.array(ESTIMATOR_PARAMETERS[2].default)
+
+
+@pytest.fixture(scope="module")
+def estimator():
+    return estimator_data({}, SENSORS.noise, VEHICLE, START, T)
+
+
+def test_transition_is_the_matrix_exponential():
+    whole = np.zeros((11, 11))
+    whole[:9, :9], whole[:9, 9:] = A, B
+    assert_allclose(transition(A, B, T), expm(whole * T), rtol=1e-9, atol=1e-12)
+
+
+def test_gain_solves_the_riccati_equation(estimator):
+    whole = np.zeros((11, 11))
+    whole[:9, :9], whole[:9, 9:] = A, B
+    F, H = expm(whole * T), np.eye(11)[:5]
+    Q, R = np.diag((PROCESS * np.sqrt(T)) ** 2), np.diag(SENSORS.noise[:5] ** 2)
+    M = solve_discrete_are(F.T, H.T, Q, R)
+    expected = M @ H.T @ np.linalg.inv(H @ M @ H.T + R)
+    scale = np.abs(expected).max(axis=0)
+    assert_allclose(estimator.gain / scale, expected / scale, atol=1e-6)
+    # The error of the estimate dies out.
+    assert np.abs(np.linalg.eigvals((np.eye(11) - estimator.gain @ H) @ F)).max() < 0.9999
+
+
+def test_scalar_gain_is_the_textbooks():
+    # A random walk measured in noise: p+ = p + q, k = p+ / (p+ + r), whose steady p+ is q / 2 + sqrt(q^2 / 4 + q r).
+    q, r = 0.3, 2.0
+    gain, _ = steady_gain(np.zeros((1, 1)), np.zeros((1, 0)), 1.0, np.sqrt(np.array([q])), np.sqrt(np.array([r])))
+    p = 0.5 * q + np.sqrt(0.25 * q * q + q * r)
+    assert gain[0, 0] == pytest.approx(p / (p + r), rel=1e-9)
+
+
+def flown(estimator, measured, seconds=20.0, offset=0.0):
+    """Return truth and estimate of a flight about the trim, its elevator off by a constant that no one knows."""
+    rows = fault_rows([SENSOR], [], T)
+    memory, sensors, work = fault_memory(rows), sensor_state(), np.empty((4, 9))
+    x, y, state, estimate = START.state.copy(), np.empty(9), np.zeros(11), np.empty(9)
+    command, truth, found = START.input.copy(), [], []
+    for k in range(round(seconds / T)):
+        measure(measured, sensors, rows, memory, k, 3, x, y)
+        estimate_step(estimator, state, k, y, command, work, estimate)
+        truth.append(x.copy())
+        found.append(estimate.copy())
+        # A feedback that holds the unstable vehicle, on the truth.
+        turn = -1.0 * (x[2] - START.state[2]) + 1.5 * (x[3] - START.state[3]) + 0.8 * x[4]
+        command = START.input + np.array([0.0, turn])
+        advance(x, command + np.array([0.0, offset]), VEHICLE, T, 2, workspace())
+    return np.array(truth), np.array(found), state
+
+
+def test_of_a_perfect_measurement_the_estimate_is_the_truth(estimator):
+    truth, found, _ = flown(estimator, sensor_data({}, T))
+    assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
+
+
+def test_noise_falls_to_a_fraction_of_the_sensors(estimator):
+    truth, found, _ = flown(estimator, SENSORS, 60.0)
+    error = (found - truth)[500:, :5].std(axis=0) / SENSORS.noise[:5]
+    assert error.max() < 0.5 and error[2:4].max() < 0.3
+
+
+def test_an_offset_of_the_elevator_is_found(estimator):
+    _, _, state = flown(estimator, sensor_data({}, T), offset=0.01)
+    assert state[10] == pytest.approx(0.01, rel=0.05)
+
+
+def test_it_is_a_function_of_what_it_is_given(estimator):
+    for one, other in zip(flown(estimator, SENSORS, 2.0), flown(estimator, SENSORS, 2.0), strict=True):
+        assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("values", "noise", "message"),
+    [
+        ({}, np.zeros(9), "estimator.noise = .*: expected 5 numbers above 0"),
+        ({"estimator.noise": [1.0, 2.0]}, np.ones(9), "estimator.noise = .*: expected 5 numbers above 0"),
+        ({"estimator.process": [1.0]}, np.ones(9), "estimator.process = .*: expected 11 numbers above 0"),
+    ],
+)
+def test_what_is_no_estimator_is_refused(values, noise, message):
+    with pytest.raises(ParameterError, match=message):
+        estimator_data(values, noise, VEHICLE, START, T)
