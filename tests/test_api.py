@@ -16,7 +16,7 @@ SHORT = {"duration": "6 s", "fault[0].start": "3 s"}
 
 
 def test_a_changed_scenario_is_flown_measured_and_drawn(tmp_path):
-    flight = hsv.fly(hsv.load("case1", SHORT | {"vehicle.perturbation.mass": "+5 %", "fault[0].value": 0.8}))
+    flight = hsv.fly(hsv.load("case1", SHORT | {"vehicle.perturbation.mass": "+5 %", "fault[0].effectiveness": 0.8}))
     assert flight.time[-1] == 6.0 and flight.fault_start == 3.0
     np.testing.assert_array_equal(flight.history.actuator[150:, 1], 0.8 * flight.history.command[150:, 1])
     assert flight.metrics["altitude_error_maximum"] == pytest.approx(182.88, rel=1e-3)
@@ -31,7 +31,7 @@ def test_a_shipped_scenario_flies_as_published(given):
 
 
 def test_flights_are_compared_and_swept():
-    flights = hsv.sweep("case1", "fault[0].value", [1.0, 0.7], SHORT)
+    flights = hsv.sweep("case1", "fault[0].effectiveness", [1.0, 0.7], SHORT)
     assert [*flights] == [1.0, 0.7]
     table = hsv.compare({"whole": flights[1.0], "lost": flights[0.7]})
     deviation = table["post_fault_attitude_deviation"]
@@ -43,8 +43,8 @@ def test_flights_are_compared_and_swept():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"fault[1].value": 0.8}, r"scenario 'case1': fault\[1\].value: no such field"),
-        ({"fault.value": 0.8}, r"scenario 'case1': fault.value: no such field"),
+        ({"fault[1].start": 0.8}, r"scenario 'case1': fault\[1\].start: no such field"),
+        ({"fault.start": 0.8}, r"scenario 'case1': fault.start: no such field"),
         ({"duration.x": 0.8}, r"scenario 'case1': duration.x: no such field"),
         ({"durations": "3 s"}, r"scenario 'case1': durations: unknown key"),
         ({"vehicle.mass": "3 %"}, r"scenario 'case1': vehicle.mass: unknown key"),

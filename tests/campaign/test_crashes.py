@@ -37,8 +37,8 @@ def fly(tmp_path_factory):
 
     def fly(name, settings, samples):
         (folder / f"{name}.toml").write_text(SCENARIO.format(settings=settings))
-        altitudes = (25950.0, 26350.0)
-        campaign = plan(str(folder / f"{name}.toml"), samples=samples, scale=0.0, initial_altitude=altitudes)
+        altitudes = {"initial.altitude": ("25950 m", "26350 m")}
+        campaign = plan(str(folder / f"{name}.toml"), samples=samples, scale=0.0, factors=altitudes)
         out = folder / f"{name}.parquet"
         run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
         return Results(out, trust=True)
@@ -48,7 +48,7 @@ def fly(tmp_path_factory):
 
 def test_a_flight_that_crashes_is_recorded_and_the_others_are_flown(fly, tmp_path):
     good = fly("good", "", 34)
-    altitudes = good.column("sample_initial_altitude")
+    altitudes = good.column("sample_initial.altitude")
     *_, second, highest = np.sort(altitudes)
     crashed = fly("crashed", f'crash_above = "{(second + highest) / 2.0} m"', 34)
     [flight] = np.flatnonzero(crashed.crashed)

@@ -32,7 +32,7 @@ zero_damping = { uniform = [0.04, 0.06] }
 [[fault]]
 channel = "elevator_deflection"
 type = "loss_of_effectiveness"
-value = { uniform = [0.8, 1.0] }
+effectiveness = { uniform = [0.8, 1.0] }
 start = "2 s"
 [limits]
 """
@@ -55,12 +55,12 @@ def flown(scenario, tmp_path_factory):
 
 def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
     own = {"initial.velocity", "command[0].altitude_change", "command[0].start", "integral.rate", "notch.zero_damping"}
-    assert {f.name for f in plan(scenario, scale=0.0).factors} == own | {"mass", "fault[0].value"}
-    everything = {f.name: f for f in plan(scenario, fault_value=(0.9, 1.0)).factors}
+    assert {f.name for f in plan(scenario, scale=0.0).factors} == own | {"mass", "fault[0].effectiveness"}
+    everything = {f.name: f for f in plan(scenario, factors={"fault[0].effectiveness": (0.9, 1.0)}).factors}
     assert len(everything) == 10 + len(own) + 1
     # What the file says of a parameter comes before the bounds of all, what the command says before both.
     assert (everything["mass"].kind, everything["mass"].high) == ("normal", 0.06)
-    assert everything["fault_value"].low == 0.9 and "fault[0].value" not in everything
+    assert everything["fault[0].effectiveness"].low == 0.9
 
 
 @pytest.mark.parametrize("flight", [0, 7, 19])
@@ -137,5 +137,5 @@ def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):
     path.write_text(text + 'velocity = "7900 ft/s"\n')
     campaign = plan(str(path), samples=2)
     sample = [factor.high for factor in campaign.factors]
-    assert campaign.flown(sample).vehicle.name == "stiffened"
-    assert campaign.flown(sample).vehicle.perturbation == {f.name: f.high for f in campaign.factors}
+    assert campaign.flown(0, sample).vehicle.name == "stiffened"
+    assert campaign.flown(0, sample).vehicle.perturbation == {f.name: f.high for f in campaign.factors}

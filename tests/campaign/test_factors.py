@@ -7,32 +7,34 @@ from hsv.errors import CampaignError, ScenarioError
 from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_names
 
 EVERYTHING = {
-    "fault_start": (1.0, 2.5),
-    "fault_value": (0.8, 1.0),
-    "initial_altitude": (26050.0, 26070.0),
-    "initial_velocity": (2400.0, 2415.0),
+    "factors": {
+        "fault[0].start": ("1 s", "2.5 s"),
+        "fault[0].effectiveness": (0.8, 1.0),
+        "initial.altitude": ("26050 m", "26070 m"),
+        "initial.velocity": ("2400 m/s", "2415 m/s"),
+    }
 }
 
 
 def test_a_written_scenario_reads_as_the_flight_that_was_flown_in_every_bit(planned):
     campaign = planned(samples=50, **EVERYTHING)
-    for sample in Sampler(campaign).draw(range(50))[0]:
-        flown = campaign.flown(sample)
-        assert parse_scenario(campaign.file(sample), flown.name) == flown
+    for flight, sample in enumerate(Sampler(campaign).draw(range(50))[0]):
+        flown = campaign.flown(flight, sample)
+        assert parse_scenario(campaign.file(flight, sample), flown.name) == flown
 
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_shipped_scenario_can_be_written(name):
     scenario, campaign = load_scenario(name), plan(name)
     values = scenario.vehicle.perturbation
-    written = parse_scenario(campaign.file([values.get(factor.name, 0.0) for factor in campaign.factors]), name)
-    assert written.parameters() == {**campaign.flown([0.0] * 10).parameters(), **scenario.parameters()}
+    written = parse_scenario(campaign.file(0, [values.get(factor.name, 0.0) for factor in campaign.factors]), name)
+    assert written.parameters() == {**campaign.flown(0, [0.0] * 10).parameters(), **scenario.parameters(), "seed": 10**7}
 
 
 def test_the_target_stays_where_it_is_when_the_start_moves(planned):
     campaign = planned(samples=50, **EVERYTHING)
-    for sample in Sampler(campaign).draw(range(50))[0]:
-        flown = campaign.flown(sample)
+    for flight, sample in enumerate(Sampler(campaign).draw(range(50))[0]):
+        flown = campaign.flown(flight, sample)
         assert flown.initial != campaign.scenario.initial
         for column, expected in zip(flown.commands, campaign.scenario.commands, strict=True):
             assert column == pytest.approx(expected, rel=1e-14)
@@ -55,10 +57,12 @@ def test_batches_cover_all_flights_once(planned):
 
 def test_what_a_scenario_does_not_admit_is_refused_before_anything_flies(planned, short):
     with pytest.raises(ScenarioError, match=r"initial\.altitude"):
-        planned(initial_altitude=(20000.0, 26000.0))
-    with pytest.raises(ScenarioError, match=r"fault\[0\]\.value"):
-        planned(fault_value=(0.5, 1.5))
-    with pytest.raises(CampaignError, match="increases"):
-        planned(fault_start=(3.0, 2.0))
+        planned(factors={"initial.altitude": ("20000 m", "26000 m")})
+    with pytest.raises(ScenarioError, match=r"fault.*effectiveness"):
+        planned(factors={"fault[0].effectiveness": (0.5, 1.5)})
+    with pytest.raises(ScenarioError, match=r"fault\[0\]\.start = .*: expected"):
+        planned(factors={"fault[0].start": ("3 s", "2 s")})
+    with pytest.raises(ScenarioError, match=r"fault\[3\]\.start: no such field"):
+        planned(factors={"fault[3].start": ("1 s", "2 s")})
     with pytest.raises(CampaignError, match="varies"):
         plan(short, scale=0.0)

@@ -19,7 +19,7 @@ BOUNDS = np.array(list(load_vehicle().uncertainty.values()))
 
 
 def test_uniform_samples_lie_within_the_bounds_and_fill_them(planned):
-    samples, _ = draw(planned(samples=2000, fault_start=None))
+    samples, _ = draw(planned(samples=2000, factors={}))
     assert np.all(np.abs(samples) <= BOUNDS)
     assert np.all(np.ptp(samples, axis=0) > 1.95 * BOUNDS)
     assert np.all(np.abs(samples.mean(axis=0)) < 0.1 * BOUNDS)
@@ -55,7 +55,7 @@ DIGESTS = {
 @pytest.mark.parametrize("method", METHODS)
 def test_samples_stay_what_they_were_in_every_bit(method):
     # A campaign begun with an earlier version, and the replay of one of its flights, draw the same.
-    campaign = plan("case1", method=method, samples=64, seed=7, fault_start=(90.0, 110.0))
+    campaign = plan("case1", method=method, samples=64, seed=7, factors={"fault[0].start": ("90 s", "110 s")})
     drawn = tuple(hashlib.sha256(array.tobytes()).hexdigest()[:16] for array in draw(campaign))
     assert drawn == DIGESTS[method]
 
@@ -80,7 +80,7 @@ def test_the_seed_determines_the_samples(planned, method):
 
 
 def test_corners_are_all_combinations_of_the_bounds_exactly(planned):
-    samples, _ = draw(planned(method="corners", fault_start=None))
+    samples, _ = draw(planned(method="corners", factors={}))
     assert samples.shape == (1024, 10)
     assert np.array_equal(np.abs(samples), np.broadcast_to(BOUNDS, samples.shape))
     assert len(np.unique(samples, axis=0)) == 1024
@@ -88,7 +88,7 @@ def test_corners_are_all_combinations_of_the_bounds_exactly(planned):
 
 def test_latin_hypercube_and_sobol_spread_more_evenly_than_chance(planned):
     def discrepancy(method):
-        samples, _ = draw(planned(samples=128, method=method, fault_start=None))
+        samples, _ = draw(planned(samples=128, method=method, factors={}))
         return qmc.discrepancy((samples / BOUNDS + 1.0) / 2.0)
 
     assert discrepancy("sobol") < discrepancy("latin_hypercube") < discrepancy("uniform")

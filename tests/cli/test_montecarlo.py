@@ -19,7 +19,7 @@ def campaign(hsv, tmp_path):
 
 
 def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path):
-    ran = campaign("--fault-start", "1 s", "2.5 s", "--json")
+    ran = campaign("--factor", "fault[0].start=1 s..2.5 s", "--json")
     values = ran.json
     assert ran.code == 0
     assert values["flown_now"] == 12

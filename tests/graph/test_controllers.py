@@ -24,7 +24,7 @@ def _shortened(processes: Processes, scenario: str, duration: float, fault: floa
     text = scenario_text(scenario).replace('"200 s"', f'"{duration} s"').replace('"100 s"', f'"{fault} s"')
     path = processes.folder / f"{scenario}.toml"
     text = re.sub(r"\[limits\]\n([^\[\n].*\n|\n)*", "", text)  # wherever it stands in the file
-    path.write_text(text.replace("value = 0.9", f"value = {value}"))
+    path.write_text(text.replace("effectiveness = 0.9", f"effectiveness = {value}"))
     return path
 
 

@@ -93,7 +93,7 @@ def test_envelope_and_uncertainty_are_those_of_the_vehicle(folder):
         load_scenario(path, {"vehicle.perturbation.gravity": "4 %"})
     with pytest.raises(ScenarioError, match=r"vehicle.perturbation.lift_alpha = 0.04: no such parameter"):
         load_scenario("case1", {"vehicle.perturbation.lift_alpha": "4 %"})
-    bounds = {factor.name: factor.high for factor in factors_of(tomllib.loads(scenario_text(path)), "flight", 1.0, {})}
+    bounds = {factor.name: factor.high for factor in factors_of(tomllib.loads(scenario_text(path)), "flight", 1.0)}
     assert bounds["mass"] == 0.05 and bounds["thrust_moment_arm"] == 0.02 and bounds["lift_alpha"] == 0.04
 
 
@@ -101,9 +101,9 @@ def test_a_sampled_scenario_takes_its_vehicle_along(folder):
     table = tomllib.loads(scenario_text(str(folder / "flight.toml")))
     table["vehicle"]["coupling"] = {"uniform": [0.2, 0.65]}
     (folder / "mine.toml").unlink()
-    factors = factors_of(table, "flight", 1.0, {})
+    factors = factors_of(table, "flight", 1.0)
     for end, coupling in (("low", "0.2"), ("high", "0.65")):
-        text = tomli_w.dumps(flown_table(table, "flight", factors, [getattr(factor, end) for factor in factors]))
+        text = tomli_w.dumps(flown_table(table, "flight", factors, [getattr(factor, end) for factor in factors], 0))
         sampled = parse_scenario(text, "sampled").vehicle
         assert sampled.described.decoupled.mass == 4600.0 and sampled.coupling == coupling
         assert abs(sampled.perturbation["mass"]) == 0.05

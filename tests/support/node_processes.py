@@ -34,7 +34,7 @@ enabled = {notch}
 [[fault]]
 channel = "elevator_deflection"
 type = "loss_of_effectiveness"
-value = 0.9
+effectiveness = 0.9
 start = "{fault} s"
 """
 

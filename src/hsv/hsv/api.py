@@ -45,7 +45,7 @@ def sweep(
 
     Args:
         name: Name of a shipped scenario, or path.
-        field: What varies, as in a scenario file, for example ``"fault[0].value"``.
+        field: What varies, as in a scenario file, for example ``"fault[0].effectiveness"``.
         values: As written in a scenario file, with their units.
         changes: Further fields that differ from the file, the same in every flight.
 

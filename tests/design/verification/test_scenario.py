@@ -12,7 +12,7 @@ def test_a_flight_of_the_declared_region_keeps_to_the_certificate(subject):
 
 
 def test_a_fault_beyond_the_region_is_found_outside(subject):
-    scenario = parse_scenario(scenario_text("case1").replace("value = 0.9", "value = 0.7"), "worse")
+    scenario = parse_scenario(scenario_text("case1").replace("effectiveness = 0.9", "effectiveness = 0.7"), "worse")
     _, disturbance, room = scenario_claims(subject, scenario)
     assert not disturbance.ok and disturbance.value > 2.0 and "lost_elevator" in disturbance.name
     assert room.ok

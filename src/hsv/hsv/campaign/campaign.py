@@ -12,9 +12,10 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.campaign.factors import Factor, check_factors, factors_of, flown_scenario, flown_table
+from hsv.campaign.factors import Factor, check_factors, factors_of, flown_table, with_factors
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError
+from hsv.noise import SEED_PARAMETER
 from hsv.simulation.assembly import assemble, blamed_on, design_parameters, scenario_parameters
 from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_table, scenario_text
 
@@ -22,6 +23,10 @@ METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
 _BATCHES = 256
 _BATCH_LIMITS = (32, 256)
+
+MOST_SAMPLES = 10**7
+
+_SEEDS = int(SEED_PARAMETER.maximum) + 1
 
 _MOST = {"latin_hypercube": 10**6}
 """Samples at most, where fewer than by the other methods: each worker has to draw and keep a hypercube whole."""
@@ -56,22 +61,28 @@ class Campaign:
         """The scenario without any change, distributions at their means."""
         return scenario_at_means(self.table, self.scenario_name)[0]
 
-    def flown(self, sample: Sequence[float]) -> Scenario:
-        """Return the scenario of the flight with a sample (one value a factor).
+    def flown(self, flight: int, sample: Sequence[float]) -> Scenario:
+        """Return the scenario of a flight with its sample (one value a factor).
 
         Raises:
             ScenarioError: The scenario does not admit these values together.
         """
-        return flown_scenario(self.table, self.scenario_name, self.factors, sample)
+        return scenario_at_means(self._flown_table(flight, sample), self.scenario_name)[0]
 
-    def file(self, sample: Sequence[float], **replaced: str) -> str:
-        """Return the scenario of the flight with a sample as a file, with errors as above.
+    def file(self, flight: int, sample: Sequence[float], **replaced: str) -> str:
+        """Return the scenario of a flight with its sample as a file, with errors as above.
 
         Args:
+            flight: Its number.
             sample: One value a factor.
             replaced: Values to put in the place of the scenario's, by key.
         """
-        return tomli_w.dumps(flown_table(self.table, self.scenario_name, self.factors, sample) | replaced)
+        return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
+
+    def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
+        # A seed of its own for every flight, as the generator's key; flights of other campaigns have others.
+        seed = (self.seed * MOST_SAMPLES + flight) % _SEEDS
+        return flown_table(self.table, self.scenario_name, self.factors, sample, seed)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -142,9 +153,9 @@ def plan(
     seed: int = 1,
     scale: float = 1.0,
     commit: str = "unknown",
-    **ranges: tuple[float, float] | None,
+    factors: Mapping[str, tuple[object, object]] | None = None,
 ) -> Campaign:
-    """Return the campaign over the uncertain parameters of the paper's section 5.1, and over what ``ranges`` name.
+    """Return the campaign over the uncertain parameters of the paper's section 5.1, and over further ``factors``.
 
     Args:
         scenario_name: Shipped scenario or path of a TOML file.
@@ -153,7 +164,7 @@ def plan(
         seed: Determines all samples.
         scale: Factor on the bounds of the uncertain parameters; 0 leaves them alone.
         commit: Version of the program.
-        ranges: Least and largest value (SI) of further factors, see :data:`hsv.campaign.factors.OPTIONAL`.
+        factors: Least and largest value, as a file has them, by field of the scenario.
 
     Raises:
         CampaignError, ScenarioError, DesignError: Names the setting that is wrong.
@@ -161,13 +172,16 @@ def plan(
     text = scenario_text(scenario_name)
     name = Path(scenario_name).stem
     table = scenario_table(text, name)
+    if factors:
+        table = with_factors(table, name, factors)
+        text = tomli_w.dumps(table)
     scenario, _ = scenario_at_means(table, name)
-    factors = factors_of(table, name, scale, ranges)
+    found = factors_of(table, name, scale)
     if method not in METHODS:
         raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
     if method == "corners":
-        samples = 2 ** len(factors)
-    most = _MOST.get(method, 10**7)
+        samples = 2 ** len(found)
+    most = _MOST.get(method, MOST_SAMPLES)
     if not 1 <= samples <= most:
         raise CampaignError(f"samples = {samples}: expected 1 to {most}")
     if method == "sobol" and samples & (samples - 1):
@@ -176,7 +190,7 @@ def plan(
         raise CampaignError(f"seed = {seed}: expected 0 to 2^63 - 1")
     with blamed_on(scenario):
         design, library = design_parameters(scenario), library_digest(scenario.controller)
-    campaign = Campaign(name, text, design, method, samples, seed, factors, commit, library)
+    campaign = Campaign(name, text, design, method, samples, seed, found, commit, library)
     _check_ends(campaign)
     return campaign
 
@@ -185,8 +199,8 @@ def _check_ends(campaign: Campaign) -> None:
     """Refuse factors that the scenario does not admit at their ends, all at once or one by one, the others half-way."""
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
     for ends in (low, high):
-        flown = campaign.flown(ends)
+        flown = campaign.flown(0, ends)
         with blamed_on(flown):
             assemble({**campaign.design, **scenario_parameters(flown)})
         for index, value in enumerate(ends):
-            campaign.flown([*mean[:index], value, *mean[index + 1 :]])
+            campaign.flown(0, [*mean[:index], value, *mean[index + 1 :]])

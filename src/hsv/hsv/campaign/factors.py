@@ -13,16 +13,6 @@ from hsv.simulation.scenario import Scenario, scenario_at_means, set_field
 from hsv.units import rounded, written
 from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
-OPTIONAL = {
-    "fault_start": ("fault[0].start", "s"),
-    "initial_altitude": ("initial.altitude", "m"),
-    "initial_velocity": ("initial.velocity", "m/s"),
-}
-"""Factors of a campaign's own beside the uncertain parameters: field of the scenario, and SI unit.
-
-The commanded target does not move with the start.
-"""
-
 _PERTURBATION = "vehicle.perturbation."
 
 
@@ -31,25 +21,39 @@ class Factor(Distribution):
     """What is drawn for one field of the scenario; uncertain parameters are relative changes."""
 
     name: str
-    """Of an uncertain parameter, one of :data:`OPTIONAL`, or the field"""
+    """Of an uncertain parameter, or the field"""
 
     @property
     def field(self) -> str:
         """The field of the scenario."""
-        if self.name in OPTIONAL:
-            return OPTIONAL[self.name][0]
         return _PERTURBATION + self.name if self.name in COEFFICIENT_UNITS else self.name
 
 
-def factors_of(
-    table: Mapping[str, Any], name: str, scale: float, ranges: Mapping[str, tuple[float, float] | None]
-) -> tuple[Factor, ...]:
-    """Return the factors of a campaign over the scenario in ``table``; other arguments as for ``plan``.
+def with_factors(table: dict[str, Any], name: str, ranges: Mapping[str, tuple[object, object]]) -> dict[str, Any]:
+    """Return the scenario in ``table`` with a uniform distribution from least to largest value in each of some fields.
 
-    A distribution in the scenario takes the place of a parameter's bounds, and a range in ``ranges`` that of both.
+    Args:
+        table: A scenario as a file has it.
+        name: What it is called.
+        ranges: By field, values as a file has them.
 
     Raises:
-        CampaignError, ScenarioError: A range that is empty or that the scenario does not admit.
+        ScenarioError: There is no such field.
+    """
+    changed = copy.deepcopy(table)
+    for field, ends in ranges.items():
+        place = _PERTURBATION + field if field in COEFFICIENT_UNITS else field
+        set_field(changed, place, {"uniform": list(ends)}, name)
+    return changed
+
+
+def factors_of(table: Mapping[str, Any], name: str, scale: float) -> tuple[Factor, ...]:
+    """Return the factors of a campaign over the scenario in ``table``; ``scale`` as for ``plan``.
+
+    A distribution in the scenario takes the place of a parameter's bounds.
+
+    Raises:
+        CampaignError, ScenarioError: A range that the scenario does not admit, or nothing varies.
     """
     if not 0.0 <= scale <= 10.0:
         raise CampaignError(f"scale = {scale}: expected 0 to 10")
@@ -61,17 +65,6 @@ def factors_of(
         field: Factor(name=field.removeprefix(_PERTURBATION), **vars(distribution))
         for field, distribution in found.items()
     }
-    for option, limits in ranges.items():
-        if option not in OPTIONAL:
-            raise CampaignError(f"factor {option!r}: expected one of {', '.join(OPTIONAL)}")
-        if limits is None:
-            continue
-        if not limits[0] < limits[1]:
-            raise CampaignError(f"{option} from {limits[0]:.6g} to {limits[1]:.6g}: expected a range that increases")
-        if option.startswith("fault_") and len(scenario.fault) != 1:
-            raise CampaignError(f"{option}: the scenario has {len(scenario.fault)} faults, expected one")
-        field, unit = OPTIONAL[option]
-        factors[field] = Factor(name=option, unit=unit, low=rounded(limits[0]), high=rounded(limits[1]))
     if not factors:
         raise CampaignError("scale = 0, no other factor and no distribution: expected something that varies")
     return tuple(factors.values())
@@ -84,7 +77,7 @@ def check_factors(factors: Iterable[Factor], table: Mapping[str, Any], name: str
         CampaignError, ScenarioError: Names it.
     """
     scenario, drawn = scenario_at_means(dict(table), name)
-    known = (*scenario.vehicle.described.uncertainty, *OPTIONAL, *drawn)
+    known = (*scenario.vehicle.described.uncertainty, *drawn)
     for factor in factors:
         if factor.name not in known:
             raise CampaignError(f"factor {factor.name!r}: expected one of {', '.join(known)}")
@@ -93,18 +86,20 @@ def check_factors(factors: Iterable[Factor], table: Mapping[str, Any], name: str
 
 
 def flown_table(
-    table: Mapping[str, Any], name: str, factors: Sequence[Factor], sample: Sequence[float]
+    table: Mapping[str, Any], name: str, factors: Sequence[Factor], sample: Sequence[float], seed: int
 ) -> dict[str, Any]:
     """Return the scenario of a flight as a file has it: ``table`` with the values (one a factor) of its sample.
+
+    The commanded target does not move with the start. ``seed``: of what is random in the flight itself.
 
     Raises:
         ScenarioError: The scenario does not admit them together.
     """
-    flown = copy.deepcopy(dict(table))
+    flown = copy.deepcopy(dict(table)) | {"seed": seed}
     starts = {}
     for factor, value in zip(factors, sample, strict=True):
         set_field(flown, factor.field, written(float(value), factor.unit), name)
-        if factor.name.startswith("initial_"):
+        if factor.field.startswith("initial."):
             starts[factor.field.removeprefix("initial.")] = float(value)
     if starts:
         flown["command"] = _to_the_same_goals({**flown, "initial": table["initial"]}, name, starts)
@@ -125,12 +120,3 @@ def _to_the_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, fl
     step = {f"{axis}_change": written(change, units[axis]) for axis, change in changes.items()}
     later = [given for given, command in zip(table.get("command", ()), scenario.command, strict=True) if command.end]
     return [step, *later]
-
-
-def flown_scenario(table: Mapping[str, Any], name: str, factors: Sequence[Factor], sample: Sequence[float]) -> Scenario:
-    """Return the scenario of a flight, called ``name``: :func:`flown_table`, read.
-
-    Raises:
-        ScenarioError: The scenario does not admit these values together.
-    """
-    return scenario_at_means(flown_table(table, name, factors, sample), name)[0]

@@ -138,7 +138,7 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
         with suppress(ControllerError):
             flights["unchanged"] = runner.fly_unchanged()
         with suppress(ControllerError):
-            flights[f"flight {worst}"] = runner.fly(runner.sample(worst))
+            flights[f"flight {worst}"] = runner.fly(worst, runner.sample(worst))
     return {
         "time": _packed(time),
         "signals": [

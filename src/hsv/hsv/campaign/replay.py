@@ -43,7 +43,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     """
     row, runner = results.row(flight), results.sample_runner
     try:
-        flown = runner.fly(runner.sample(flight))
+        flown = runner.fly(flight, runner.sample(flight))
         repeated = runner.outcome(flown.data(), flown.fingerprint)
     except ControllerError as error:
         repeated = runner.crashed(error)

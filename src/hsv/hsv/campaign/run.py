@@ -73,7 +73,7 @@ def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
         runner.outcome(flown.data(), flown.fingerprint)
     started = time.perf_counter()
     with suppress(ControllerError):
-        flown = runner.fly(runner.sample(0))
+        flown = runner.fly(0, runner.sample(0))
         runner.outcome(flown.data(), flown.fingerprint)
     seconds = time.perf_counter() - started
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.

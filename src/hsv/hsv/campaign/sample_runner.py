@@ -55,10 +55,10 @@ class SampleRunner:
         [sample], _ = self.sampler.draw(range(flight, flight + 1))
         return list(sample.tolist())
 
-    def fly(self, sample: Sequence[float]) -> Flight:
-        """Fly a sample (one value a factor)."""
+    def fly(self, flight: int, sample: Sequence[float]) -> Flight:
+        """Fly a flight with its sample (one value a factor)."""
         parts = self._parts
-        values = {**self.campaign.design, **scenario_parameters(self.campaign.flown(sample))}
+        values = {**self.campaign.design, **scenario_parameters(self.campaign.flown(flight, sample))}
         names = values.keys() | self._nominal.keys()
         changed = [name for name in names if values.get(name) != self._nominal.get(name)]
         if not all(name.startswith(self._kept_for) for name in changed):

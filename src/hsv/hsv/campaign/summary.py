@@ -132,7 +132,7 @@ class Results:
 
     def file(self, flight: int, **replaced: str) -> str:
         """Return the scenario of a flight as a file, with values ``replaced`` by key; errors as :meth:`row`."""
-        return self.campaign.file(list(self.sample(flight).values()), **replaced)
+        return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
 
     def _read(self, **what: Any) -> pa.Table:
         try:

@@ -60,7 +60,7 @@ def _flown_here(text: str, batch: int) -> bytes:
     flights = campaign.flights(batch)
     for flight, sample, seed in zip(flights, *runner.sampler.draw(flights), strict=True):
         try:
-            flown = runner.fly(sample)
+            flown = runner.fly(flight, sample)
             data = flown.data()
             envelope.add(data, runner.steps)
             outcome = runner.outcome(data, flown.fingerprint)

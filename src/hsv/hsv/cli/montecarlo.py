@@ -42,7 +42,6 @@ montecarlo = typer.Typer(
 )
 
 ResultArgument = Annotated[Path, typer.Argument(help="Result file of a campaign (.parquet).")]
-Range = tuple[str, str]
 
 
 @montecarlo.command()
@@ -53,11 +52,9 @@ def fly(
     sampling: Annotated[Sampling, typer.Option(help="How samples are drawn.")] = Sampling.uniform,
     corners: Annotated[bool, typer.Option("--corners", help="All combinations of least and largest value.")] = False,
     scale: Annotated[float, typer.Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
-    fault_start: Annotated[Range | None, typer.Option(help="Vary the start of the fault, e.g. '90 s' '110 s'.")] = None,
-    fault_value: Annotated[Range | None, typer.Option(help="Vary the value of the fault, e.g. 0.85 1.")] = None,
-    initial_altitude: Annotated[Range | None, typer.Option(help="Vary the start, e.g. '85400 ft' '85600 ft'.")] = None,
-    initial_velocity: Annotated[
-        Range | None, typer.Option(help="Vary the start, e.g. '7850 ft/s' '7950 ft/s'.")
+    factor: Annotated[
+        list[str] | None,
+        typer.Option(help="Vary a field of the scenario, FIELD=LEAST..LARGEST, e.g. 'fault[0].start=90 s..110 s'."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
     workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")] = 0,
@@ -72,7 +69,7 @@ def fly(
     A flight that its controller crashes is recorded with the reason, and the others are flown. Exit code 1 where every
     flight crashed.
 
-    Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --fault-start "90 s" "110 s"
+    Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --factor "fault[0].start=90 s..110 s"
     """
     from hsv.campaign.campaign import plan
     from hsv.campaign.executors import make_executor
@@ -85,13 +82,8 @@ def fly(
     from hsv.graph.preparation import commit
 
     method = "corners" if corners else sampling.value
-    ranges = {
-        "fault_start": _range(fault_start, "s", "fault-start"),
-        "fault_value": _range(fault_value, "1", "fault-value"),
-        "initial_altitude": _range(initial_altitude, "m", "initial-altitude"),
-        "initial_velocity": _range(initial_velocity, "m/s", "initial-velocity"),
-    }
-    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, commit=commit(), **ranges)
+    factors = dict(map(_factor, factor or ()))
+    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, commit=commit(), factors=factors)
     if out is None:
         Path("campaigns").mkdir(exist_ok=True)
         count = "" if corners else f"_{campaign.samples}_seed{seed}"
@@ -237,7 +229,12 @@ def scenario(
     print(text, end="")
 
 
-def _range(words: Range | None, unit: str, field: str) -> tuple[float, float] | None:
-    from hsv.units import parse_quantity
+def _factor(text: str) -> tuple[str, tuple[str, str]]:
+    """Return field, least and largest value of a factor as it is given."""
+    from hsv.errors import CampaignError
 
-    return None if words is None else (parse_quantity(words[0], unit, field), parse_quantity(words[1], unit, field))
+    field, _, ends = text.partition("=")
+    low, dots, high = ends.partition("..")
+    if not dots:
+        raise CampaignError(f"factor = {text!r}: expected FIELD=LEAST..LARGEST")
+    return field.strip(), (low.strip(), high.strip())
