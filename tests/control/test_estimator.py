@@ -85,7 +85,8 @@ def test_noise_falls_to_a_fraction_of_the_sensors(estimator):
 
 
 def test_an_offset_of_the_elevator_is_found(estimator):
-    _, _, state = flown(estimator, sensor_data({}, T), offset=0.01)
+    truth, _, state = flown(estimator, sensor_data({}, T), 4.0, offset=0.01)
+    assert np.abs(truth[-1, 2:4]).max() < 0.5
     assert state[10] == pytest.approx(0.01, rel=0.05)
 
 

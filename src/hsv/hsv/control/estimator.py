@@ -33,7 +33,7 @@ ESTIMATOR_PARAMETERS = (
     Parameter("estimator.noise", [], "standard deviation of each rigid state's measurement; empty: the sensors'"),
     Parameter(
         "estimator.process",
-        [7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 7e-4],
+        [7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 1e-2],
         "noise that drives each state and each input's offset, SI per root of a second",
         "",
         1e-12,
