@@ -146,10 +146,10 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
         return
     if not air.still:
         atmosphere_step(air, atmosphere, step, data.seed, x[0], x[1], conditions[:3])
-    speed, path_angle = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
+    speed, turn, _, _ = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
     mach = speed / speed_of_sound(x[0])
     engine, engine_memory = faults.engine, faults.engine_memory
-    apply_engine_faults(engine, engine_memory, step, data.seed, x[3] - path_angle, mach, actuator[0], conditions[3:])
+    apply_engine_faults(engine, engine_memory, step, data.seed, x[2] - turn, mach, actuator[0], conditions[3:])
     advance_equipped(
         x,
         actuator,
