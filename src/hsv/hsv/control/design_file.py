@@ -81,8 +81,9 @@ def _no_parameters(source: str) -> DesignError:
 
 def read_design(path: Path) -> ControlDesign:
     """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
+    values = read_parameters(path)
     try:
-        return ControlDesign.from_parameters(read_parameters(path))
+        return ControlDesign.from_parameters(values)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from error
 
