@@ -27,7 +27,10 @@ def planned(short: str) -> Callable[..., Campaign]:
     """Plan a campaign of short flights."""
 
     def make(**settings: Any) -> Campaign:
-        return plan(short, **{"samples": 44, "seed": 3, "factors": {"fault[0].start": ("1 s", "2.5 s")}, "commit": "test"} | settings)
+        return plan(
+            short,
+            **{"samples": 44, "seed": 3, "factors": {"fault[0].start": ("1 s", "2.5 s")}, "commit": "test"} | settings,
+        )
 
     return make
 

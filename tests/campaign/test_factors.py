@@ -28,7 +28,11 @@ def test_every_shipped_scenario_can_be_written(name):
     scenario, campaign = load_scenario(name), plan(name)
     values = scenario.vehicle.perturbation
     written = parse_scenario(campaign.file(0, [values.get(factor.name, 0.0) for factor in campaign.factors]), name)
-    assert written.parameters() == {**campaign.flown(0, [0.0] * 10).parameters(), **scenario.parameters(), "seed": 10**7}
+    assert written.parameters() == {
+        **campaign.flown(0, [0.0] * 10).parameters(),
+        **scenario.parameters(),
+        "seed": 10**7,
+    }
 
 
 def test_the_target_stays_where_it_is_when_the_start_moves(planned):

@@ -65,7 +65,11 @@ def test_metres_serve_as_well_as_feet():
         ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of name, definition, model"),
         ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
-        ("effectiveness = 0.9", "effectiveness = 0.9\nwhen = 3", "fault[0].when: unknown key, expected one of effective"),
+        (
+            "effectiveness = 0.9",
+            "effectiveness = 0.9\nwhen = 3",
+            "fault[0].when: unknown key, expected one of effective",
+        ),
         ('"600 ft"', '"600 s"', "command[0].altitude_change = '600 s': wrong unit, expected a finite quantity such as"),
         ('"600 ft"', "600", "command[0].altitude_change = 600: the unit is missing"),
         ('"600 ft"', '"nan ft"', "command[0].altitude_change = 'nan ft': "),

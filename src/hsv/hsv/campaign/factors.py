@@ -9,7 +9,7 @@ from typing import Any
 
 from hsv.errors import CampaignError
 from hsv.simulation.distribution import KINDS, Distribution
-from hsv.simulation.scenario import Scenario, scenario_at_means, set_field
+from hsv.simulation.scenario import scenario_at_means, set_field
 from hsv.units import rounded, written
 from hsv.vehicle.parameters import COEFFICIENT_UNITS
 

@@ -33,7 +33,10 @@ GROUP = "hsv.controllers"
 SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
 """The classes of this library's by name, which a source tree knows as well; others are entry points."""
 
-NOT_TOLD = ("vehicle.perturbation.", "fault.", "seed", *sorted({f"{table}." for table in EQUIPMENT}))
+NOT_TOLD = (
+    *("vehicle.perturbation.", "fault.", "seed"),
+    *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors."),
+)
 """Beginnings of parameters that a controller of one's own is not told: how the vehicle really is, what will fail."""
 
 _DEFAULT = "tube_mpc"

@@ -31,7 +31,8 @@ from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.timing import NEVER
 from hsv.vehicle.dynamics import N_INPUTS, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
-from hsv.vehicle.plant import FlightStatus, Plant, PlantFaults, advance_plant, sense
+from hsv.vehicle.integration import advance
+from hsv.vehicle.plant import FlightStatus, Plant, PlantFaults, advance_plant, ideal_plant, sense
 
 
 @dataclass
@@ -162,6 +163,11 @@ def _fly(
     filter_state = np.zeros(len(s))
     measurement = np.empty(n)
     sense(x, plant, plant_memory, plant_faults, 0, measurement)
+    # What advance_plant and sense would do as well, for three times the time.
+    ideal = ideal_plant(plant, plant_faults)
+    vehicle, period, substeps = plant.vehicle, plant.period, plant.substeps
+    lowest, highest = plant.actuators.minimum, plant.actuators.maximum
+    effector, work = plant_memory.effector, plant_memory.work
     rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
     S, new = np.empty(n * (n + m)), np.empty(n)
@@ -174,8 +180,16 @@ def _fly(
     rows = len(history.filtered_pitch_rate)
     for k in range(rows):
         if k > 0:
-            advance_plant(x, actuator, plant, plant_memory, plant_faults, k - 1)
-            sense(x, plant, plant_memory, plant_faults, k, measurement)
+            if ideal:
+                for i in range(m):
+                    effector[i] = min(max(actuator[i], lowest[i]), highest[i])
+                advance(x, effector, vehicle, period, substeps, work)
+            else:
+                advance_plant(x, actuator, plant, plant_memory, plant_faults, k - 1)
+                sense(x, plant, plant_memory, plant_faults, k, measurement)
+        if ideal:
+            for i in range(n):
+                measurement[i] = x[i]
         for i in range(n):
             history.state[k, i] = x[i]
             history.measurement[k, i] = measurement[i]
@@ -225,7 +239,7 @@ def _fly(
         apply_command_faults(faults, remembered, k, plant.seed, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
-        if not in_model_range(x, plant.vehicle.angle_limit):
+        if not in_model_range(x, vehicle.angle_limit):
             return k + 1
     return rows
 

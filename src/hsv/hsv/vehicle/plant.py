@@ -113,6 +113,13 @@ class PlantFaults(NamedTuple):
         return cls(*found)
 
 
+@njit(cache=True)
+def ideal_plant(data: Any, faults: Any) -> bool:
+    """Tell whether actuators and sensors are ideal, the air still, and nothing of the ``faults`` will ever change that."""
+    expected = len(faults.effector.start) + len(faults.engine.start) + len(faults.sensor.start)
+    return data.actuators.ideal and data.atmosphere.still and data.sensors.ideal and expected == 0
+
+
 @njit(cache=True, error_model="numpy")
 def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, faults: Any, step: int) -> None:
     """Replace ``x`` (9) in ``step`` by the state one period later.
