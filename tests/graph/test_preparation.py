@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from hsv.control.design_file import digest
+from hsv.control.design_file import find_design, read_design
 from hsv.errors import RecordingError
 from hsv.graph.preparation import prepare
-from hsv.simulation.assembly import design_parameters
 from hsv.simulation.fingerprint import as_published
-from hsv.simulation.scenario import parse_scenario
+from hsv.simulation.scenario import parse_scenario, with_controller
 
 
 def test_the_bag_is_made_here_so_that_a_second_run_of_its_name_is_refused(tmp_path: Path) -> None:
@@ -37,5 +36,21 @@ def test_the_bag_of_a_foreign_controller_keeps_the_scenario_that_is_flown(tmp_pa
         kept = parse_scenario((folder / "scenario.toml").read_text(), name)
         assert kept == prepared.scenario and kept.controller.startswith("node:") == external
         # Only the scenario's own controller is compared with the publication.
-        design = digest(design_parameters(kept))
+        design = read_design(find_design(kept.design)).digest
         assert as_published("v1:another", kept, design) is (None if external else False)
+
+
+@pytest.mark.parametrize("controller", ["tube_mpc", "package.module:Class"])
+def test_a_foreign_controller_flies_in_the_same_air(controller: str) -> None:
+    text = f"""
+title = "wind"
+controller = "{controller}"
+duration = "1 s"
+[initial]
+altitude = "85500 ft"
+velocity = "7900 ft/s"
+[wind]
+up = "2 m/s"
+"""
+    flown = [parse_scenario(text, "wind"), parse_scenario(with_controller(text, "node:", "wind"), "wind")]
+    assert flown[0].equipment and flown[0].equipment == flown[1].equipment

@@ -318,7 +318,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             why = ", a scenario is called by its file" if key == "name" else ""
             raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
     equipment = {key: value for key, value in table.items() if key in EQUIPMENT}
-    own = {key: value for key, value in _own_tables(table).items() if key not in equipment}
+    own = _own_tables(table)
     table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | equipment)}
     vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
@@ -415,7 +415,8 @@ def _own_tables(table: dict[str, Any]) -> dict[str, Any]:
     """Return the tables of a controller of one's own."""
     if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
         return {}
-    return {key: value for key, value in table.items() if isinstance(value, dict) and key not in Scenario.model_fields}
+    known = Scenario.model_fields.keys() | EQUIPMENT
+    return {key: value for key, value in table.items() if isinstance(value, dict) and key not in known}
 
 
 def _limits(table: object) -> dict[str, float]:
