@@ -28,6 +28,7 @@ ON_THE_PATH = (
     "elimination.py",
     "inheritance.py",
     "signals.py",
+    "timing.py",
     "noise.py",
     "sensors.py",
     "units.py",
@@ -53,6 +54,7 @@ ON_THE_PATH = (
     "control/tube_law.py",
     "control/tube_set.py",
     "faults/injector.py",
+    "faults/schedule.py",
     "faults/effectors.py",
     "faults/laws.py",
     "faults/table.py",
@@ -215,6 +217,7 @@ def test_what_is_not_exact_is_found_in_a_source(line):
     assert problems(line)
 
 
+@pytest.mark.long
 def test_compiled_loop_and_set_up_take_nothing_inexact_from_elsewhere(tmp_path):
     program = Path(inspect.getfile(undefined_symbols))
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}

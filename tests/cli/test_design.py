@@ -26,6 +26,7 @@ def small(tmp_path):
     return path
 
 
+@pytest.mark.long
 def test_a_design_is_written_here_and_comes_out_alike_on_another_processor(hsv, small, tmp_path, monkeypatch):
     here = tmp_path / "here"
     here.mkdir()

@@ -77,7 +77,8 @@ def test_a_campaign_flies_it(hsv, example):
 
 
 @pytest.mark.parametrize(
-    "flown", [pytest.param("lqr", marks=pytest.mark.long), str(EXAMPLES / "compiled" / "compiled.toml")]
+    "flown",
+    [pytest.param(name, marks=pytest.mark.long) for name in ("lqr", str(EXAMPLES / "compiled" / "compiled.toml"))],
 )
 def test_it_flies_the_same_bytes_every_time(hsv, flown):
     ran = hsv("check", flown, "--json")
@@ -134,6 +135,7 @@ def test_the_example_in_c_flies_the_same_bits_as_the_one_that_numba_compiles(che
     assert fly(assemble_flight(load_scenario(path, changes))).fingerprint == fly(compiled).fingerprint
 
 
+@pytest.mark.long
 def test_what_the_example_in_c_refuses_is_said_in_a_line(checkout, hsv, tmp_path):
     for text, message in {
         "[scheduled]\nlow_velocity = '7900 ft'": "scheduled.low_velocity = '7900 ft': wrong unit",

@@ -50,6 +50,7 @@ def test_nodes_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> 
         assert "broken off by the plant at t = " in said[name], said[name]
 
 
+@pytest.mark.long
 def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> None:
     bag = processes.folder / "by_hand"
     # Nodes need not have the same parameters, and each is repeated with its own.

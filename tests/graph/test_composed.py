@@ -9,6 +9,7 @@ from node_processes import Processes
 pytestmark = pytest.mark.graph
 
 
+@pytest.mark.long
 def test_composed_by_hand_with_a_fault_injected_in_flight(processes: Processes) -> None:
     bag = processes.folder / "by_hand"
     words = ["-p", f"bag.directory:={bag}", *LONG]

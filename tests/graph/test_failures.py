@@ -37,7 +37,14 @@ def _start_and_fly(processes: Processes, bag: Path, *words: str) -> subprocess.P
     return run
 
 
-@pytest.mark.parametrize("name", [node.name for node in graph() if node is not RECORDER])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(node.name, marks=() if node.name in ("plant", "tube_mpc") else pytest.mark.long)
+        for node in graph()
+        if node is not RECORDER
+    ],
+)
 def test_a_killed_node_ends_the_run_by_name(processes: Processes, name: str) -> None:
     bag = processes.folder / "broken"
     run = _start_and_fly(processes, bag)
@@ -73,7 +80,7 @@ def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes
     assert recorded_steps(bag) >= ON_DISK
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
 def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int) -> None:
     bag, temporary = processes.folder / "interrupted", processes.folder / "temporary"
     temporary.mkdir()
@@ -122,7 +129,7 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()), nodes.values())
 
 
-@pytest.mark.parametrize("name", ["notch_filter", "plant"])
+@pytest.mark.parametrize("name", ["notch_filter", pytest.param("plant", marks=pytest.mark.long)])
 def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) -> None:
     bag = processes.folder / "hung"
     # Longer than it takes to call a process hung: that is said before.

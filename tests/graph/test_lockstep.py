@@ -45,7 +45,8 @@ def _short_case2(folder: Path) -> Path:
     path.write_text(
         'extends = "case2"\nduration = "5 s"\n'
         '[[command]]\naltitude_change = "30 ft"\nvelocity_change = "12.5 ft/s"\nstart = "1 s"\nend = "4 s"\n'
-        '[[fault]]\nchannel = "elevator_deflection"\ntype = "loss_of_effectiveness"\neffectiveness = 0.9\nstart = "3 s"\n'
+        '[[fault]]\nchannel = "elevator_deflection"\ntype = "loss_of_effectiveness"\n'
+        'effectiveness = 0.9\nstart = "3 s"\n'
         '[[tube.change]]\nstart = "2 s"\ntau = 1.0\n'
     )
     return path

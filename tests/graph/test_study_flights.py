@@ -16,6 +16,7 @@ SHORT = "case1_derived_no_notch"
 """Diverges after 17.5 s."""
 
 
+@pytest.mark.long
 def test_a_flight_of_the_graph_is_kept_as_its_bag_and_flown_again_where_that_is_cut_off(
     ros_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

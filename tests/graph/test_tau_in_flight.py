@@ -35,6 +35,7 @@ def scenario(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Path) -> None:
     bag_path = tmp_path / "flown"
     # No change comes too late for this flight; it is interrupted once there is enough of it for a replay.

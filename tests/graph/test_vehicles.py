@@ -23,6 +23,7 @@ fault = []
 """
 
 
+@pytest.mark.long
 def test_the_bag_takes_the_vehicle_along(processes: Processes) -> None:
     folder = processes.folder
     (folder / "lab").mkdir()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from flight_fingerprints import flown_on
 from other_environments import changed_flights, fly
 
@@ -26,6 +27,7 @@ def test_libm_blas_and_numpy_as_on_an_old_processor():
         assert old["blas"] != usual["blas"]
 
 
+@pytest.mark.long
 def test_code_compiled_for_any_x86_64(tmp_path):
     report = fly(compiled=tmp_path, NUMBA_CPU_NAME="generic", OPENBLAS_CORETYPE="Sandybridge")
     assert not changed_flights(report)

@@ -102,7 +102,10 @@ SOLVED_IN_FLIGHT = {
 }
 
 
-@pytest.mark.parametrize("name", SOLVED_IN_FLIGHT)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.long if name == "case1_kothare_online" else ()) for name in SOLVED_IN_FLIGHT],
+)
 def test_flights_that_solve_a_problem_in_flight_agree_within_their_tolerance(name):
     tolerance, expected = SOLVED_IN_FLIGHT[name]
     assert name not in _table()

@@ -115,7 +115,7 @@ class PlantFaults(NamedTuple):
 
 @njit(cache=True)
 def ideal_plant(data: Any, faults: Any) -> bool:
-    """Tell whether actuators and sensors are ideal, the air still, and nothing of the ``faults`` will ever change that."""
+    """Tell whether actuators and sensors are ideal, the air still, and no fault will ever change that."""
     expected = len(faults.effector.start) + len(faults.engine.start) + len(faults.sensor.start)
     return data.actuators.ideal and data.atmosphere.still and data.sensors.ideal and expected == 0
 

@@ -47,6 +47,9 @@ DEFAULT_VEHICLE = "parker"
 DERIVED = "derived"
 """The set of inertial coupling that a number is a multiple of."""
 
+MOST_COUPLING = 2.0
+"""Largest multiple of it: twice the coupling of a beam model is no vehicle of this structure any more."""
+
 MOST_UNCERTAIN = 12
 """Uncertain parameters at most: a design flies every corner of their bounds."""
 
@@ -109,7 +112,7 @@ class Vehicle:
             coupling: A name, a number or its text; empty: the first set.
 
         Raises:
-            QuantityError: No such set, or no number from 0 on.
+            QuantityError: No such set, or no number from 0 to :data:`MOST_COUPLING`.
         """
         if coupling == "":
             return next(iter(self.couplings))
@@ -119,10 +122,10 @@ class Vehicle:
             scale = float(coupling) if isinstance(coupling, str | float | int) else math.nan
         except ValueError:
             scale = math.nan
-        if isinstance(coupling, bool) or not (math.isfinite(scale) and scale >= 0.0):
+        if isinstance(coupling, bool) or not 0.0 <= scale <= MOST_COUPLING:
             raise QuantityError(
                 f"coupling = {coupling!r}: expected one of {', '.join(self.couplings)}, or a multiple of {DERIVED} "
-                "such as 0.65"
+                f"from 0 to {MOST_COUPLING:g}, such as 0.65"
             )
         return repr(scale)
 
