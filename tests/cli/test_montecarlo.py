@@ -29,7 +29,7 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
     assert result.exists() and (tmp_path / values["page"]).read_text().startswith("<!DOCTYPE html>")
     again = hsv("montecarlo", "replay", str(result), "--flight", "7", "--json").json
     assert again["identical"] is True
-    assert 1.0 <= again["sample_si"]["fault_start"] <= 2.5
+    assert 1.0 <= again["sample_si"]["fault[0].start"] <= 2.5
     shown = hsv("montecarlo", "summary", str(result), "--units", "paper", "--no-page").out
     assert "12 of 12" in shown and "worst flights" in shown
 
@@ -38,8 +38,9 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
     ("words", "expected"),
     [
         (("--samples", "0"), "samples = 0"),
-        (("--fault-start", "1 m", "2 s"), "fault-start = '1 m': wrong unit"),
-        (("--initial-altitude", "10 km", "11 km"), "initial.altitude"),
+        (("--factor", "fault[0].start=1 m..2 s"), "uniform = '1 m': wrong unit"),
+        (("--factor", "fault[0].start"), "factor = 'fault[0].start': expected FIELD=LEAST..LARGEST"),
+        (("--factor", "initial.altitude=10 km..11 km"), "initial.altitude"),
         (("--scale", "0"), "varies"),
         (("--out", "result.csv"), ".parquet"),
         (("--workers", "-1"), "workers = -1: expected 0 to 4096"),
@@ -144,7 +145,7 @@ def test_a_campaign_fails_only_where_every_flight_crashed(hsv, tmp_path, above, 
     short_scenario(tmp_path, duration=3, fault=2)
     own = f'extends = "short.toml"\ncontroller = "{__name__}:Failing"\ndesign = ""\n[failing]\nabove = "{above}"\n'
     (tmp_path / "own.toml").write_text(own)
-    words = ("--samples", "4", "--scale", "0", "--initial-altitude", "85400 ft", "85600 ft", "--workers", "1")
+    words = ("--samples", "4", "--scale", "0", "--factor", "initial.altitude=85400 ft..85600 ft", "--workers", "1")
     for flown in (4, 0):
         ran = hsv("montecarlo", "own.toml", *words, "--out", "own.parquet", "--no-page", "--json")
         assert (ran.code, ran.json["flown_now"]) == (code, flown)

@@ -83,8 +83,10 @@ def test_a_gain_changed_by_a_millionth_is_found(bag: Bag, tmp_path: Path) -> Non
 def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_path: Path) -> None:
     elevator = "elevator_deflection"
     in_flight = {
-        200: lambda injector: injector.inject(Fault("fuel_equivalence_ratio", "loss_of_effectiveness", 0.95)),
-        350: lambda injector: injector.inject(Fault(elevator, "loss_of_effectiveness", 0.8)),
+        200: lambda injector: injector.inject(
+            Fault.of("fuel_equivalence_ratio", "loss_of_effectiveness", {"effectiveness": 0.95})
+        ),
+        350: lambda injector: injector.inject(Fault.of(elevator, "loss_of_effectiveness", {"effectiveness": 0.8})),
         420: lambda injector: injector.clear("fuel_equivalence_ratio"),
         500: lambda injector: injector.clear(),
     }

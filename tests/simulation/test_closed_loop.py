@@ -115,6 +115,6 @@ def test_unstable_loop_ends_diverged_with_everything_finite_and_limited():
 
 def test_a_plant_whose_arithmetic_overflows_still_ends_diverged():
     # Ten times the natural period a step: the integration itself is unstable.
-    parts = components(duration=200.0)
-    parts.plant.substeps, parts.plant.period = 1, 1.0
+    parts = components(duration=200.0, substeps=1)
+    parts.plant.data = parts.plant.data._replace(period=1.0)
     assert fly(parts).status is FlightStatus.DIVERGED

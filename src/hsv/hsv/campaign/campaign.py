@@ -81,7 +81,7 @@ class Campaign:
 
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
         # A seed of its own for every flight, as the generator's key; flights of other campaigns have others.
-        seed = (self.seed * MOST_SAMPLES + flight) % _SEEDS
+        seed = (self.seed * MOST_SAMPLES + int(flight)) % _SEEDS
         return flown_table(self.table, self.scenario_name, self.factors, sample, seed)
 
     @property

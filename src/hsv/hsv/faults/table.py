@@ -399,14 +399,9 @@ class Fault:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Its parameters by name, SI: all of its kind, of its occurrence those that are not as without any."""
+        """Its parameters by name, SI, but those that are as by default."""
         table = fault_parameters(self.channel, self.type)
-        own = len(self.kind.parameters)
-        return {
-            p.name: value
-            for i, (p, value) in enumerate(zip(table, self.values, strict=True))
-            if i < own or value != p.default
-        }
+        return {p.name: value for p, value in zip(table, self.values, strict=True) if value != p.default}
 
 
 def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:

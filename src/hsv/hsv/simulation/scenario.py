@@ -329,7 +329,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             **table,
             "name": name,
             "own": own,
-            "equipment": table_values(EQUIPMENT_PARAMETERS, _own_value("", equipment, found)),
+            "equipment": table_values(EQUIPMENT_PARAMETERS, _own_values(equipment, found)),
             "fault": _fault_rows(table.get("fault", ()), found),
             "limits": _limits(table.get("limits", {})),
             "vehicle": vehicle,
@@ -354,6 +354,16 @@ def _tables_in(value: object, field: str = "") -> Iterator[tuple[str, dict[str, 
             yield from _tables_in(entry, f"{field}[{index}]")
 
 
+def _own_values(tables: dict[str, Any], found: dict[int, Distribution], within: str = "") -> dict[str, Any]:
+    """Return tables, one in the other, with means in the place of distributions, which go to ``found``."""
+    values = {}
+    for key, entry in tables.items():
+        deeper = isinstance(entry, dict) and not entry.keys() & KINDS
+        place = f"{within}{key}"
+        values[key] = _own_values(entry, found, f"{place}.") if deeper else _own_value(place, entry, found)
+    return values
+
+
 def _own_value(field: str, value: object, found: dict[int, Distribution]) -> Any:
     """Return an entry of a controller's own table with means in the place of distributions, which go to ``found``.
 
@@ -363,8 +373,6 @@ def _own_value(field: str, value: object, found: dict[int, Distribution]) -> Any
         return [_own_value(field, entry, found) for entry in value]
     if not isinstance(value, dict):
         return value
-    if not value.keys() & KINDS:
-        return {key: _own_value(f"{field}.{key}".lstrip("."), entry, found) for key, entry in value.items()}
     pair = next(iter(value.values()), None)
     first = pair[0] if isinstance(pair, list) and pair else None
     drawn = found[id(value)] = read_distribution(value, si_unit_of(first), field)
