@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import zstandard
+from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from rosbag2_bags import converted, recorded
 from rosbags.rosbag2 import CompressionMode
@@ -193,8 +194,11 @@ def test_a_chunk_without_a_checksum_is_read_around_the_damage(tmp_path: Path) ->
     file = recorded(REFERENCE, tmp_path / "bare") / "bare_0.mcap"
     whole = Bag(file)
     data = bytearray(file.read_bytes())
-    middle = len(data) // 2 + 4096
-    data[middle : middle + 4096] = bytes(4096)
+    with file.open("rb") as opened:
+        chunks = make_reader(opened).get_summary().chunk_indexes
+    chunk = chunks[len(chunks) // 2]
+    middle = chunk.chunk_start_offset + chunk.chunk_length // 2
+    data[middle : middle + 1024] = bytes(1024)
     file.write_bytes(data)
     damaged = Bag(file)
     for topic in whole.topics:

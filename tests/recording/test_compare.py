@@ -6,6 +6,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from hsv.recording.compare import Comparison, compare
@@ -21,7 +22,8 @@ def track(kit: SimpleNamespace) -> Any:
         still = kit.messages.store.types["hsv_msgs/msg/InputVector"](
             fuel_equivalence_ratio=0.3, elevator_deflection=0.2
         )
-        fixed = {"pitching_moment": 0.0, "dynamic_pressure": 5.0, "effector": still}
+        air = {"wind_forward": 0.0, "wind_up": 0.0, "density_factor": 1.0}
+        fixed = {"pitching_moment": 0.0, "dynamic_pressure": 5.0, "effector": still, **air}
         data = [
             kit.messages.stamped(kind, time, k, **({"lift": values[k], "drag": 1.0, "thrust": 2.0} | fixed | given))
             for k, time in enumerate(times)
@@ -100,7 +102,11 @@ def test_arrays_and_lists_of_messages(kit: SimpleNamespace) -> None:
     def faults(value: float, count: int) -> Track:
         active = [kit.messages.fault(value)] * count
         still = {"fuel_equivalence_ratio": 0.3, "elevator_deflection": 0.2}
-        data = [kit.messages.stamped("hsv_msgs/msg/Actuator", 0, 0, active=active, **still)]
+        data = [
+            kit.messages.stamped(
+                "hsv_msgs/msg/Actuator", 0, 0, active=active, since=np.zeros(count, np.uint64), **still
+            )
+        ]
         return Track("/hsv/actuator", "hsv_msgs/msg/Actuator", kit.messages.store, [0], data)
 
     assert compare(faults(0.9, 1), faults(0.9 + 1e-12, 1), tolerance=1e-10).first is None

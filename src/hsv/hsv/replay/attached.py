@@ -12,7 +12,7 @@ import numpy as np
 from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.injector import FaultInjector
@@ -111,7 +111,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
         except (DesignError, ParameterError) as error:
             raise RecordingError(f"{bag.path}: attached {error}") from error
     if design is not None:
-        values = ParameterSections(read_design(design).to_parameters()).overlaid(scenario)
+        values = ParameterSections(read_parameters(design)).overlaid(scenario)
     return values.overlaid(ParameterSections({}, changed))
 
 
