@@ -1,4 +1,7 @@
-"""The sampled closed loop, linear: the vehicle at trim under held inputs, the discrete notch filter, the feedback F."""
+"""The sampled closed loop, linear: the vehicle at trim under held inputs, the discrete notch filter, the feedback F.
+
+Actuators and a delay may stand between the two.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
-from hsv.lpv.discretisation import zero_order_hold
+from hsv.lpv.actuated import held_behind
+from hsv.vehicle.actuators import ActuatorSet
 from hsv.vehicle.dynamics import jacobian
 from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.parameters import VehicleParameters
@@ -31,8 +35,19 @@ COUPLING_SCALES = tuple(0.05 * step for step in range(26))
 
 
 @dataclass(frozen=True)
+class Hardware:
+    """What is between command and vehicle: linear ``actuators``, at most one a channel, and a ``delay`` (s)."""
+
+    actuators: tuple[ActuatorSet, ...] = ()
+    delay: float = 0.0
+
+
+IDEAL = Hardware()
+
+
+@dataclass(frozen=True)
 class SampledLoop:
-    """A (9 + s, 9 + s) of vehicle and filter, the loop open; B (9 + s, 2) of the inputs; gain (2, 9 + s), u = gain x.
+    """A (n, n) of vehicle (9), actuators, delay and filter, the loop open; B (n, 2) of the inputs; gain (2, n), u = gain x.
 
     ``period`` in s; the effectiveness of the elevator is in B.
     """
@@ -70,6 +85,7 @@ def sampled_loop(
     *,
     point: tuple[float, float] = TARGET,
     effectiveness: float = 1.0,
+    hardware: Hardware = IDEAL,
 ) -> SampledLoop:
     """Return the loop around ``vehicle``.
 
@@ -80,24 +96,35 @@ def sampled_loop(
         period: Control period (s).
         point: Altitude (m) and velocity (m/s) of the trim.
         effectiveness: Of the elevator.
+        hardware: Between command and vehicle.
 
     Raises:
         TrimError: No equilibrium there.
     """
-    A, B, gain = with_notch(*_held(vehicle, point, period), feedback, discretise(notch, period))
+    held, inputs = _held(vehicle, point, period, hardware)
+    full = np.zeros((len(feedback), len(held)))
+    full[:, : feedback.shape[1]] = feedback
+    A, B, gain = with_notch(held, inputs, full, discretise(notch, period))
     B[:, ELEVATOR] *= effectiveness
     return SampledLoop(A, B, gain, period)
 
 
 @lru_cache(maxsize=8192)
-def _held(vehicle: VehicleParameters, point: tuple[float, float], period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (9, 9) and B (9, 2) of the vehicle at trim under held inputs; kept, for many loops go around each."""
+def _held(
+    vehicle: VehicleParameters, point: tuple[float, float], period: float, hardware: Hardware
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return A (n, n) and B (n, 2) of vehicle at trim and hardware, commands held; kept, for many loops go around each."""
     equilibrium = trim(vehicle, *point)
-    return zero_order_hold(*jacobian(equilibrium.state, equilibrium.input, vehicle), period)
+    A, B = jacobian(equilibrium.state, equilibrium.input, vehicle)
+    return held_behind(A, B, period, hardware.actuators, hardware.delay)
 
 
 def worst_growth(
-    vehicle: VehicleParameters, feedback: np.ndarray, notch: Sequence[NotchSection], period: float
+    vehicle: VehicleParameters,
+    feedback: np.ndarray,
+    notch: Sequence[NotchSection],
+    period: float,
+    hardware: Hardware = IDEAL,
 ) -> float:
     """Return the largest growth (1/s) of the loop at both ends of Case 1's step, before and after its fault.
 
@@ -106,9 +133,10 @@ def worst_growth(
         feedback: (2, 9).
         notch: Sections of the filter.
         period: Control period (s).
+        hardware: Between command and vehicle.
     """
     return max(
-        sampled_loop(vehicle, feedback, notch, period, point=point, effectiveness=share).growth
+        sampled_loop(vehicle, feedback, notch, period, point=point, effectiveness=share, hardware=hardware).growth
         for point in (START, TARGET)
         for share in EFFECTIVENESS
     )
