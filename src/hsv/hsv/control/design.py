@@ -16,6 +16,7 @@ from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
 from hsv.lpv.polytope import Polytope, axis_weights
 from hsv.parameters import check_all
+from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 
 
@@ -46,6 +47,8 @@ class ControlDesign:
     notch: tuple[NotchSection, ...]
     coupling: str = ""
     """Set of inertial coupling that the tube is certified for, empty: the design carries no tube."""
+    actuators: tuple[str, ...] = ()
+    """Names of the actuators that the tube is certified for, ideal where a channel has none."""
     vehicle: str = ""
     """Digest of the vehicle that the design is for, empty: the default one."""
     tube: TubeSet | None = None
@@ -102,6 +105,8 @@ class ControlDesign:
         values |= {name: compact(tau) for name, tau in adjustable.items() if np.any(tau != 1.0)}
         if self.filtered:
             values["nominal.filtered"] = True
+        if self.actuators:
+            values["design.actuators"] = " ".join(self.actuators)
         if self.vehicle:
             values["design.vehicle"] = self.vehicle
         if self.tube:
@@ -146,6 +151,7 @@ class ControlDesign:
             velocity_samples=velocity,
             notch=notch,
             coupling=v["design.coupling"],
+            actuators=_actuators(v["design.actuators"]),
             vehicle=v["design.vehicle"],
             tube=_tube(v, N_RIGID + 2 * len(notch)),
             plan_bounds=_plan_bounds(v),
@@ -203,6 +209,13 @@ def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:
     if not (np.allclose(shape, shape.T, rtol=1e-9, atol=0.0) and np.linalg.eigvalsh(shape)[0] > 0.0):
         raise DesignError("parameter tube.shape: expected a symmetric positive definite matrix")
     return TubeSet(shaped(values, "tube.centre", (n,)), shape, shaped(values, "tube.half_width", (n,)))
+
+
+def _actuators(text: str) -> tuple[str, ...]:
+    for name in (names := tuple(text.split())):
+        if name not in ACTUATOR_SETS:
+            raise DesignError(f"parameter design.actuators = {text!r}: expected names from {', '.join(ACTUATOR_SETS)}")
+    return names
 
 
 def _plan_bounds(values: Mapping[str, Any]) -> PlanBounds | None:

@@ -33,6 +33,7 @@ DESIGN_PARAMETERS = (
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
     Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
+    Parameter("design.actuators", "", "actuators that the tube is certified for, by name; empty: ideal ones"),
     Parameter("design.vehicle", "", "digest of the vehicle that the design is for; empty: the default one"),
     Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
     Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),

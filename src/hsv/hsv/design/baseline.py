@@ -126,6 +126,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         input_minimum=vehicle.decoupled.input_minimum,
         input_maximum=vehicle.decoupled.input_maximum,
         notch=notch,
+        actuators=inputs.actuators,
         vehicle=vehicle.digest,
     )
     return DesignResult(design, model, _report(inputs, design, model, feedback, nominal))

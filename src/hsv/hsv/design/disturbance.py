@@ -9,6 +9,9 @@ parameters, flexible coupling.
 The structured set writes the rigid part of Delta as three accelerations held over a period, the lost elevator through
 the column B_e(p), and what remains in altitude and pitch angle; a seventh channel is the part of the feedback that
 comes from filtering the nominal pitch rate, F_q (notch(q_n) - q_n), which acts through B(p) F_q. Nothing is left out.
+
+Where the design knows its actuators, u above is where they are on average over the period, driven by what is commanded,
+and w is what of the lost elevator comes through them; see :mod:`hsv.design.error_system` for the lag of the plan.
 """
 
 from __future__ import annotations
@@ -21,11 +24,14 @@ import numpy as np
 from numba import njit
 
 from hsv.control.notch_filter import NotchData, filter_step, rest
+from hsv.design.error_system import lag_response, tube_errors
 from hsv.design.rounding import outward
+from hsv.lpv.actuated import SampledActuators, respond
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.lpv.polytope import Polytope, schedule
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
+from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -63,15 +69,21 @@ def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Record:
-    """What membership needs of a flight: rows k = 0 ... n of x, x_n (9), command, actuator, x_r, u_r and d_r (9)."""
+    """What membership needs of a flight: rows k = 0 ... n of x, x_n (9), u_n, command, actuator, x_r, u_r, d_r (9)."""
 
     state: np.ndarray
     deviation: np.ndarray
+    nominal_input: np.ndarray
     command: np.ndarray
     actuator: np.ndarray
     reference: np.ndarray
     reference_input: np.ndarray
     defect: np.ndarray
+
+    @property
+    def plan(self) -> np.ndarray:
+        """u_n + u_r (n + 1, 2)."""
+        return self.nominal_input + self.reference_input
 
 
 class Signals(NamedTuple):
@@ -91,19 +103,29 @@ class Signals(NamedTuple):
 class ChannelModel:
     """How Delta is split into channels: the model it is measured against, filter, acceleration columns (5, 3).
 
-    ``filtered``: the nominal pitch rate is filtered as the measured one is, and its channel is nothing.
+    ``filtered``: the nominal pitch rate is filtered as the measured one is, and its channel is nothing. ``gain`` (2, 5)
+    and ``vehicle`` tell what the lag of the plan does where there are ``actuators``.
     """
 
     polytope: Polytope
     notch: NotchData
     columns: np.ndarray
+    gain: np.ndarray
+    vehicle: Vehicle
     filtered: bool = False
+    actuators: SampledActuators | None = None
 
     def signals(self, record: Record) -> Signals:
         """Return the disturbances f, w and Delta that acted in a flight (paper eq. 13, eq. 16, eq. 18)."""
         n = len(record.state) - 1
         signals = Signals(np.empty((n, len(CHANNELS))), np.empty((n, N_STATES)), np.empty((n, N_STATES)))
         rows = list(_ACCELERATED)
+        commanded, lost = record.command, record.actuator[:, 1] - record.command[:, 1]
+        through = lost
+        if self.actuators is not None:
+            at_rest = self._at_rest(record)
+            commanded = at_rest + respond(self.actuators, record.command - at_rest)[1]
+            through = respond(self.actuators, np.stack((np.zeros_like(lost), lost), axis=1))[1][:, 1].copy()
         _signals(
             self.polytope.data(),
             self.notch,
@@ -111,8 +133,9 @@ class ChannelModel:
             np.ascontiguousarray(self.columns[list(_REMAINING)]),
             record.state,
             record.deviation,
-            record.command,
-            record.actuator,
+            commanded,
+            lost,
+            through,
             record.reference,
             record.reference_input,
             record.defect,
@@ -121,6 +144,27 @@ class ChannelModel:
         if self.filtered:
             signals.channels[:, _FILTERED_NOMINAL] = 0.0
         return signals
+
+    def errors(self, record: Record) -> tuple[np.ndarray, np.ndarray]:
+        """Return the error in the tube (n + 1, states), and the feedback (n + 1, 2) to the lag of the plan.
+
+        The latter is none without actuators; the former is e less the effect of that lag.
+        """
+        if self.actuators is None:
+            e = tube_errors(record.state, record.deviation, record.reference, self.notch)
+            return e, np.zeros_like(record.command)
+        plan, at_rest = record.plan, self._at_rest(record)
+        beyond = record.actuator - plan
+        e = tube_errors(record.state, record.deviation, record.reference, self.notch, self.actuators, beyond)
+        lag = at_rest + respond(self.actuators, plan - at_rest)[1] - plan
+        late, feedback = lag_response(
+            self.polytope, self.gain, self.notch, self.actuators, record.state[:, :2], np.ascontiguousarray(lag)
+        )
+        return e - late, feedback
+
+    def _at_rest(self, record: Record) -> np.ndarray:
+        """Return where actuators rest before the flight (2): in the trim that it starts in."""
+        return trim(self.vehicle.decoupled, record.state[0, 0], record.state[0, 1]).input
 
 
 @njit(cache=True, nogil=True)
@@ -132,7 +176,8 @@ def _signals(
     state: np.ndarray,
     deviation: np.ndarray,
     command: np.ndarray,
-    actuator: np.ndarray,
+    lost: np.ndarray,
+    through: np.ndarray,
     x_r: np.ndarray,
     u_r: np.ndarray,
     defect: np.ndarray,
@@ -146,7 +191,6 @@ def _signals(
     rest(notch, deviation[0, 4] + x_r[0, 4], filter_state)
     for k in range(len(delta)):
         schedule(polytope, state[k, 0], state[k, 1], S)
-        lost = actuator[k, 1] - command[k, 1]
         for i in range(n):
             row = i * (n + m)
             predicted = x_r[k + 1, i] + defect[k, i]
@@ -155,12 +199,12 @@ def _signals(
             for j in range(m):
                 predicted += S[row + n + j] * (command[k, j] - u_r[k, j])
             delta[k, i] = state[k + 1, i] - predicted
-            fault[k, i] = S[row + n + 1] * lost
+            fault[k, i] = S[row + n + 1] * through[k]
         for c in range(3):
             channels[k, c] = 0.0
             for j, row in enumerate((1, 2, 4)):
                 channels[k, c] += inverse[c, j] * (delta[k, row] - fault[k, row])
-        channels[k, 3] = lost
+        channels[k, 3] = lost[k]
         planned = deviation[k, 4] + x_r[k, 4]
         channels[k, 4] = filter_step(notch, filter_state, planned) - planned
         for c, row in enumerate((0, 3)):
@@ -238,7 +282,12 @@ class DisturbanceSet:
 
 def inflated(lower: np.ndarray, upper: np.ndarray, factor: float) -> DisturbanceSet:
     """Return the set between ``lower`` and ``upper`` (7), widened to hold zero, times ``factor``, rounded outwards."""
-    return DisturbanceSet(outward(factor * np.minimum(lower, 0.0)), outward(factor * np.maximum(upper, 0.0)))
+    return DisturbanceSet(*widened(lower, upper, factor))
+
+
+def widened(lower: np.ndarray, upper: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bounds, moved apart to hold zero, times ``factor``, rounded outwards."""
+    return outward(factor * np.minimum(lower, 0.0)), outward(factor * np.maximum(upper, 0.0))
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,16 @@ The paper's error system leaves the notch filter out. Here its states belong to 
 state of the same filter fed with the pitch rate of reference + nominal from the same start. Then
 e_s(k+1) = A_s e_s + B_s e_q exactly, and the feedback sees F_q (C_s e_s + D_s e_q) plus F_q (notch(q_n) - q_n), a
 signal of the plan alone. The pitch rate in e is the true one.
+
+Actuators that a design knows belong to it, too: e_a = a - a_n, where a_n are the same actuators driven by the plan
+u_n + u_r from the same start. Then e_a(k+1) = A_a e_a + B_a (F e + lost elevator), and their position acts on e. The
+nominal model takes the plan itself, so what the plan and a_n differ by, its lag, moves e as well. That is a signal of
+the plan alone, and so is its effect in the closed loop, :func:`lag_response`: e less that is the error in the tube.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +21,10 @@ import numpy as np
 from numba import njit
 
 from hsv.control.notch_filter import NotchData, filter_step, rest, with_notch
-from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE, STATE_NAMES
+from hsv.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
+from hsv.lpv.polytope import Polytope, schedule
+from hsv.vehicle.actuators import ActuatorSet
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
 
 
 @dataclass(frozen=True)
@@ -23,18 +32,34 @@ class ErrorSystem:
     """e(k+1) = A_i e(k) + G_i d(k), the feedback closed; n states, d disturbance channels, r vertices.
 
     ``A`` (r, n, n) closed loop; ``G`` (r, n, d) columns of the channels; ``F`` (2, n) the feedback on e, and ``F_d``
-    (2, d) on d; ``names`` (n). SI per period.
+    (2, d) on d; ``names`` (n); ``B`` (r, n, 2) columns of commands. SI per period.
     """
 
     A: np.ndarray
+    B: np.ndarray
     G: np.ndarray
     F: np.ndarray
     F_d: np.ndarray
     names: tuple[str, ...]
+    unseen: int = 0
+    """How many of the last states no controller sees: those of actuators."""
+
+    @property
+    def seen(self) -> int:
+        """How many of the first states a controller sees."""
+        return len(self.names) - self.unseen
 
 
-def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, channels: np.ndarray) -> ErrorSystem:
-    """Return the error system of the rigid states and the notch filter (paper eq. 23, with the filter in it).
+def error_system(
+    A: np.ndarray,
+    B: np.ndarray,
+    F: np.ndarray,
+    notch: NotchData,
+    channels: np.ndarray,
+    actuators: Sequence[ActuatorSet] = (),
+    period: float = 0.0,
+) -> ErrorSystem:
+    """Return the error system of rigid states, notch filter and actuators (paper eq. 23, with the latter two in it).
 
     The flexible states of the decoupled model follow the rigid ones and are not fed back, so they stay outside.
 
@@ -44,50 +69,82 @@ def error_system(A: np.ndarray, B: np.ndarray, F: np.ndarray, notch: NotchData, 
         F: (2, 9) or (2, 5) feedback gain.
         notch: The discrete filter.
         channels: (5, 3) effect of the acceleration channels over a period.
+        actuators: Those the design knows; F does not see their states, which come last.
+        period: s, that of the actuators.
     """
     r = len(A)
     A_x, B_x, F_x = A[:, :N_RIGID, :N_RIGID], B[:, :N_RIGID], F[:, :N_RIGID]
+    if actuators:
+        A_x, B_x, F_x = _with_actuators(A_x, B_x, F_x, sampled_actuators(actuators, period))
     whole, inputs, gain = with_notch(A_x, B_x, F_x, notch)
-    n = whole.shape[1]
+    n, a = whole.shape[1], A_x.shape[1] - N_RIGID
     columns = np.zeros((r, n, 7))
     columns[:, :N_RIGID, :3] = channels
-    columns[:, :N_RIGID, 3] = B_x[:, :, 1]
-    columns[:, :N_RIGID, 4] = B_x @ F_x[:, PITCH_RATE]
+    columns[:, : N_RIGID + a, 3] = B_x[:, :, 1]
+    columns[:, : N_RIGID + a, 4] = B_x @ F_x[:, PITCH_RATE]
     columns[:, 0, 5] = columns[:, 3, 6] = 1.0
-    names = STATE_NAMES[:N_RIGID] + tuple(f"filter_{i + 1}" for i in range(n - N_RIGID))
+    names = STATE_NAMES[:N_RIGID] + tuple(f"filter_{i + 1}" for i in range(n - N_RIGID - a))
+    if actuators:
+        # The filter before the actuators: what a controller sees of the set is its first states.
+        order = np.r_[:N_RIGID, N_RIGID + a : n, N_RIGID : N_RIGID + a]
+        whole, inputs, columns = whole[:, order][:, :, order], inputs[:, order], columns[:, order]
+        gain, names = gain[:, order], names + actuator_names(actuators)
     feedthrough = np.zeros((2, columns.shape[2]))
     feedthrough[:, 4] = F_x[:, PITCH_RATE]
-    return ErrorSystem(whole + inputs @ gain, columns, gain, feedthrough, names)
+    return ErrorSystem(whole + inputs @ gain, inputs, columns, gain, feedthrough, names, a)
+
+
+def _with_actuators(
+    A: np.ndarray, B: np.ndarray, F: np.ndarray, actuators: SampledActuators
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return vertices A (r, n + a, n + a) and B (r, n + a, 2), and F (2, n + a), the actuators' states last."""
+    (r, n, _), a = A.shape, len(actuators.A)
+    whole, inputs = np.zeros((r, n + a, n + a)), np.empty((r, n + a, B.shape[2]))
+    whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, n:] = A, B @ actuators.C, actuators.A
+    inputs[:, :n], inputs[:, n:] = B @ actuators.D, actuators.B
+    return whole, inputs, np.concatenate((F, np.zeros((len(F), a))), axis=1)
 
 
 def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
     """Return the system that may switch between the vertices of all; its feedback F is that of the ``first``."""
     systems = (first, *others)
-    return replace(first, A=np.concatenate([s.A for s in systems]), G=np.concatenate([s.G for s in systems]))
+    A, B, G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "B", "G"))
+    return replace(first, A=A, B=B, G=G)
 
 
 def paper_system(A: np.ndarray, B: np.ndarray, F: np.ndarray) -> ErrorSystem:
     """Return the error system as the paper has it (eq. 22): all states, no filter, a disturbance on every state."""
     r, n, _ = A.shape
     identity = np.broadcast_to(np.eye(n), (r, n, n))
-    return ErrorSystem(A + B @ F, identity, F, np.zeros((len(F), n)), STATE_NAMES)
+    return ErrorSystem(A + B @ F, B, identity, F, np.zeros((len(F), n)), STATE_NAMES)
 
 
-def tube_errors(state: np.ndarray, deviation: np.ndarray, reference: np.ndarray, notch: NotchData) -> np.ndarray:
-    """Return e (k, n) of a flight: rigid states, then the filter's.
+def tube_errors(
+    state: np.ndarray,
+    deviation: np.ndarray,
+    reference: np.ndarray,
+    notch: NotchData,
+    actuators: SampledActuators | None = None,
+    beyond_plan: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return e (k, n) of a flight: rigid states, then the filter's, then those of actuators that the design knows.
 
     Args:
         state: (k, 9) x at every step, from the first.
         deviation: (k, 9) x_n.
         reference: (k, 9) x_r.
         notch: The discrete filter; it is linear, so its error is the filter's answer to the error of the pitch rate.
+        actuators: Likewise, without their limits.
+        beyond_plan: (k, 2) what they are commanded beyond the plan, u - u_n - u_r, a loss of it included.
     """
     rigid = (state - deviation - reference)[:, :N_RIGID]
     errors = np.zeros((len(state), N_RIGID + 2 * len(notch.D)))
     errors[:, :N_RIGID] = rigid
     filter_state = np.zeros(2 * len(notch.D))
     _filter_errors(notch, np.ascontiguousarray(rigid[:, PITCH_RATE]), filter_state, errors[:, N_RIGID:])
-    return errors
+    if actuators is None or beyond_plan is None:
+        return errors
+    return np.hstack((errors, respond(actuators, beyond_plan)[0]))
 
 
 @njit(cache=True, nogil=True)
@@ -96,3 +153,85 @@ def _filter_errors(notch: Any, rate: np.ndarray, filter_state: np.ndarray, error
     for k in range(len(rate)):
         errors[k] = filter_state
         filter_step(notch, filter_state, rate[k])
+
+
+def lag_response(
+    polytope: Polytope,
+    gain: np.ndarray,
+    notch: NotchData,
+    actuators: SampledActuators,
+    scheduled: np.ndarray,
+    lag: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the lag of the plan makes of e (k, n) and of the feedback (k, 2), the loop closed, from zero.
+
+    Args:
+        polytope: The design's model.
+        gain: (2, 5) F, with its factor.
+        notch: The discrete filter.
+        actuators: Those the design knows.
+        scheduled: (k, 2) altitude and velocity of the flight.
+        lag: (k, 2) mean position of actuators driven by the plan, less the plan.
+    """
+    a, s = len(actuators.A), 2 * len(notch.D)
+    errors, feedback = np.zeros((len(lag), N_RIGID + s + a)), np.zeros((len(lag), len(gain)))
+    _lag_response(
+        polytope.data(),
+        np.ascontiguousarray(gain),
+        notch,
+        actuators,
+        np.ascontiguousarray(scheduled),
+        lag,
+        errors,
+        feedback,
+    )
+    return errors, feedback
+
+
+@njit(cache=True, nogil=True)
+def _lag_response(
+    polytope: Any,
+    gain: np.ndarray,
+    notch: Any,
+    actuators: Any,
+    scheduled: np.ndarray,
+    lag: np.ndarray,
+    errors: np.ndarray,
+    feedback: np.ndarray,
+) -> None:
+    A_a, B_a, C_a, D_a = actuators
+    n, m = N_RIGID, N_INPUTS
+    S = np.empty(N_STATES * (N_STATES + m))
+    x, new, held = np.zeros(n), np.zeros(n), np.zeros(m)
+    s, a, turned = np.zeros(2 * len(notch.D)), np.zeros(len(A_a)), np.zeros(len(A_a))
+    for k in range(len(lag)):
+        errors[k, :n], errors[k, n : n + len(s)], errors[k, n + len(s) :] = x, s, a
+        schedule(polytope, scheduled[k, 0], scheduled[k, 1], S)
+        filtered = filter_step(notch, s, x[PITCH_RATE])
+        for i in range(m):
+            total = gain[i, PITCH_RATE] * filtered
+            for j in range(n):
+                if j != PITCH_RATE:
+                    total += gain[i, j] * x[j]
+            feedback[k, i] = total
+        for i in range(m):
+            held[i] = lag[k, i]
+            for j in range(len(a)):
+                held[i] += C_a[i, j] * a[j]
+            for j in range(m):
+                held[i] += D_a[i, j] * feedback[k, j]
+        for i in range(len(a)):
+            turned[i] = 0.0
+            for j in range(len(a)):
+                turned[i] += A_a[i, j] * a[j]
+            for j in range(m):
+                turned[i] += B_a[i, j] * feedback[k, j]
+        a[:] = turned
+        for i in range(n):
+            row = i * (N_STATES + m)
+            new[i] = 0.0
+            for j in range(n):
+                new[i] += S[row + j] * x[j]
+            for j in range(m):
+                new[i] += S[row + N_STATES + j] * held[j]
+        x[:] = new

@@ -23,6 +23,7 @@ from hsv.control.design_file import find_file
 from hsv.errors import DesignError, QuantityError
 from hsv.inheritance import follow_extends, is_path
 from hsv.units import parse_quantity
+from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -261,6 +262,28 @@ class AdjustableInputs(_Table):
         return np.full(N_RIGID, self.tau[0]) if len(self.tau) == 1 else np.array(self.tau)
 
 
+class ActuatorInputs(_Table):
+    """The actuators that the design knows, by name; a channel without one is where its command is.
+
+    Their dynamics become states of the error system. Their stops are taken to be those of the vehicle.
+    """
+
+    fuel_equivalence_ratio: str | None = None
+    elevator_deflection: str | None = None
+
+    @field_validator("fuel_equivalence_ratio", "elevator_deflection")
+    @classmethod
+    def _known(cls, name: str | None, info: ValidationInfo) -> str | None:
+        names = [key for key, actuator in ACTUATOR_SETS.items() if actuator.channel == info.field_name]
+        if name is not None and name not in names:
+            raise ValueError(f"{info.field_name} = {name!r}: expected one of {', '.join(names)}")
+        return name
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the actuators, in the order of the channels."""
+        return tuple(name for name in (self.fuel_equivalence_ratio, self.elevator_deflection) if name)
+
+
 def _vehicle_values(vehicle: Vehicle | None) -> dict[str, Any] | None:
     return vehicle.to_parameters() if vehicle else None
 
@@ -285,6 +308,7 @@ class DesignInputs(_Table):
     vehicle: Annotated[Vehicle | None, BeforeValidator(_vehicle), PlainSerializer(_vehicle_values)] = None
     """Registered name, or the path of a file; none: the default one"""
     model: ModelInputs
+    actuator: ActuatorInputs | None = None
     notch: list[NotchInputs] = Field(min_length=1, max_length=4)
     feedback: FeedbackInputs
     nominal: NominalInputs
@@ -299,7 +323,14 @@ class DesignInputs(_Table):
             self.flown_vehicle.coupling_name(self.disturbance.coupling)
         except QuantityError as error:
             raise ValueError(f"disturbance.{error}") from error
+        if self.actuators and self.adjustable:
+            raise ValueError("actuator: given, expected none in an adjustable design")
         return self
+
+    @property
+    def actuators(self) -> tuple[str, ...]:
+        """Names of the actuators that the design knows."""
+        return self.actuator.names() if self.actuator else ()
 
     @property
     def flown_vehicle(self) -> Vehicle:

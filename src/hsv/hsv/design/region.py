@@ -20,10 +20,14 @@ from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import Flight, fly
 from hsv.threads import over_threads
+from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.plant import FlightStatus
 
 Corner = Mapping[str, float]
 Result = TypeVar("Result")
+
+_NO_STOP = 1e3
+"""Stop of an actuator that leaves those of the vehicle; they hold beside."""
 
 _FRACTIONED = 10
 """Uncertain parameters from which on a quarter of the corners is enough to measure disturbances."""
@@ -86,7 +90,17 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
         "fault.types": ["loss_of_effectiveness"],
         "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - region.elevator_effectiveness)!r}"],
         "fault.starts": [region.fault_start],
+        **actuator_parameters(inputs),
     }
+
+
+def actuator_parameters(inputs: DesignInputs) -> dict[str, Any]:
+    """Return the flat parameters of the actuators that the design knows, the stops those of its vehicle."""
+    values: dict[str, Any] = {}
+    for name in inputs.actuators:
+        where = f"actuator.{ACTUATOR_SETS[name].channel}"
+        values |= {f"{where}.set": name, f"{where}.stop": [_NO_STOP]}
+    return values
 
 
 class Region:
@@ -134,18 +148,31 @@ class Region:
 def record(flight: Flight) -> Record:
     """Return the part of ``flight`` that disturbances are computed from."""
     h = flight.history
-    return Record(h.state, h.deviation, h.command, h.actuator, flight.reference, flight.reference_input, flight.defect)
+    return Record(
+        h.state,
+        h.deviation,
+        h.nominal_input,
+        h.command,
+        h.actuator,
+        flight.reference,
+        flight.reference_input,
+        flight.defect,
+    )
 
 
 @dataclass(frozen=True)
 class RegionResult:
-    """What was measured over the region: extremes of the channels (7), and of f, w, Delta (9 each)."""
+    """What was measured over the region: extremes of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
+
+    The last: what F makes of the lag of the plan, nothing where actuators are ideal.
+    """
 
     flights: int
     channels: Extremes
     remainder: Extremes
     fault: Extremes
     delta: Extremes
+    lag_feedback: Extremes
 
 
 def measure(
@@ -154,9 +181,10 @@ def measure(
     """Fly ``over`` and return the extremes of every disturbance (paper eq. 17, eq. 19)."""
 
     def job(flight: Flight) -> list[np.ndarray]:
-        s: Signals = model.signals(record(flight))
-        parts = (s.channels, s.remainder, s.fault, s.delta)
+        recorded = record(flight)
+        s: Signals = model.signals(recorded)
+        parts = (s.channels, s.remainder, s.fault, s.delta, model.errors(recorded)[1])
         return [extreme for part in parts for extreme in (part.min(axis=0), part.max(axis=0))]
 
     columns = [np.stack(column) for column in zip(*region.map(job, over, progress), strict=True)]
-    return RegionResult(len(over), *(Extremes.over(*columns[i : i + 2]) for i in range(0, 8, 2)))
+    return RegionResult(len(over), *(Extremes.over(*columns[i : i + 2]) for i in range(0, 10, 2)))

@@ -1,7 +1,8 @@
 """Tightened bounds of the nominal input (paper eq. 30): U minus F Z, per side, with the trim.
 
 U is not symmetric about trim and the tube not about zero, so every side has its own bound. What the feedback may add is
-F e over c + Z, and its part from filtering the nominal pitch rate.
+F e over c + Z, its part from filtering the nominal pitch rate, and what it makes of the lag of the plan where the
+design knows its actuators.
 """
 
 from __future__ import annotations
@@ -36,16 +37,17 @@ class TightenedInputs:
         return np.minimum(trim_input - self.lower, self.upper - trim_input)
 
 
-def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> TightenedInputs:
+def tighten(
+    found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray, lag: tuple[np.ndarray, np.ndarray] | None = None
+) -> TightenedInputs:
     """Return U minus F Z (paper eq. 30, eq. 53) for U between ``minimum`` and ``maximum`` (2).
+
+    ``lag``: least and largest feedback (2 each) to the lag of the plan.
 
     Raises:
         DesignError: Nothing is left of an input.
     """
-    system, disturbance = found.problem.system, found.problem.disturbance
-    middle = system.F @ found.centre + system.F_d @ disturbance.centre
-    half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
-    bounds = TightenedInputs(minimum - middle + half, maximum - middle - half)
+    bounds = left_by(found, minimum, maximum, lag)
     for name, unit, low, high in zip(INPUT_NAMES, INPUT_UNITS, bounds.lower, bounds.upper, strict=True):
         if not low < high:
             raise DesignError(
@@ -53,6 +55,17 @@ def tighten(found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray) -> Ti
                 "expected room for the nominal input"
             )
     return bounds
+
+
+def left_by(
+    found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray, lag: tuple[np.ndarray, np.ndarray] | None = None
+) -> TightenedInputs:
+    """Return U minus F Z, whether anything is left or not; arguments as for :func:`tighten`."""
+    system, disturbance = found.problem.system, found.problem.disturbance
+    middle = system.F @ found.centre + system.F_d @ disturbance.centre
+    half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
+    bounds = TightenedInputs(minimum - middle + half, maximum - middle - half)
+    return bounds if lag is None else TightenedInputs(bounds.lower - lag[0], bounds.upper - lag[1])
 
 
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:

@@ -11,8 +11,7 @@ import numpy as np
 from hsv.control.design import ControlDesign
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
-from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership
-from hsv.design.error_system import tube_errors
+from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
 from hsv.design.sets.box import box
@@ -54,9 +53,7 @@ class Tube:
 
     def flown(self) -> TubeSet | None:
         """Return the set as a controller carries it; only the ellipsoid can be watched in flight."""
-        if not isinstance(self.found, EllipsoidSet):
-            return None
-        return TubeSet(self.found.centre, self.found.shape, self.found.half_width)
+        return self.found.seen() if isinstance(self.found, EllipsoidSet) else None
 
 
 def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> InvariantSet:
@@ -79,13 +76,16 @@ class MeasuredSet:
     found: InvariantSet
     certified: dict[str, Any]
     bounds: TightenedInputs
+    lag: tuple[np.ndarray, np.ndarray] | None
+    """Least and largest feedback (2 each) to the lag of the plan, where the design knows its actuators."""
 
     def report(self) -> dict[str, Any]:
         """Return disturbances, set and tightened inputs, for JSON."""
+        lag = {"lag_feedback": {"lower": self.lag[0].tolist(), "upper": self.lag[1].tolist()}} if self.lag else {}
         return {
             "disturbance": _disturbance_report(self.measured, self.disturbance),
             "invariant_set": {**_set_report(self.found), "certificate": self.certified},
-            "tightening": {"lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
+            "tightening": {**lag, "lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
         }
 
 
@@ -106,8 +106,12 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
     found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set)
     certified = found.certify()
     progress("invariant set", 1, 1)
-    bounds = tighten(found, design.input_minimum, design.input_maximum)
-    return MeasuredSet(measured, disturbance, found, certified, bounds)
+    lag = None
+    if design.actuators:
+        worst = measured.lag_feedback
+        lag = widened(worst.lower, worst.upper, inputs.disturbance.inflation)
+    bounds = tighten(found, design.input_minimum, design.input_maximum, lag)
+    return MeasuredSet(measured, disturbance, found, certified, bounds, lag)
 
 
 def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress) -> Tube:
@@ -156,7 +160,8 @@ def flights_in_tube(
 class FlightEvidence:
     """What one flight shows: worst ``level``, ratios |e - c| / z (n), membership, extremes of its plan, some metrics.
 
-    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2).
+    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2); ``lag_feedback`` (2, 2):
+    least and largest feedback to the lag of the plan.
     """
 
     level: float | None
@@ -164,6 +169,7 @@ class FlightEvidence:
     membership: Membership
     lowest: np.ndarray
     highest: np.ndarray
+    lag_feedback: np.ndarray
     metrics: np.ndarray
 
 
@@ -171,17 +177,18 @@ def flight_evidence(
     flight: Flight, found: InvariantSet, disturbance: DisturbanceSet, model: ChannelModel
 ) -> FlightEvidence:
     """Return what ``flight`` shows of the tube."""
-    h = flight.history
-    errors = tube_errors(h.state, h.deviation, flight.reference, model.notch)
-    plan = h.nominal_input + flight.reference_input
+    h, recorded = flight.history, record(flight)
+    errors, lag_feedback = model.errors(recorded)
+    plan = recorded.plan
     pitch_acceleration = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
     return FlightEvidence(
         level=float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
         ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
-        membership=disturbance.membership(model.signals(record(flight)).channels),
+        membership=disturbance.membership(model.signals(recorded).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
         highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
+        lag_feedback=np.stack((lag_feedback.min(axis=0), lag_feedback.max(axis=0))),
         metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
     )
 

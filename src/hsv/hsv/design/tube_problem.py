@@ -9,14 +9,28 @@ from hsv.control.notch_filter import discretise
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
 from hsv.design.error_system import error_system, union
 from hsv.design.sets.invariant_set import TubeProblem
+from hsv.lpv.actuated import sampled_actuators
+from hsv.vehicle.actuators import ACTUATOR_SETS, ActuatorSet
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.vehicle import Vehicle
 
 
 def channel_model(design: ControlDesign, vehicle: Vehicle) -> ChannelModel:
     """Return how disturbances are measured against the model of ``design``, which is for ``vehicle``."""
-    columns = acceleration_channels(vehicle, design.period)
-    return ChannelModel(design.polytope, discretise(design.notch, design.period), columns, design.filtered)
+    return ChannelModel(
+        design.polytope,
+        discretise(design.notch, design.period),
+        acceleration_channels(vehicle, design.period),
+        design.adjusted_gain(design.tau)[:, :N_RIGID],
+        vehicle,
+        design.filtered,
+        sampled_actuators(known_actuators(design), design.period) if design.actuators else None,
+    )
+
+
+def known_actuators(design: ControlDesign) -> tuple[ActuatorSet, ...]:
+    """Return the actuators that ``design`` knows."""
+    return tuple(ACTUATOR_SETS[name] for name in design.actuators)
 
 
 def factors(design: ControlDesign) -> list[np.ndarray]:
@@ -34,6 +48,15 @@ def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: Disturban
     model, polytope = channel_model(design, vehicle), design.polytope
     gain = design.feedback_gain[:, :N_RIGID]
     systems = [
-        error_system(polytope.A, polytope.B, gain * factor, model.notch, model.columns) for factor in factors(design)
+        error_system(
+            polytope.A,
+            polytope.B,
+            gain * factor,
+            model.notch,
+            model.columns,
+            known_actuators(design),
+            design.period,
+        )
+        for factor in factors(design)
     ]
     return TubeProblem(union(*systems), disturbance)

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import brentq
 
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.lpv.actuated import held_behind
 from hsv.vehicle.actuators import ActuatorSet
-from hsv.vehicle.dynamics import jacobian
+from hsv.vehicle.dynamics import N_STATES, PITCH_RATE, jacobian
 from hsv.vehicle.envelope import FOOT
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
@@ -47,7 +48,7 @@ IDEAL = Hardware()
 
 @dataclass(frozen=True)
 class SampledLoop:
-    """A (n, n) of vehicle (9), actuators, delay and filter, the loop open; B (n, 2) of the inputs; gain (2, n), u = gain x.
+    """A (n, n) of vehicle (9), actuators, delay and filter, the loop open; B (n, 2) of the inputs; gain (2, n) of u.
 
     ``period`` in s; the effectiveness of the elevator is in B.
     """
@@ -67,6 +68,21 @@ class SampledLoop:
     def growth(self) -> float:
         """Largest real part of all poles, 1/s: below zero the loop is stable."""
         return float(self.poles.real.max())
+
+    def command_noise(self, noise: np.ndarray) -> np.ndarray:
+        """Return the standard deviations (2) of the command under white measurement ``noise`` (9 deviations), SI.
+
+        Raises:
+            numpy.linalg.LinAlgError: The loop is unstable.
+        """
+        if self.growth >= 0.0:
+            raise np.linalg.LinAlgError(f"growth {self.growth:.3g} 1/s, expected a stable loop")
+        direct = self.gain[:, :N_STATES] * noise
+        entering = self.B @ direct
+        # Of what follows the vehicle's states the pitch rate moves the filter alone.
+        entering[N_STATES:, PITCH_RATE] += self.A[N_STATES:, PITCH_RATE] * noise[PITCH_RATE]
+        P = solve_discrete_lyapunov(self.A + self.B @ self.gain, entering @ entering.T)
+        return np.asarray(np.sqrt(np.diag(self.gain @ P @ self.gain.T + direct @ direct.T)))
 
     def elevator_loop(self, frequencies: np.ndarray) -> np.ndarray:
         """Return L (f), the response of the loop broken at the elevator, the other input closed; -1 is critical."""
@@ -113,7 +129,7 @@ def sampled_loop(
 def _held(
     vehicle: VehicleParameters, point: tuple[float, float], period: float, hardware: Hardware
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return A (n, n) and B (n, 2) of vehicle at trim and hardware, commands held; kept, for many loops go around each."""
+    """Return A (n, n) and B (n, 2) of the vehicle at trim behind ``hardware``; kept, for many loops go around each."""
     equilibrium = trim(vehicle, *point)
     A, B = jacobian(equilibrium.state, equilibrium.input, vehicle)
     return held_behind(A, B, period, hardware.actuators, hardware.delay)
@@ -159,6 +175,21 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float]) ->
             return value if before is None else float(brentq(growth, before, value, xtol=1e-6 * abs(value - before)))
         before = value
     return None
+
+
+def crossings(growth: Callable[[float], float], along: Sequence[float]) -> list[float]:
+    """Return all values at which ``growth`` changes its sign going ``along`` its argument, by root finding.
+
+    Args:
+        growth: Largest real part (1/s) of a loop's poles over a scalar, such as a bandwidth.
+        along: Values of the scalar, increasing, so dense that at most one change is between two of them.
+    """
+    values = [growth(float(value)) for value in along]
+    return [
+        float(brentq(growth, along[i], along[i + 1], xtol=1e-6 * (along[i + 1] - along[i])))
+        for i in range(len(values) - 1)
+        if (values[i] < 0.0) != (values[i + 1] < 0.0)
+    ]
 
 
 def critical_coupling(

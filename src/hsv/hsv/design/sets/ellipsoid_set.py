@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.control.tube_set import TubeSet
 from hsv.design.lmi import SolverReport, smallest_eigenvalues
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.errors import DesignError
@@ -35,8 +36,12 @@ class EllipsoidSet(InvariantSet):
     @property
     def shape(self) -> np.ndarray:
         """P = Q^-1 (n, n)."""
-        P = np.linalg.inv(self.Q)
-        return np.asarray(0.5 * (P + P.T))
+        return _inverse(self.Q)
+
+    def seen(self) -> TubeSet:
+        """Return the set as a controller sees it: its shadow on the states before those of actuators, if it has any."""
+        n = self.problem.system.seen
+        return TubeSet(self.centre[:n], _inverse(self.Q[:n, :n]), self.half_width[:n])
 
     def level(self, error: np.ndarray) -> np.ndarray:
         """Return (e - c)' P (e - c) of errors (..., n)."""
@@ -53,6 +58,11 @@ class EllipsoidSet(InvariantSet):
         if not origin <= 1.0:
             raise DesignError(f"ellipsoid: level of e = 0 is {origin:.6g}, expected at most 1: flights start there")
         return {"lmi_smallest_eigenvalues": residuals.tolist(), "level_of_zero_error": origin}
+
+
+def _inverse(Q: np.ndarray) -> np.ndarray:
+    P = np.linalg.inv(Q)
+    return np.asarray(0.5 * (P + P.T))
 
 
 def from_shape(

@@ -15,7 +15,7 @@ from hsv.design.sets.sampling import sample
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most, same
-from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.invariant_set import certified_set, lag_feedback
 from hsv.design.verification.tolerances import ROUNDING, TOLERANCES
 
 _FLIGHTS, _FLIGHT_SEED = 48, 7
@@ -43,6 +43,10 @@ def flight_claims(subject: Subject) -> Iterable[Claim]:
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
     yield above("nominal plan of flown corners, lowest", float(np.min(lowest - least)), -ROUNDING)
     yield above("nominal plan of flown corners, highest", float(np.min(most - highest)), -ROUNDING)
+    if (lag := lag_feedback(stored["tightening"])) is not None:
+        seen_lag = np.stack([f.lag_feedback for f in flown])
+        yield above("feedback to the lag of the plan, lowest", float(np.min(seen_lag[:, 0] - lag[0])), -ROUNDING)
+        yield above("feedback to the lag of the plan, highest", float(np.min(lag[1] - seen_lag[:, 1])), -ROUNDING)
     if "adjustable" in subject.certificate:
         flown = _sample(Region(design, subject.inputs, 1.0), found, model)
         yield from _worst("flown corners, whole fault", flown, subject.certificate["adjustable"]["complete_fault"])

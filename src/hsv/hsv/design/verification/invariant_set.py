@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from hsv.design.disturbance import DisturbanceSet, Extremes
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
-from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
+from hsv.design.verification.claims import Claim, Subject, above, at_most, required, same, same_parameter
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -27,6 +27,12 @@ def stored_set(design: ControlDesign, vehicle: Vehicle, stored: dict[str, Any]) 
     return from_report(tube_problem(design, vehicle, disturbance), stored["invariant_set"])
 
 
+def lag_feedback(tightening: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the bounds of the feedback to the lag of the plan in a certificate; none where actuators are ideal."""
+    lag = tightening.get("lag_feedback")
+    return (np.array(lag["lower"]), np.array(lag["upper"])) if lag else None
+
+
 def set_claims(subject: Subject) -> Iterable[Claim]:
     """Recompute invariance, half-widths and tightened bounds from the stored matrices; milliseconds."""
     stored, design = subject.certificate["tube"], subject.design
@@ -35,10 +41,11 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     yield Claim("tube parameters", str(design.tube is not None), "True", design.tube is not None)
     found = certified_set(subject)
     if design.tube is not None:
-        yield required(same_parameter(subject, "tube.centre", design.tube.centre, found.centre))
-        yield required(same_parameter(subject, "tube.shape", design.tube.shape, inverse(found.Q), "tube.shape = Q^-1"))
+        seen = found.seen()
+        yield required(same_parameter(subject, "tube.centre", design.tube.centre, seen.centre))
+        yield required(same_parameter(subject, "tube.shape", design.tube.shape, seen.shape, "tube.shape = Q^-1"))
         half_width, name = design.tube.half_width, "tube.half_width from Q"
-        yield required(same_parameter(subject, "tube.half_width", half_width, found.half_width, name))
+        yield required(same_parameter(subject, "tube.half_width", half_width, seen.half_width, name))
     yield same("certified half-widths from Q", s["half_width"], found.half_width, "half-widths")
     yield same("feedback half-ranges from Q", s["feedback_half_range"], found.feedback, "half-widths")
     measured, inputs = stored["disturbance"]["measured"], subject.certificate["inputs"]["disturbance"]
@@ -50,7 +57,8 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield required(above("invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0))
     yield required(at_most("level of e = 0", float(found.level(np.zeros(len(found.Q)))), 1.0))
-    bounds, kept = tighten(found, design.input_minimum, design.input_maximum), stored["tightening"]
+    kept = stored["tightening"]
+    bounds = tighten(found, design.input_minimum, design.input_maximum, lag_feedback(kept))
     yield same("tightened bounds, lower", kept["lower"], bounds.lower, "tightened bounds")
     yield same("tightened bounds, upper", kept["upper"], bounds.upper, "tightened bounds")
     plan = kept["plan"]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hsv.design.verification.claims import Claim, Subject, above, same, same_parameter
+from hsv.design.verification.claims import Claim, Subject, above, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
 
 
@@ -18,6 +18,10 @@ def input_claims(subject: Subject) -> Iterable[Claim]:
     yield same("notch", [list(vars(section).values()) for section in design.notch], notch, "copied")
     coupling = inputs["disturbance"]["coupling"]
     yield Claim("design.coupling", design.coupling, repr(coupling), design.coupling == coupling)
+    known = " ".join(name for name in (inputs.get("actuator") or {}).values() if name)
+    yield required(
+        Claim("design.actuators", " ".join(design.actuators), repr(known), " ".join(design.actuators) == known)
+    )
     limits, digest = subject.vehicle.decoupled, subject.vehicle.digest
     yield Claim("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest)
     yield same_parameter(subject, "input.minimum", design.input_minimum, limits.input_minimum)

@@ -11,7 +11,8 @@ from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.claims import Claim, Subject, above, at_most
-from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.invariant_set import certified_set, lag_feedback
+from hsv.design.verification.tolerances import ROUNDING
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -50,6 +51,10 @@ def scenario_claims(
     held = f" (W' holds {share:g} of fault and parameter bounds, eq. 47)" if share < 1.0 else ""
     yield at_most(f"{name}: disturbance over its bound, {worst.channel} at step {worst.step}{held}", worst.ratio, 1.0)
     kept = subject.certificate["tube"]["tightening"]
+    if (lag := lag_feedback(kept)) is not None:
+        reached = np.stack([f.lag_feedback for f in flown])
+        room = min(float(np.min(reached[:, 0] - lag[0])), float(np.min(lag[1] - reached[:, 1])))
+        yield above(f"{name}: room of the feedback to the lag of the plan", room, -ROUNDING)
     bounds = TightenedInputs(np.array(kept["lower"]), np.array(kept["upper"]))
     lowest, highest = np.min([f.lowest for f in flown], axis=0)[:2], np.max([f.highest for f in flown], axis=0)[:2]
     yield above(f"{name}: room of the nominal plan in U minus F Z", bounds.margins(lowest, highest).min(), 0.0)

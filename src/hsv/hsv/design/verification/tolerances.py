@@ -158,13 +158,16 @@ def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
         rows, columns = {"model.a": (states, states), "model.b": (states, inputs)}.get(parameter, (inputs, states))
         return np.asarray(rows[:, None] / columns)
     described = certificate["tube"]["invariant_set"]
+    seen = sum(not name.startswith(INPUT_NAMES) for name in described["states"])
     if kind == "ellipsoids":
-        Q = described["Q"] if parameter == "tube.shape" else [gain["Q"] for gain in certificate["nominal"]]
-        P = np.linalg.inv(np.array(Q))
+        Q = np.array([gain["Q"] for gain in certificate["nominal"]])
+        if parameter == "tube.shape":
+            Q = np.array(described["Q"])[:seen, :seen]
+        P = np.linalg.inv(Q)
         roots = np.sqrt(np.diagonal(P, axis1=-2, axis2=-1))
         return np.asarray(roots[..., :, None] * roots[..., None, :])
     if kind in ("centre", "half-widths"):
-        return np.array(described["half_width"])
+        return np.array(described["half_width"])[:seen]
     if kind == "plans":
         plan = certificate["tube"]["tightening"]["plan"]
         low, high = plan["pitch_acceleration"]

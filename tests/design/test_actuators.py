@@ -1,0 +1,108 @@
+"""A design that knows its actuators: their states in the error system, the lag of the plan, what a controller sees."""
+
+import dataclasses
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.design.disturbance import DisturbanceSet
+from hsv.design.inputs import ActuatorInputs, parse_inputs
+from hsv.design.region import Region, record
+from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.errors import DesignError
+from hsv.lpv.actuated import respond
+
+NAMES = ("fuel_10", "elevator_50")
+
+
+@pytest.fixture(scope="module")
+def design(subject):
+    return dataclasses.replace(subject.design, actuators=NAMES)
+
+
+@pytest.fixture(scope="module")
+def flight(design, subject):
+    short = subject.inputs.disturbance.model_copy(update={"duration": 102.0})
+    actuator = {"fuel_equivalence_ratio": NAMES[0], "elevator_deflection": NAMES[1]}
+    table = subject.inputs.model_copy(update={"disturbance": short, "actuator": ActuatorInputs(**actuator)})
+    return Region(design, table, 1.0).fly(subject.vehicle.uncertainty)
+
+
+def test_the_error_system_predicts_the_error_of_a_flight_with_actuators(flight, design, subject):
+    """From one step to the next, states of filter and actuators included; the lag of the plan is taken out before."""
+    model = channel_model(design, subject.vehicle)
+    recorded = record(flight)
+    errors, _ = model.errors(recorded)
+    channels = model.signals(recorded).channels
+    ones = DisturbanceSet(-np.ones(7), np.ones(7))
+    size = np.abs(errors).max(axis=0)
+    for k in (1, 60, 700, 5001, 5090):
+        A, B = design.polytope.at(*flight.history.state[k, :2])
+        local = dataclasses.replace(design.polytope, A=np.repeat(A[None], 20, 0), B=np.repeat(B[None], 20, 0))
+        system = tube_problem(dataclasses.replace(design, polytope=local), subject.vehicle, ones).system
+        predicted = system.A[0] @ errors[k] + system.G[0] @ channels[k]
+        assert_allclose(predicted / size, errors[k + 1] / size, rtol=0.0, atol=1e-8)
+
+
+def test_a_controller_sees_the_states_before_those_of_the_actuators(design, subject):
+    ones = DisturbanceSet(-np.ones(7), np.ones(7))
+    system = tube_problem(design, subject.vehicle, ones).system
+    assert system.names[-3:] == (
+        "fuel_equivalence_ratio_position",
+        "elevator_deflection_position",
+        "elevator_deflection_rate",
+    )
+    assert system.seen == 7
+    assert np.all(system.F[:, 7:] == 0.0)
+    ideal = tube_problem(subject.design, subject.vehicle, ones).system
+    assert_allclose(system.F[:, :7], ideal.F)
+
+
+def test_the_lag_of_a_plan_at_rest_is_nothing(design, subject):
+    sampled = channel_model(design, subject.vehicle).actuators
+    states, means = respond(sampled, np.zeros((5, 2)))
+    assert not states.any()
+    assert not means.any()
+
+
+def test_the_feedback_to_the_lag_dies_out_between_two_gains_of_the_plan(flight, design, subject):
+    _, feedback = channel_model(design, subject.vehicle).errors(record(flight))
+    assert 0.001 < np.abs(feedback[:200, 1]).max() < 0.02
+    # A second before the fault the plan has long settled.
+    assert np.abs(feedback[4900:5000, 1]).max() < 1e-3 * np.abs(feedback[:, 1]).max()
+
+
+def test_the_parameters_say_which_actuators(design):
+    values = design.to_parameters()
+    assert values["design.actuators"] == "fuel_10 elevator_50"
+    assert type(design).from_parameters(values).actuators == NAMES
+    with pytest.raises(DesignError, match=r"^parameter design\.actuators = 'servo': expected names from "):
+        type(design).from_parameters(values | {"design.actuators": "servo"})
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        (
+            {"elevator_deflection": "fuel_10"},
+            r"actuator\.elevator_deflection = 'fuel_10': expected one of elevator_50, ",
+        ),
+        ({"elevator_deflection": 50}, r"actuator\.elevator_deflection = 50: "),
+        ({"rudder": "elevator_50"}, r"actuator\.rudder: unknown field"),
+    ],
+)
+def test_wrong_actuators_are_named(table, message):
+    source = Path(__file__).parents[2] / "offline_design" / "baseline.toml"
+    inputs = tomllib.loads(source.read_text(encoding="utf-8"))
+    with pytest.raises(DesignError, match=message):
+        parse_inputs(inputs | {"actuator": table})
+
+
+def test_an_adjustable_design_knows_no_actuators():
+    source = Path(__file__).parents[2] / "offline_design" / "adjustable.toml"
+    inputs = tomllib.loads(source.read_text(encoding="utf-8"))
+    with pytest.raises(DesignError, match=r"^actuator: given, expected none in an adjustable design"):
+        parse_inputs(inputs | {"actuator": {"elevator_deflection": "elevator_50"}})
