@@ -5,6 +5,7 @@ import pytest
 
 from hsv.control.design_file import find_design, read_design
 from hsv.study.linear_loop import COUPLING_SCALES
+from hsv.study.sensitivity import hardware
 from hsv.study.sensitivity.catalogue import STUDIES, page
 from hsv.study.sensitivity.controllers import (
     ALL,
@@ -177,3 +178,23 @@ def test_a_coarse_study_has_a_page_with_its_findings(tmp_path):
         assert found.startswith(controller.label)
         said = re.search(r"stable up to κ = (\S+)( at least)? \(nominal", found)
         assert float(said[1]) == pytest.approx(COUPLING_SCALES[-1] if limit is None else limit, abs=0.005)
+
+
+def test_hardware_limits_of_the_baseline_and_of_the_loop_without_notch():
+    """Where stability changes the loop is on the edge; without the notch elevators of a middle range destabilise it."""
+    with_notch, without = hardware.CASES[:2]
+    for case in (with_notch, without):
+        limits = hardware.Limits.of(case, [{}])
+        for bandwidth in limits.bandwidths[0]:
+            assert abs(hardware.growth(case, hardware.elevator(bandwidth))) < 1e-3
+        borne = limits.delays["one of 50 rad/s"][0]
+        assert hardware.growth(case, hardware.elevator(50.0, borne - 1e-3)) < 0.0
+        assert hardware.growth(case, hardware.elevator(50.0, borne + 1e-3)) > 0.0
+    assert len(limits.bandwidths[0]) == 3
+    assert limits.bandwidths[0][1] < 150.0 < limits.bandwidths[0][2]
+    assert "stable from 7.25 to 83.5 rad/s and from 628 rad/s on (nominal vehicle)" in limits.said("no corner")
+
+
+def test_a_loop_that_is_unstable_has_no_noise_to_speak_of():
+    unstable = hardware.Case(WITHOUT_NOTCH, "derived", "black")
+    assert np.isnan(hardware.elevator_noise(unstable, hardware.elevator(50.0), "fine"))

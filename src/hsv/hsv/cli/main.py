@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from hsv.cli.bench import bench
+from hsv.cli.certify import certify
 from hsv.cli.check import check
 from hsv.cli.claims import claims
 from hsv.cli.conclude import conclude
@@ -60,6 +61,7 @@ for command in (
     linearise,
     design,
     verify,
+    certify,
     check,
     scenarios,
     vehicles,

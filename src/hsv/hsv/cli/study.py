@@ -13,7 +13,9 @@ from hsv.cli.targets import check_folder
 
 
 def study(
-    name: Annotated[str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp or factor.")],
+    name: Annotated[
+        str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor or hardware.")
+    ],
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of the study.")] = Path("study"),
     flights: FlightsOption = Path("bags/study"),
     coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,

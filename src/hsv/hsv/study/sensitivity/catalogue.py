@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from hsv.study.sensitivity import coupling, factor, fault, notch, parameters, ramp, sampling, weights
+from hsv.study.sensitivity import coupling, factor, fault, hardware, notch, parameters, ramp, sampling, weights
 from hsv.study.sensitivity.study import Outcome, Study
 
 STUDIES: dict[str, Study] = {
-    m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, weights, ramp, factor)
+    m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, weights, ramp, factor, hardware)
 }
 
 _PAGE = """# Sensitivity: {title}

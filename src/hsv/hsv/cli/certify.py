@@ -1,0 +1,72 @@
+"""The command ``hsv certify``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.table import Table
+
+from hsv.cli.options import JsonOption
+from hsv.cli.output import console, print_json, report_error
+
+if TYPE_CHECKING:
+    from hsv.design.verification.effects import Verdict
+
+
+def certify(
+    file: Annotated[Path, typer.Argument(help="Parameter file of a design; its certificate lies beside it.")],
+    sensors: Annotated[str, typer.Option(help="Published sensors by name: their noise and bias.")] = "ideal",
+    bias: Annotated[
+        list[str], typer.Option(help="Constant bias of a rigid state, as 'angle_of_attack=0.05 deg'; may be repeated.")
+    ] = [],  # noqa: B006
+    actuators: Annotated[
+        str, typer.Option(help="Published actuators by name, with commas between; default: those the design knows.")
+    ] = "",
+    gust: Annotated[str, typer.Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
+    turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
+    density: Annotated[str, typer.Option(help="Largest difference of the density from the model's.")] = "0 %",
+    json: JsonOption = False,
+) -> None:
+    """Say whether a design stays certified with hardware and air, and by how much; fails where it does not.
+
+    Each model is added to the disturbances of the certificate alone, and then all of them. The tube's invariant set is
+    sought anew, and the nominal plan has to fit into what it leaves of the inputs.
+
+    Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
+    """
+    from hsv.cli.progress import stages
+    from hsv.design.verification.effects import certified_with, described
+    from hsv.design.verification.verifier import load_subject
+
+    subject = load_subject(file)
+    models = described(subject, sensors=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density)
+    with stages() as progress:
+        verdicts = certified_with(subject, models, actuators, progress)
+    if json:
+        print_json({"design": subject.design.name, "verdicts": [verdict.as_dict() for verdict in verdicts]})
+    else:
+        console.print(_table(verdicts))
+        for verdict in verdicts:
+            state = "certified" if verdict.certified else "not certified"
+            console.print(f"{verdict.name}: {state}, {verdict.said}", soft_wrap=True)
+    if not verdicts[-1].certified:
+        report_error(f"{subject.design.name}: not certified with {verdicts[-1].name}: {verdicts[-1].said}")
+        raise typer.Exit(1)
+
+
+def _table(verdicts: list[Verdict]) -> Table:
+    from hsv.units import to_paper
+
+    table = Table(box=None, pad_edge=False)
+    for column in ("", "h ft", "V ft/s", "alpha deg", "theta deg", "q deg/s", "FZ fuel", "FZ elevator deg"):
+        table.add_column(column, justify="left" if not column else "right", overflow="fold")
+    units = ("m", "m/s", "rad", "rad", "rad/s", "1", "rad")
+    for verdict in verdicts:
+        numbers = [""] * len(units)
+        if verdict.half_width is not None and verdict.feedback is not None:
+            values = (*verdict.half_width, *verdict.feedback)
+            numbers = [f"{to_paper(value, unit)[0]:.3g}" for value, unit in zip(values, units, strict=True)]
+        table.add_row(verdict.name, *numbers)
+    return table

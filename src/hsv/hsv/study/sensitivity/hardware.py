@@ -1,0 +1,258 @@
+"""Which actuators, delay and sensor noise the linear loop of each controller bears."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from hsv.design.region import Corner
+from hsv.sensors import SENSOR_SETS
+from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
+from hsv.study.linear_loop import START, TARGET, Hardware, crossings, sampled_loop, stability_limit, worst_growth
+from hsv.study.sensitivity.controllers import (
+    PURPLE,
+    SAID_RMPC,
+    WIDER_NOTCH,
+    WITH_NOTCH,
+    WITHOUT_NOTCH,
+    Controller,
+    corners_of,
+    feedback,
+    said_corners,
+)
+from hsv.study.sensitivity.study import Outcome, Progress, Study
+from hsv.units import to_paper
+from hsv.vehicle.actuators import ACTUATOR_SETS
+from hsv.vehicle.dynamics import STATE_NAMES
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import load_vehicle
+
+REALISTIC = Controller("tube that knows its actuators", "case1", GREEN, "realistic")
+RMPC = Controller("RMPC without notch", "case1_rmpc_fourth_k", RED)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A controller around a vehicle with this coupling."""
+
+    controller: Controller
+    coupling: str
+    color: str
+
+    @property
+    def label(self) -> str:
+        """For plots and sentences."""
+        return f"{self.controller.label}, {self.coupling.replace('_', '-')} coupling"
+
+
+CASES = (
+    Case(WITH_NOTCH, "paper_like", BLUE),
+    Case(WITHOUT_NOTCH, "paper_like", ORANGE),
+    Case(REALISTIC, "paper_like", GREEN),
+    Case(RMPC, "paper_like", RED),
+    Case(WITH_NOTCH, "derived", PURPLE),
+    Case(WIDER_NOTCH, "derived", GREY),
+)
+
+FUEL, ELEVATOR = ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"]
+
+ELEVATORS: dict[str, Hardware] = {
+    "ideal actuators": Hardware(),
+    "an elevator of 150 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_150"])),
+    "one of 50 rad/s": Hardware((FUEL, ELEVATOR)),
+    "one of 20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
+    "one of 20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
+}
+"""Published elevators, each with the fuel delivery of 10 rad/s."""
+
+BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
+"""rad/s, of elevators of the second order."""
+
+DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
+"""s, between which the limit is looked for."""
+
+_SHOWN_DELAY = 0.16
+
+_ONE_DEGREE = np.pi / 180.0
+
+
+def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
+    """Return an elevator of ``bandwidth`` (rad/s), the damping that of the realistic one, its fuel, a ``delay`` (s)."""
+    return Hardware((FUEL, replace(ELEVATOR, natural_frequency=bandwidth)), delay)
+
+
+def growth(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> float:
+    """Return the largest real part (1/s) of all poles over both ends of the step, fault and corners."""
+    gain, notch, period = feedback(case.controller)
+    vehicle = load_vehicle().coupled(case.coupling)
+    return max(worst_growth(vehicle.perturbed(corner), gain, notch, period, hardware) for corner in over)
+
+
+def delay_borne(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> float | None:
+    """Return the delay (s) at which the loop stops being stable; ``None``: beyond all of :data:`DELAYS`."""
+    return stability_limit(lambda delay: growth(case, replace(hardware, delay=delay), over), DELAYS)
+
+
+def elevator_noise(case: Case, hardware: Hardware, sensors: str) -> float:
+    """Return the rms elevator command (rad) from the noise of a published sensor set, the worse end of the step.
+
+    Not a number where the loop is unstable.
+    """
+    gain, notch, period = feedback(case.controller)
+    vehicle: VehicleParameters = load_vehicle().coupled(case.coupling)
+    channels = SENSOR_SETS[sensors].channels
+    noise = np.array([channels.get(name, {}).get("noise", 0.0) for name in STATE_NAMES])
+    loops = [sampled_loop(vehicle, gain, notch, period, point=p, hardware=hardware) for p in (START, TARGET)]
+    if any(loop.growth >= 0.0 for loop in loops):
+        return float("nan")
+    return max(float(loop.command_noise(noise)[1]) for loop in loops)
+
+
+def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
+    """Linearise every controller behind elevators of all bandwidths and behind delays."""
+    over = corners_of(1.0, coarseness)
+    bandwidths = np.geomspace(5.0, 500.0, max(4, round(31 / coarseness)))
+    delays = np.linspace(0.0, _SHOWN_DELAY, max(3, round(33 / coarseness)))
+    figure = new_figure(6.4)
+    panels = figure.subplots(2, 2).ravel()
+    findings, numbers = [], {}
+    for done, case in enumerate(CASES):
+        progress("linear loops", done, len(CASES))
+        growths = [growth(case, elevator(float(w))) for w in bandwidths]
+        late = [growth(case, elevator(ELEVATOR.natural_frequency, float(delay))) for delay in delays]
+        borne = [delay_borne(case, elevator(float(w))) for w in bandwidths]
+        noise = [elevator_noise(case, elevator(float(w)), "fine") for w in bandwidths]
+        style = "-" if case.coupling == "paper_like" else "--"
+        panels[0].semilogx(bandwidths, growths, style, color=case.color, label=case.label)
+        panels[1].plot(1e3 * delays, late, style, color=case.color)
+        panels[2].semilogx(bandwidths, [np.nan if d is None else 1e3 * d for d in borne], style, color=case.color)
+        panels[3].semilogx(bandwidths, [to_paper(n, "rad")[0] for n in noise], style, color=case.color)
+        limits = Limits.of(case, over)
+        findings.append(f"{case.label}: {limits.said(said_corners(over))}")
+        numbers[case.label] = {
+            **limits.report(),
+            "growth_per_s": growths,
+            "growth_behind_delay_per_s": late,
+            "delay_borne_s": borne,
+            "elevator_noise_rad": noise,
+        }
+    progress("linear loops", len(CASES), len(CASES))
+    for panel, label in zip(
+        panels,
+        ("largest real part (1/s)", "largest real part (1/s)", "delay borne (ms)", "elevator rms, fine sensors (deg)"),
+        strict=True,
+    ):
+        panel.set_ylabel(label)
+        panel.set_xlabel("bandwidth of the elevator (rad/s)")
+    panels[1].set_xlabel(f"delay (ms), elevator of {ELEVATOR.natural_frequency:g} rad/s")
+    for panel in panels[:2]:
+        panel.axhline(0.0, color="black", linewidth=0.6)
+        panel.set_ylim(-0.6, 1.0)
+    panels[2].set_ylim(bottom=0.0)
+    panels[3].set_ylim(0.0, 1.0)
+    letter(panels)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return Outcome(
+        figure,
+        "Linear sampled loop of Case 1 around the coupled vehicle, the worst of both ends of the step, before and "
+        f"after the fault, with an elevator of the second order, damping {ELEVATOR.damping_ratio:g}, and the fuel "
+        f"delivery of {FUEL.natural_frequency:g} rad/s; nominal vehicle. (a) Over the bandwidth of the elevator. (b) "
+        "Over a delay of the command. (c) The delay at which the loop stops being stable, by root finding. (d) Rms of "
+        "the elevator command from the noise of the fine sensor set, without a fault; no line where the loop is "
+        f"unstable. {SAID_RMPC}. Limits of the actuators are left out.",
+        tuple(findings),
+        {"bandwidth_rad_per_s": bandwidths.tolist(), "delay_s": delays.tolist(), "cases": numbers},
+    )
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a case bears.
+
+    ``growths`` (1/s) with each of :data:`ELEVATORS`; ``bandwidths`` (rad/s) at which stability changes, of the nominal
+    vehicle and of the worst of the corners; ``delays`` (s) with ideal and realistic actuators, nominal and worst;
+    ``noise`` (rad) of the elevator by sensor set, realistic actuators.
+    """
+
+    growths: dict[str, float]
+    bandwidths: tuple[list[float], list[float]]
+    ends: tuple[bool, bool]
+    delays: dict[str, tuple[float | None, float | None]]
+    noise: dict[str, float]
+
+    @classmethod
+    def of(cls, case: Case, over: Sequence[Corner]) -> Limits:
+        """Return the limits of ``case``, the corners ``over`` beside the nominal vehicle."""
+
+        def nominal(bandwidth: float) -> float:
+            return growth(case, elevator(bandwidth))
+
+        def worst(bandwidth: float) -> float:
+            return growth(case, elevator(bandwidth), over)
+
+        chosen = {name: ELEVATORS[name] for name in ("ideal actuators", "one of 50 rad/s")}
+        return cls(
+            {name: growth(case, hardware) for name, hardware in ELEVATORS.items()},
+            (crossings(nominal, BANDWIDTHS), crossings(worst, BANDWIDTHS[:: max(1, len(BANDWIDTHS) // 30)])),
+            (nominal(BANDWIDTHS[0]) < 0.0, worst(BANDWIDTHS[0]) < 0.0),
+            {name: (delay_borne(case, h), delay_borne(case, h, over)) for name, h in chosen.items()},
+            {name: elevator_noise(case, ELEVATORS["one of 50 rad/s"], name) for name in ("fine", "ghv")},
+        )
+
+    def said(self, corners: str) -> str:
+        """Return the limits in words."""
+        spans = [
+            f"{_stable(changes, first)} ({vehicle})"
+            for changes, first, vehicle in zip(
+                self.bandwidths, self.ends, ("nominal vehicle", f"worst of {corners}"), strict=True
+            )
+        ]
+        growths = ", ".join(f"{value:+.3f} with {name}" for name, value in self.growths.items())
+        delays = "; ".join(
+            f"delay borne with {name} {_milliseconds(nominal)} (nominal vehicle), {_milliseconds(worst)} (worst)"
+            for name, (nominal, worst) in self.delays.items()
+        )
+        return f"elevator {'; '.join(spans)}; largest real part {growths} 1/s; {delays}; {self._said_noise()}"
+
+    def _said_noise(self) -> str:
+        if any(np.isnan(value) for value in self.noise.values()):
+            return "no statement on noise: unstable with an elevator of 50 rad/s"
+        said = " and ".join(f"{to_paper(value, 'rad')[0]:.2f} deg ({name})" for name, value in self.noise.items())
+        return (
+            f"sensor noise moves the elevator by {said} rms, by 1 deg if it is {_ONE_DEGREE / self.noise['fine']:.1f} "
+            "times the fine set"
+        )
+
+    def report(self) -> dict[str, object]:
+        """Return the limits for JSON."""
+        return {
+            "growth_with_published_elevators_per_s": self.growths,
+            "stability_changes_at_rad_per_s": {"nominal": self.bandwidths[0], "worst": self.bandwidths[1]},
+            "stable_when_slowest": {"nominal": self.ends[0], "worst": self.ends[1]},
+            "delay_borne_s_of": {name: {"nominal": n, "worst": w} for name, (n, w) in self.delays.items()},
+            "elevator_rms_rad": self.noise,
+        }
+
+
+def _stable(changes: Sequence[float], first: bool) -> str:
+    """Return in words where a loop is stable that changes at these bandwidths, ``first``: so at the lowest."""
+    edges = [BANDWIDTHS[0], *changes, BANDWIDTHS[-1]]
+    spans = [
+        f"from {low:.3g} to {high:.3g} rad/s" if high < BANDWIDTHS[-1] else f"from {low:.3g} rad/s on"
+        for index, (low, high) in enumerate(pairwise(edges))
+        if (index % 2 == 0) == first
+    ]
+    return f"stable {' and '.join(spans)}" if spans else "stable nowhere"
+
+
+def _milliseconds(delay: float | None) -> str:
+    if delay is None:
+        return f"{1e3 * DELAYS[-1]:g} ms at least"
+    return f"{1e3 * delay:.0f} ms" if delay > 0.0 else "none"
+
+
+STUDY = Study("hardware", "Actuators, delay and noise", run)
