@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design_file import ControlDesign
+from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, widened
 from hsv.design.error_system import ErrorSystem
 from hsv.design.region import Region, incomplete_share, record
