@@ -52,7 +52,7 @@ def test_a_flight_that_diverges_ends_at_the_same_step():
 
 @needs_compiler
 def test_another_flight_is_seen():
-    parts, other = components(duration=110.0), components(duration=110.0, fault__values=[0.9000001])
+    parts, other = components(duration=110.0), components(duration=110.0, fault__parameters=["effectiveness=0.9000001"])
     assert largest_difference(fly(parts).history, CFlight(other).fly()) > 1e-9
     assert largest_difference(fly(parts).history, CFlight(components(duration=100.0)).fly()) == float("inf")
 

@@ -205,7 +205,7 @@ def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
         assert f"{name} " in str(fault) and str(fault).endswith(f"of {channel}")
         assert Fault.of(channel, name, fault.parameters) == fault
         sides = (COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR)
-        assert sum(len(fault_rows([side], [(fault, 0, NEVER)], T).start) for side in sides) == 1
+        assert sum(len(fault_rows([side], [(fault, 0, NEVER)], T).table) for side in sides) == 1
         for parameter in (*kind.parameters, *OCCURRENCE_PARAMETERS):
             described = parameter.of(channel)
             assert described.description and described.minimum <= described.default <= described.maximum

@@ -143,7 +143,7 @@ def test_integral_action_removes_the_offset_of_a_wrong_mass(flown):
 
 
 def test_without_fault_the_flight_ends_at_its_command():
-    values = {"fault__values": [1.0]}
+    values = {"fault__parameters": ["effectiveness=1.0"]}
     h = fly(components("case1", **values)).history
     reference = fly(components("case1", duration=0.02)).reference
     assert np.abs(h.state[-1] - reference)[:2].max() < 0.05

@@ -43,7 +43,7 @@ TWO_NOTCHES = {
         ("case1", SHORT | {"vehicle__model": "DM"}),
         ("case1", SHORT | {"substeps": 4}),
         ("case1", SHORT | TWO_NOTCHES),
-        ("case1", SHORT | {"fault__starts": [0.0], "fault__values": [0.0]}),
+        ("case1", SHORT | {"fault__starts": [0.0], "fault__parameters": ["effectiveness=0.0"]}),
         ("case1", {"duration": 0.0}),
         ("case1", {"duration": 0.02}),
         ("case1_derived_no_notch", {}),

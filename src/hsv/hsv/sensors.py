@@ -17,7 +17,7 @@ from numba import njit
 
 from hsv.elementary import exponential
 from hsv.errors import ParameterError
-from hsv.faults.laws import ACTING, KEPT, ONSET, begin_faults
+from hsv.faults.laws import ACTING, CHANNEL, CODE, KEPT, ONSET, PARAMETER, START, begin_faults
 from hsv.faults.table import (
     SENSOR_BIAS,
     SENSOR_DROP_OUT,
@@ -270,9 +270,9 @@ def measure(
         else:
             measurement[i] = x[i]
     if failing > 0:
-        for j in range(len(rows.start)):
+        for j in range(len(rows.table)):
             if memory[j, ACTING] == 1.0:
-                i = rows.channel[j]
+                i = int(rows.table[j, CHANNEL])
                 measurement[i] = _failed(rows, memory, j, step, seed, measurement[i], state[i, GIVEN])
     for i in range(N_STATES):
         state[i, GIVEN] = measurement[i]
@@ -332,22 +332,22 @@ def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: floa
 @njit(cache=True, error_model="numpy", inline="always")
 def _failed(rows: Any, memory: np.ndarray, j: int, step: int, seed: int, value: float, given: float) -> float:
     """Return what becomes of a measurement; ``given`` is the one of the step before."""
-    code, first = rows.code[j], rows.parameters[j, 0]
+    code, first = int(rows.table[j, CODE]), rows.table[j, PARAMETER]
     fresh = memory[j, ONSET] == step
     if code == SENSOR_SCALE:
         return first * value
     if code == SENSOR_NOISE:
-        drawn, _ = normals(seed, step, _FAULT_NOISE + rows.channel[j], rows.start[j])
+        drawn, _ = normals(seed, step, _FAULT_NOISE + int(rows.table[j, CHANNEL]), rows.table[j, START])
         return value + first * drawn
     if code == SENSOR_BIAS:
         return value + first
     if code == SENSOR_RUNAWAY:
-        limit = rows.parameters[j, 1]
-        return value + min(max(first * ((step - rows.start[j]) * rows.period), -limit), limit)
+        limit = rows.table[j, PARAMETER + 1]
+        return value + min(max(first * ((step - rows.table[j, START]) * rows.period), -limit), limit)
     if code == SENSOR_DROP_OUT:
         if fresh:
             memory[j, KEPT] = given if step > 0 else value
-        drawn, _ = uniforms(seed, step, _FAULT_DROP_OUT + rows.channel[j], rows.start[j])
+        drawn, _ = uniforms(seed, step, _FAULT_DROP_OUT + int(rows.table[j, CHANNEL]), rows.table[j, START])
         if drawn >= first:
             memory[j, KEPT] = value
         return memory[j, KEPT]

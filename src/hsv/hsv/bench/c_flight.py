@@ -19,7 +19,7 @@ from hsv.control.nominal_law import FamilyLaw
 from hsv.control.tube_law import TubeLaw
 from hsv.errors import RunError
 from hsv.export.controller import SOURCE, controller_source
-from hsv.faults.laws import FaultRows
+from hsv.faults.laws import CHANNEL, CODE, OCCURRENCE, PARAMETER, START, STOP, FaultRows
 from hsv.faults.table import COMMAND, LOSS
 from hsv.simulation.closed_loop import Components, History
 
@@ -65,8 +65,8 @@ def _losses(components: Components) -> FaultRows:
     if not (data.actuators.ideal and data.atmosphere.still and data.sensors.ideal):
         raise RunError("C build: actuators, air and sensors are ideal in it, expected a scenario with these")
     rows = components.fault_injector.rows((COMMAND,))
-    others = len(rows.start) < len(known) or np.any(rows.code != LOSS)
-    if others or rows.occurrence.any() or rows.parameters[:, 1].any():
+    others = len(rows.table) < len(known) or np.any(rows.table[:, CODE] != LOSS)
+    if others or rows.table[:, OCCURRENCE].any() or rows.table[:, PARAMETER + 1].any():
         raise RunError("C build: a fault that it does not know, expected a loss of effectiveness, at once and for good")
     return rows
 
@@ -111,9 +111,9 @@ class CFlight:
             ),
             ctypes.byref(
                 _Faults(
-                    len(faults.start),
-                    *(self._integers(a) for a in (faults.start, faults.stop, faults.channel)),
-                    self._doubles(np.ascontiguousarray(faults.parameters[:, 0])),
+                    len(faults.table),
+                    *(self._integers(faults.table[:, column].astype(np.int64)) for column in (START, STOP, CHANNEL)),
+                    self._doubles(np.ascontiguousarray(faults.table[:, PARAMETER])),
                 )
             ),
             ctypes.byref(_Reference(reference.first, len(reference.state), *map(self._doubles, reference[1:]))),

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 from hsv.elementary import sine
-from hsv.faults.laws import ACTING, KEPT, ONSET, begin_faults
+from hsv.faults.laws import ACTING, CHANNEL, CODE, KEPT, ONSET, PARAMETER, START, begin_faults
 from hsv.faults.table import (
     BANDWIDTH,
     BIAS,
@@ -59,7 +59,7 @@ def move_effectors(
         angle_of_attack: rad, for what floats along the flow.
         effector: What it was over the substep before; replaced.
     """
-    n = len(rows.start)
+    n = len(rows.table)
     middle = (substep + 0.5) * data.substep
     for channel in range(len(command)):
         order = data.order[channel]
@@ -68,15 +68,18 @@ def move_effectors(
         minimum, maximum, rate = data.minimum[channel], data.maximum[channel], data.rate_limit[channel]
         slowed = False
         for i in range(n):
-            if memory[i, ACTING] == 1.0 and rows.channel[i] == channel:
-                if rows.code[i] == BANDWIDTH and rows.parameters[i, 0] < frequency:
-                    frequency = rows.parameters[i, 0]
+            if memory[i, ACTING] == 1.0 and int(rows.table[i, CHANNEL]) == channel:
+                if int(rows.table[i, CODE]) == BANDWIDTH and rows.table[i, PARAMETER] < frequency:
+                    frequency = rows.table[i, PARAMETER]
                     order = max(order, 1)
                     slowed = True
-                elif rows.code[i] == RATE_LIMIT:
-                    rate = min(rate, rows.parameters[i, 0])
-                elif rows.code[i] == STOP_LIMIT:
-                    minimum, maximum = max(minimum, rows.parameters[i, 0]), min(maximum, rows.parameters[i, 1])
+                elif int(rows.table[i, CODE]) == RATE_LIMIT:
+                    rate = min(rate, rows.table[i, PARAMETER])
+                elif int(rows.table[i, CODE]) == STOP_LIMIT:
+                    minimum, maximum = (
+                        max(minimum, rows.table[i, PARAMETER]),
+                        min(maximum, rows.table[i, PARAMETER + 1]),
+                    )
         if slowed:
             map = actuator_map(order, frequency, damping, data.substep)
         after, speed, position = actuator_step(
@@ -93,11 +96,12 @@ def move_effectors(
         )
         replaced = False
         for i in range(n):
-            if memory[i, ACTING] == 1.0 and rows.channel[i] == channel and rows.code[i] >= SCALE:
+            here = memory[i, ACTING] == 1.0 and int(rows.table[i, CHANNEL]) == channel
+            if here and int(rows.table[i, CODE]) >= SCALE:
                 if memory[i, ONSET] == step and substep == 0:
                     memory[i, KEPT] = effector[channel]
-                if rows.code[i] >= LOCK:
-                    replaced = rows.code[i] != FLOAT
+                if int(rows.table[i, CODE]) >= LOCK:
+                    replaced = int(rows.table[i, CODE]) != FLOAT
                 position = _deflected(rows, memory, i, step, middle, angle_of_attack, position)
         position = min(max(position, data.minimum[channel]), data.maximum[channel])
         if replaced:  # the actuator itself is held, and goes on from there when it is free
@@ -109,26 +113,28 @@ def move_effectors(
 @njit(cache=True, error_model="numpy", inline="always")
 def _deflected(rows: Any, memory: np.ndarray, i: int, step: int, middle: float, alpha: float, position: float) -> float:
     """Return what the effector does, ``position`` without this fault, ``middle`` s after the beginning of ``step``."""
-    code = rows.code[i]
-    elapsed = (step - rows.start[i]) * rows.period + middle
+    code = int(rows.table[i, CODE])
+    elapsed = (step - rows.table[i, START]) * rows.period + middle
     if code == SCALE:
-        return rows.parameters[i, 0] * position
+        return rows.table[i, PARAMETER] * position
     if code == BIAS:
-        return position + rows.parameters[i, 0]
+        return position + rows.table[i, PARAMETER]
     if code == DRIFT:
-        return position + min(max(rows.parameters[i, 0] * elapsed, -rows.parameters[i, 1]), rows.parameters[i, 1])
+        return position + min(
+            max(rows.table[i, PARAMETER] * elapsed, -rows.table[i, PARAMETER + 1]), rows.table[i, PARAMETER + 1]
+        )
     if code in (OSCILLATION, SOLID_OSCILLATION):
-        turns = rows.parameters[i, 1] * elapsed
-        wave = rows.parameters[i, 0] * sine(_TWO_PI * (turns - math.floor(turns)) + rows.parameters[i, 2])
+        turns = rows.table[i, PARAMETER + 1] * elapsed
+        wave = rows.table[i, PARAMETER] * sine(_TWO_PI * (turns - math.floor(turns)) + rows.table[i, PARAMETER + 2])
         return (position if code == OSCILLATION else memory[i, KEPT]) + wave
     if code == LOCK:
         return memory[i, KEPT]
     if code == LOCK_AT:
-        return rows.parameters[i, 0]
+        return rows.table[i, PARAMETER]
     if code == FLOAT:
-        return -rows.parameters[i, 0] * alpha
+        return -rows.table[i, PARAMETER] * alpha
     if code == HARD_OVER:
-        return memory[i, KEPT] + rows.parameters[i, 0] * ((step - memory[i, ONSET]) * rows.period + middle)
+        return memory[i, KEPT] + rows.table[i, PARAMETER] * ((step - memory[i, ONSET]) * rows.period + middle)
     return position
 
 

@@ -47,20 +47,20 @@ _NOT_YET = -2.0
 _OCCURRENCE = STREAMS["fault_occurrence"]
 
 
-class FaultRows(NamedTuple):
-    """Faults for compiled functions, a row each: steps [start, stop), channel, code, occurrence (n, 3), parameters.
+START, STOP, CHANNEL, CODE, OCCURRENCE = range(5)
+PARAMETER = OCCURRENCE + 3
+"""Columns of the table of faults: steps [start, stop); channel, which counts among inputs or states; code; occurrence,
+:data:`ALWAYS`, or :data:`PERIODIC` with the period and the share of it in steps, or :data:`RANDOM` with the
+probabilities of going and of coming in a step; from the last one on, the parameters of the kind."""
 
-    The channel counts among inputs or states. ``occurrence`` is :data:`ALWAYS`, or :data:`PERIODIC` with the
-    period and the share of it in steps, or :data:`RANDOM` with the probabilities of going and of coming in a step.
-    ``period`` is T (s).
+
+class FaultRows(NamedTuple):
+    """Faults for compiled functions: a row each of the ``table``, and T, ``period`` (s).
+
+    One array: a compiled function that takes several is slower than what it does with them.
     """
 
-    start: np.ndarray
-    stop: np.ndarray
-    channel: np.ndarray
-    code: np.ndarray
-    occurrence: np.ndarray
-    parameters: np.ndarray
+    table: np.ndarray
     period: float
 
 
@@ -73,21 +73,13 @@ def fault_rows(sides: Sequence[str], scheduled: Sequence[tuple[Fault, int, int]]
         period: T (s).
     """
     chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
-    n = len(chosen)
-    occurrence, parameters = np.zeros((n, 3)), np.zeros((n, N_PARAMETERS))
-    for i, (fault, _, _) in enumerate(chosen):
+    table = np.zeros((len(chosen), PARAMETER + N_PARAMETERS))
+    for row, (fault, start, stop) in zip(table, chosen, strict=True):
         own = len(fault.kind.parameters)
-        parameters[i, :own] = fault.values[:own]
-        occurrence[i] = _occurrence(fault.values[own:], period)
-    return FaultRows(
-        np.array([start for _, start, _ in chosen], np.int64),
-        np.array([stop for _, _, stop in chosen], np.int64),
-        np.array([_place(fault.channel) for fault, _, _ in chosen], np.int64),
-        np.array([fault.kind.code for fault, _, _ in chosen], np.int64),
-        occurrence,
-        parameters,
-        period,
-    )
+        row[:OCCURRENCE] = start, stop, _place(fault.channel), fault.kind.code
+        row[OCCURRENCE:PARAMETER] = _occurrence(fault.values[own:], period)
+        row[PARAMETER : PARAMETER + own] = fault.values[:own]
+    return FaultRows(table, period)
 
 
 def _place(channel: str) -> int:
@@ -123,8 +115,8 @@ def fault_memory(rows: FaultRows, earlier: FaultRows | None = None, memory: np.n
     """
     kept: dict[tuple[Any, ...], np.ndarray] = {}
     if earlier is not None and memory is not None:
-        kept = {_identity(earlier, i): memory[i] for i in range(len(earlier.start))}
-    found = np.zeros((len(rows.start), MEMORY))
+        kept = {_identity(earlier, i): memory[i] for i in range(len(earlier.table))}
+    found = np.zeros((len(rows.table), MEMORY))
     found[:, LAST] = found[:, ONSET] = _NOT_YET
     for i in range(len(found)):
         if (known := kept.get(_identity(rows, i))) is not None:
@@ -134,30 +126,28 @@ def fault_memory(rows: FaultRows, earlier: FaultRows | None = None, memory: np.n
 
 def _identity(rows: FaultRows, i: int) -> tuple[Any, ...]:
     """Return what tells a fault from others: all but its stop, which a clearance in flight moves."""
-    return (
-        *(int(column[i]) for column in (rows.start, rows.channel, rows.code)),
-        *rows.occurrence[i].tolist(),
-        *rows.parameters[i].tolist(),
-    )
+    return tuple(np.delete(rows.table[i], STOP).tolist())
 
 
 @njit(cache=True, error_model="numpy")
 def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
     """Note in ``memory`` (n, :data:`MEMORY`) which ``rows`` act in ``step``; return how many do."""
     acting = 0
-    for i in range(len(rows.start)):
-        acts = rows.start[i] <= step < rows.stop[i]
+    for i in range(len(rows.table)):
+        acts = rows.table[i, START] <= step < rows.table[i, STOP]
         if acts:
-            how = rows.occurrence[i, 0]
+            how = rows.table[i, OCCURRENCE]
             if how == PERIODIC:
-                acts = (step - rows.start[i]) % int(rows.occurrence[i, 1]) < int(rows.occurrence[i, 2])
+                acts = (step - rows.table[i, START]) % int(rows.table[i, OCCURRENCE + 1]) < int(
+                    rows.table[i, OCCURRENCE + 2]
+                )
             elif how == RANDOM:
-                if step == rows.start[i]:
+                if step == rows.table[i, START]:
                     memory[i, AWAY] = 0.0
                 else:
-                    drawn, _ = uniforms(seed, step, _OCCURRENCE + rows.code[i], rows.channel[i])
+                    drawn, _ = uniforms(seed, step, _OCCURRENCE + int(rows.table[i, CODE]), int(rows.table[i, CHANNEL]))
                     away = memory[i, AWAY] == 1.0
-                    if drawn < (rows.occurrence[i, 2] if away else rows.occurrence[i, 1]):
+                    if drawn < (rows.table[i, OCCURRENCE + 2] if away else rows.table[i, OCCURRENCE + 1]):
                         memory[i, AWAY] = 0.0 if away else 1.0
                 acts = memory[i, AWAY] == 0.0
         memory[i, ACTING] = 1.0 if acts else 0.0
@@ -181,20 +171,20 @@ def apply_command_faults(
         actuator[i] = command[i]
     if begin_faults(rows, memory, step, seed) == 0:
         return
-    for i in range(len(rows.start)):
+    for i in range(len(rows.table)):
         if memory[i, ACTING] == 1.0:
-            channel = rows.channel[i]
+            channel = int(rows.table[i, CHANNEL])
             actuator[channel] = _commanded(rows, memory, i, step, actuator[channel])
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _commanded(rows: Any, memory: np.ndarray, i: int, step: int, command: float) -> float:
-    code, value = rows.code[i], rows.parameters[i, 0]
+    code, value = int(rows.table[i, CODE]), rows.table[i, PARAMETER]
     fresh = memory[i, ONSET] == step
     if fresh:
         memory[i, KEPT] = command
     if code == LOSS:
-        ramp, elapsed = rows.parameters[i, 1], (step - rows.start[i]) * rows.period
+        ramp, elapsed = rows.table[i, PARAMETER + 1], (step - rows.table[i, START]) * rows.period
         if elapsed < ramp:
             value = 1.0 + (value - 1.0) * (elapsed / ramp)
         return value * command
@@ -247,31 +237,33 @@ def apply_engine_faults(
     engine[0], engine[1], engine[2], engine[3] = 1.0, 1.0, 1.0, 0.0
     if begin_faults(rows, memory, step, seed) == 0:
         return
-    for i in range(len(rows.start)):
+    for i in range(len(rows.table)):
         if memory[i, ACTING] == 1.0:
-            values = rows.parameters[i]
-            if rows.code[i] == UNSTART_OUTSIDE and not _unstarted(rows, memory, i, step, angle_of_attack, mach, fuel):
+            outside = int(rows.table[i, CODE]) == UNSTART_OUTSIDE
+            if outside and not _unstarted(rows, memory, i, step, angle_of_attack, mach, fuel):
                 continue
-            engine[0] *= values[0]
-            if rows.code[i] != THRUST_LOSS:
-                engine[1], engine[2] = values[1], values[2]
-                engine[3] = values[3] + values[4] * angle_of_attack
+            engine[0] *= rows.table[i, PARAMETER]
+            if int(rows.table[i, CODE]) != THRUST_LOSS:
+                engine[1], engine[2] = rows.table[i, PARAMETER + 1], rows.table[i, PARAMETER + 2]
+                engine[3] = rows.table[i, PARAMETER + 3] + rows.table[i, PARAMETER + 4] * angle_of_attack
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _unstarted(rows: Any, memory: np.ndarray, i: int, step: int, alpha: float, mach: float, fuel: float) -> bool:
     """Tell whether the inlet is unstarted; KEPT says that it was, SINCE from which step on."""
-    values = rows.parameters[i]
     if memory[i, ONSET] == step:
         memory[i, KEPT] = 0.0
-    off_alpha, off_mach = (alpha - values[5]) / values[6], (mach - values[7]) / values[8]
-    distance, limit = off_alpha * off_alpha + off_mach * off_mach, values[9]
+    off_alpha, off_mach = (
+        (alpha - rows.table[i, PARAMETER + 5]) / rows.table[i, PARAMETER + 6],
+        (mach - rows.table[i, PARAMETER + 7]) / rows.table[i, PARAMETER + 8],
+    )
+    distance, limit = off_alpha * off_alpha + off_mach * off_mach, rows.table[i, PARAMETER + 9]
     if memory[i, KEPT] == 0.0:
         if distance > 1.0 or fuel > limit:
             memory[i, KEPT], memory[i, SINCE] = 1.0, step
     else:
-        regained = 1.0 - values[10]
-        long_enough = (step - memory[i, SINCE]) * rows.period >= values[11]
+        regained = 1.0 - rows.table[i, PARAMETER + 10]
+        long_enough = (step - memory[i, SINCE]) * rows.period >= rows.table[i, PARAMETER + 11]
         if long_enough and distance < regained * regained and fuel < regained * limit:
             memory[i, KEPT] = 0.0
     return memory[i, KEPT] == 1.0

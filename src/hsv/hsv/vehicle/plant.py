@@ -14,7 +14,7 @@ from hsv.errors import ParameterError, QuantityError
 from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
-from hsv.faults.table import DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
+from hsv.faults.table import COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
 from hsv.sensors import SENSOR_PARAMETERS, SensorData, measure, sensor_data, sensor_state
@@ -113,13 +113,6 @@ class PlantFaults(NamedTuple):
         return cls(*found)
 
 
-@njit(cache=True)
-def ideal_plant(data: Any, faults: Any) -> bool:
-    """Tell whether actuators and sensors are ideal, the air still, and no fault will ever change that."""
-    expected = len(faults.effector.start) + len(faults.engine.start) + len(faults.sensor.start)
-    return data.actuators.ideal and data.atmosphere.still and data.sensors.ideal and expected == 0
-
-
 @njit(cache=True, error_model="numpy")
 def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, faults: Any, step: int) -> None:
     """Replace ``x`` (9) in ``step`` by the state one period later.
@@ -134,7 +127,7 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
     """
     actuators, effector, atmosphere, _, conditions, work = memory
     p, air = data.vehicle, data.atmosphere
-    if air.still and len(faults.engine.start) == 0:
+    if air.still and len(faults.engine.table) == 0:
         advance_equipped(
             x,
             actuator,
@@ -178,7 +171,7 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
 @njit(cache=True, error_model="numpy")
 def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measurement: np.ndarray) -> None:
     """Write into ``measurement`` (9) what the sensors say of ``x`` (9) in ``step``; see :func:`advance_plant`."""
-    if data.sensors.ideal and len(faults.sensor.start) == 0:
+    if data.sensors.ideal and len(faults.sensor.table) == 0:
         for i in range(len(x)):
             measurement[i] = x[i]
     else:
@@ -272,6 +265,11 @@ class Plant:
         """Return the same with another vehicle, relative changes by parameter name; it starts in the same trim."""
         vehicle = self.vehicle.perturbed(perturbation)
         return Plant(vehicle, self.initial, self.period, self.steps, self.data.substeps, self._equipment)
+
+    def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
+        """Tell whether actuators and sensors are ideal, the air still, and no fault in a schedule changes that."""
+        equipped = not (self.data.actuators.ideal and self.data.atmosphere.still and self.data.sensors.ideal)
+        return not equipped and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
