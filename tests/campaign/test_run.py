@@ -25,8 +25,8 @@ class Counting(SerialExecutor):
     def __init__(self):
         self.flown = []
 
-    def fly(self, text, batches):
-        for batch, content in super().fly(text, batches):
+    def fly(self, job, text, batches):
+        for batch, content in super().fly(job, text, batches):
             self.flown.append(batch)
             yield batch, content
 

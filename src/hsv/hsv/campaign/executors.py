@@ -10,7 +10,6 @@ from itertools import islice
 from typing import Any, Protocol
 
 from hsv.campaign.scheduler import connected
-from hsv.campaign.table import fly_batch
 from hsv.errors import CampaignError, RunError, reason
 
 _AHEAD = 4
@@ -29,6 +28,10 @@ _LOCAL = {
 """Settings of workers on this machine; together they give a sixth more flights a second."""
 
 
+Job = Callable[[str, int], bytes]
+"""Flies a batch, by its number, of the campaign written in a text, and returns what is to be kept of it."""
+
+
 class Executor(Protocol):
     """An execution back end, which flies the batches of a campaign."""
 
@@ -36,8 +39,8 @@ class Executor(Protocol):
     def cores(self) -> int:
         """Number of flights that are flown at the same time."""
 
-    def fly(self, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number and content of each batch of the campaign written in ``text``, in any order."""
+    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
+        """Yield number and content of each batch of the campaign in ``text``, as ``job`` flies it, in any order."""
 
 
 class SerialExecutor:
@@ -45,10 +48,10 @@ class SerialExecutor:
 
     cores = 1
 
-    def fly(self, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
+    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield number and content of each batch."""
         for batch in batches:
-            yield batch, fly_batch(text, batch)
+            yield batch, job(text, batch)
 
 
 class DaskExecutor:
@@ -62,7 +65,7 @@ class DaskExecutor:
         """Threads of all workers."""
         return sum(self._client.nthreads().values())
 
-    def fly(self, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
+    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield number and content of each batch.
 
         Raises:
@@ -78,7 +81,7 @@ class DaskExecutor:
 
         def submit(count: int) -> None:
             for batch in islice(waiting, count):
-                future = self._client.submit(fly_batch, campaign, batch)
+                future = self._client.submit(job, campaign, batch)
                 numbers[future.key] = batch
                 running.add(future)
 

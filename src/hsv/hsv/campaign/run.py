@@ -12,7 +12,7 @@ from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Executor
 from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
-from hsv.campaign.table import schema
+from hsv.campaign.table import fly_batch, schema
 from hsv.errors import ControllerError
 
 
@@ -57,7 +57,7 @@ def run_campaign(
         if missing:
             expect(capacity(campaign, campaign.samples - done, executor.cores))
         progress(done)
-        for batch, content in executor.fly(campaign.text, missing):
+        for batch, content in executor.fly(fly_batch, campaign.text, missing):
             store.keep(batch, content)
             flown += len(campaign.flights(batch))
             progress(done + flown)

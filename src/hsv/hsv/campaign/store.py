@@ -59,7 +59,7 @@ class ResultStore:
         Raises:
             CampaignError: It cannot be written.
         """
-        _write(self._part(batch), content)
+        write_whole(self._part(batch), content)
 
     def finish(self) -> None:
         """Make the result file of all batches, and remove them.
@@ -91,7 +91,7 @@ class ResultStore:
             return
         with _writing(self.folder):
             self.folder.mkdir(exist_ok=True)
-        _write(described, self._campaign.text.encode())
+        write_whole(described, self._campaign.text.encode())
 
     def _is_whole(self, batch: int) -> bool:
         try:
@@ -140,7 +140,12 @@ def read_campaign(path: Path) -> Campaign:
         raise CampaignError(f"{path}: {error}") from error
 
 
-def _write(path: Path, content: bytes) -> None:
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that is there whole, or not at all.
+
+    Raises:
+        CampaignError: It cannot be written.
+    """
     temporary = path.with_name(path.name + ".unfinished")
     with _writing(path, temporary):
         temporary.write_bytes(content)

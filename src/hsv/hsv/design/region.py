@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
+from scipy.linalg import hadamard
 
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
@@ -58,6 +59,16 @@ def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, 
     signs = np.array([[np.sign(row[name]) for name in names] for row in rows])
     kept = (signs[:, 8] == signs[:, :5].prod(axis=1)) & (signs[:, 9] == signs[:, [0, 1, 5, 6, 7]].prod(axis=1))
     return [nominal, *(row for row, keep in zip(rows, kept, strict=True) if keep)]
+
+
+def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[Corner]:
+    """Return the nominal vehicle and 32 corners of ``share`` of the bounds of at most 15 parameters, in a fixed order.
+
+    A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
+    """
+    runs = hadamard(16)[:, 1 : 1 + len(bounds)]
+    rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))
+    return [{}, *(dict(zip(bounds, map(float, row), strict=True)) for row in rows)]
 
 
 def incomplete_share(inputs: DesignInputs) -> float:

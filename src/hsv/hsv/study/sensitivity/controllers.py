@@ -9,12 +9,11 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
-from scipy.linalg import hadamard
 
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection, flown_sections
-from hsv.design.region import Corner
+from hsv.design.region import Corner, screening_corners
 from hsv.simulation.assembly import assemble_flight, scenario_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
@@ -81,16 +80,8 @@ SAID_RMPC = "RMPC flies the fourth gain of the nominal family"
 
 
 def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
-    """Return the nominal vehicle and 32 corners of ``scale`` times the parameter bounds, fewer if coarse.
-
-    A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
-    """
-    names = list(load_vehicle().uncertainty)
-    runs = hadamard(16)[:, 1 : 1 + len(names)]
-    signs = np.vstack((runs, -runs))
-    bounds = np.array(list(load_vehicle().uncertainty.values()))
-    over: list[Corner] = [{}, *(dict(zip(names, map(float, scale * row * bounds), strict=True)) for row in signs)]
-    return over[:: max(1, round(coarseness))]
+    """Return the nominal vehicle and 32 corners of ``scale`` times the parameter bounds, fewer if coarse."""
+    return screening_corners(load_vehicle().uncertainty, scale)[:: max(1, round(coarseness))]
 
 
 def said_corners(over: Sequence[Corner]) -> str:

@@ -1,0 +1,61 @@
+"""Components of flights that differ little from one: what a change leaves as it was is built once and shared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
+from hsv.control.design import design_of
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.faults.injector import FaultInjector
+from hsv.simulation.assembly import assemble, assemble_flight, scenario_parameters
+from hsv.simulation.closed_loop import Components
+from hsv.simulation.scenario import Scenario
+from hsv.vehicle.plant import Plant
+
+_NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
+"""Beginnings of parameters on which the bench's own controllers do not depend."""
+
+
+class FlightVariants:
+    """A scenario's flight, and variants of it."""
+
+    def __init__(self, scenario: Scenario, design: Mapping[str, Any]) -> None:
+        """Assemble the flight.
+
+        Args:
+            scenario: Of the flight that is varied.
+            design: Flat parameters of the controller's design.
+
+        Raises:
+            ScenarioError: The scenario is not acceptable; the message names the field.
+        """
+        self._parameters = dict(design)
+        self._design = design_of(design)
+        self._nominal = {**design, **scenario_parameters(scenario)}
+        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
+        self.unchanged: Components = assemble_flight(scenario, self._design)
+        """Components of the flight itself"""
+
+    def components(self, scenario: Scenario) -> Components:
+        """Return the components of the flight of another ``scenario`` with the same design.
+
+        Raises:
+            ParameterError, DesignError, TrimError: Names the parameter that is wrong.
+        """
+        values = {**self._parameters, **scenario_parameters(scenario)}
+        names = values.keys() | self._nominal.keys()
+        changed = [name for name in names if values.get(name) != self._nominal.get(name)]
+        if not all(name.startswith(self._kept_for) for name in changed):
+            return assemble(values)
+        trajectory = self.unchanged.nominal_trajectory
+        if any(name.startswith("reference.") for name in changed):
+            trajectory = NominalTrajectory.from_parameters(values, self._design)
+        return replace(
+            self.unchanged,
+            plant=Plant.from_parameters(values),
+            nominal_trajectory=trajectory,
+            fault_injector=FaultInjector.from_parameters(values),
+        )
