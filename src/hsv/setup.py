@@ -15,6 +15,7 @@ setup(
             "recording/layouts/*",
             "recording/report/plotly/*",
             "recording/report/template/*",
+            "resilience/template/*",
         ]
     },
     data_files=[

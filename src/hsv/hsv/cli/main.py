@@ -32,6 +32,7 @@ from hsv.cli.prepare import prepare
 from hsv.cli.recover import recover
 from hsv.cli.replay import replay
 from hsv.cli.report import report
+from hsv.cli.resilience import resilience
 from hsv.cli.run import run
 from hsv.cli.scenarios import scenarios
 from hsv.cli.set import set
@@ -84,6 +85,7 @@ for command in (
     figures,
     claims,
     study,
+    resilience,
     set,
     topic,
 ):

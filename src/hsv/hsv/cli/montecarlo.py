@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from hsv.cli.options import JsonOption, ScenarioArgument, TrustOption, UnitsOption
+from hsv.cli.options import JsonOption, ScenarioArgument, SchedulerOption, TrustOption, UnitsOption, WorkersOption
 from hsv.cli.output import Units, console, errors, print_json, to_json
 from hsv.cli.targets import check_target
 
@@ -57,8 +57,8 @@ def fly(
         typer.Option(help="Vary a field of the scenario, FIELD=LEAST..LARGEST, e.g. 'fault[0].start=90 s..110 s'."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
-    workers: Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")] = 0,
-    scheduler: Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers fly instead.")] = "",
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
     restart: Annotated[bool, typer.Option("--restart", help="Throw away what is there and begin anew.")] = False,
     page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
     units: UnitsOption = Units.si,

@@ -49,3 +49,5 @@ SuppliedScenarioOption = Annotated[
 ]
 TrustOption = Annotated[bool, typer.Option("--trust", help="Run code that the file names, as a controller's class.")]
 FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]
+WorkersOption = Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")]
+SchedulerOption = Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers fly instead.")]

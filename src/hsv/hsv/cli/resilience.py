@@ -1,0 +1,124 @@
+"""The command ``hsv resilience``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsv.cli.options import JsonOption, SchedulerOption, WorkersOption
+from hsv.cli.output import console, errors, print_json
+from hsv.cli.targets import check_folder
+
+if TYPE_CHECKING:
+    from hsv.resilience.summary import ResilienceResults
+
+
+def resilience(
+    controllers: Annotated[
+        str, typer.Option(help="Scenarios, by name or path, with commas; default: five of Tube-MPC and robust MPC.")
+    ] = "",
+    faults: Annotated[str, typer.Option(help="Faults to try, with commas; default: all, which --list names.")] = "",
+    out: Annotated[Path, typer.Option(help="Folder for page, scenarios of the worst flights, and results.")] = Path(
+        "resilience"
+    ),
+    workers: WorkersOption = 0,
+    scheduler: SchedulerOption = "",
+    listed: Annotated[bool, typer.Option("--list", help="Name the faults with their severities, and end.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Fly controllers with faults of rising severity until each is lost; make a map of what they survive.
+
+    Interrupted, the same command goes on where it was left; more controllers or faults fly beside what is there. Exit
+    code 1 where every flight crashed.
+
+    Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
+    """
+    from hsv.campaign.executors import make_executor
+    from hsv.cli.campaign_summary import announce
+    from hsv.cli.output import print_titles
+    from hsv.cli.progress import flights as flights_bar
+    from hsv.errors import RunError
+    from hsv.resilience.campaign import CONTROLLERS, plan
+    from hsv.resilience.faults import TRIED
+    from hsv.resilience.page import write_results
+    from hsv.resilience.run import CaseStore, run_resilience
+    from hsv.resilience.summary import ResilienceResults, parameter_words
+
+    if listed:
+        print_titles({name: parameter_words(name) for name in TRIED}, json)
+        return
+    campaign = plan(_names(controllers) or CONTROLLERS, _names(faults) or tuple(TRIED))
+    check_folder(out, "out")
+    store = CaseStore(out)
+    try:
+        with (
+            make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
+            flights_bar("resilience", sum(case.flights for case in campaign.cases)) as progress,
+        ):
+            flown = run_resilience(campaign, store, flying, expect=announce, progress=progress)
+    except KeyboardInterrupt:
+        errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
+        raise
+    results = ResilienceResults.read(campaign, store)
+    written = write_results(results, out)
+    if json:
+        print_json({"written": list(map(str, written)), "cases_flown_now": flown, "cells": _cells(results)})
+    else:
+        _show(results)
+        console.print(f"written {', '.join(map(str, written))}", soft_wrap=True)
+    crashes = [flight.crashed for flight in results.flights]
+    if all(crashes):
+        raise RunError(f"all {len(crashes)} flights crashed, the first: {crashes[0]}")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",")) if text else ()
+
+
+def _show(results: ResilienceResults) -> None:
+    from rich.table import Table
+
+    table = Table(title="flights survived", title_justify="left", box=None, pad_edge=False, header_style="bold")
+    table.add_column("fault")
+    for subject in results.campaign.subjects:
+        table.add_column(subject.name, justify="right")
+    for fault in results.campaign.faults:
+        counts = [results.squares[fault, subject.name].survived for subject in results.campaign.subjects]
+        table.add_row(fault.replace("_", " "), *(f"{survived} of {flights}" for survived, flights in counts))
+    console.print(table)
+
+
+def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
+    from hsv.resilience.faults import TRIED
+    from hsv.resilience.page import flight_file
+
+    found = []
+    for (fault, controller), square in results.squares.items():
+        for moment, cells in square.cells.items():
+            ends = square.boundaries[moment]
+            values = {
+                name: None if end is None else TRIED[fault].value(end)
+                for name, end in (("largest_survived", ends.survived), ("least_lost", ends.lost))
+            }
+            found += [
+                {
+                    "controller": controller,
+                    "fault": fault,
+                    "time": moment.name,
+                    "severity": cell.severity,
+                    "value": cell.flights[0].value,
+                    "unit": TRIED[fault].unit,
+                    "survived": cell.survived,
+                    "flights": len(cell.flights),
+                    "attitude_rad": cell.attitude,
+                    "altitude_m": cell.altitude,
+                    "recovery_time_s": cell.recovery_time,
+                    "time_to_loss_s": cell.time_to_loss,
+                    "worst_flight": flight_file(cell),
+                    **values,
+                }
+                for cell in cells
+            ]
+    return found

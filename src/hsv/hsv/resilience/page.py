@@ -1,0 +1,80 @@
+"""The results of a resilience campaign as a page, as Markdown, and as scenarios of its worst flights."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from hsv.campaign.store import write_whole
+from hsv.errors import CampaignError, reason
+from hsv.recording.report import text
+from hsv.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
+from hsv.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
+from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundary
+
+FLIGHTS = "flights"
+"""Folder beside the page with the scenarios of the worst flights."""
+
+
+def write_results(results: ResilienceResults, out: Path) -> list[Path]:
+    """Write page, Markdown and the scenario of the worst flight of every cell into ``out``; return page and Markdown.
+
+    Raises:
+        CampaignError: A file cannot be written.
+    """
+    folder = out / FLIGHTS
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CampaignError(f"{folder}: cannot be made ({reason(error)})") from error
+    for cell in results.cells:
+        write_whole(out / flight_file(cell), flight_text(cell).encode())
+    written = [out / "index.html", out / "result.md"]
+    for path in written:
+        write_whole(path, render(results, path.name).encode())
+    return written
+
+
+def flight_file(cell: Cell) -> str:
+    """Return where the scenario of a cell's worst flight is, from the page."""
+    return f"{FLIGHTS}/{cell.case.label}_{cell.severity}.toml"
+
+
+def flight_text(cell: Cell) -> str:
+    """Return the scenario of a cell's worst flight as a file."""
+    worst, case = cell.worst, cell.case
+    return case.subject.file(case.moment, worst.vehicle, TRIED[case.fault], worst.value)
+
+
+def render(results: ResilienceResults, name: str) -> str:
+    """Return the page (``index.html``) or the Markdown (``result.md``)."""
+    html = name.endswith(".html")
+    environment = Environment(
+        loader=PackageLoader("hsv.resilience", "template"),
+        autoescape=html,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": text.number, "words": text.words}
+    style = files("hsv.recording.report").joinpath("template", "style.css").read_text(encoding="utf-8")
+    return environment.get_template(f"{name}.j2").render(
+        campaign=results.campaign,
+        squares=results.squares,
+        moments=tuple(Moment),
+        severities=SEVERITIES,
+        tried=TRIED,
+        observed=OBSERVED,
+        attitude_band=ATTITUDE_BAND,
+        altitude_band=ALTITUDE_BAND,
+        quantity=text.quantity,
+        said_boundary=said_boundary,
+        parameter_words=parameter_words,
+        flight_file=flight_file,
+        survived=sum(flight.survived for flight in results.flights),
+        flights=len(results.flights),
+        style=Markup(style),
+    )
