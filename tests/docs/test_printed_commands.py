@@ -33,6 +33,7 @@ HERE = {
     "hsv export-controller baseline --out controller",
     "hsv run case1 --composed",
     "hsv montecarlo case1 --samples 100 --seed 1",
+    "hsv resilience --controllers case1 --faults elevator_loss",
     "hsv figures --only 9",
     "hsv claims",
     "hsv study coupling",

@@ -85,11 +85,6 @@ class Campaign:
         return flown_table(self.table, self.scenario_name, self.factors, sample, seed)
 
     @property
-    def parameters(self) -> dict[str, Any]:
-        """Flat parameters of the scenario's own flight."""
-        return {**self.design, **scenario_parameters(self.scenario)}
-
-    @property
     def batch(self) -> int:
         """Flights a batch, the unit that is flown and stored at once."""
         low, high = _BATCH_LIMITS

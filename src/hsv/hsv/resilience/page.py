@@ -5,6 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
+import tomli_w
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
@@ -14,6 +15,7 @@ from hsv.recording.report import text
 from hsv.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
 from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundary
+from hsv.simulation.scenario import scenario_table
 
 FLIGHTS = "flights"
 """Folder beside the page with the scenarios of the worst flights."""
@@ -46,7 +48,16 @@ def flight_file(cell: Cell) -> str:
 def flight_text(cell: Cell) -> str:
     """Return the scenario of a cell's worst flight as a file."""
     worst, case = cell.worst, cell.case
-    return case.subject.file(case.moment, worst.vehicle, TRIED[case.fault], worst.value)
+    subject, fault = case.subject, TRIED[case.fault]
+    table = scenario_table(subject.file(case.moment, worst.vehicle, fault, worst.value), subject.name)
+    said = f"{case.fault.replace('_', ' ')} ({fault.parameter.replace('_', ' ')} {fault.said(worst.value)})"
+    table["title"] = f"{subject.name} with {said} from {subject.start(case.moment):g} s, {vehicle_words(worst.vehicle)}"
+    return tomli_w.dumps(table)
+
+
+def vehicle_words(vehicle: int) -> str:
+    """Return what a vehicle is, by its number."""
+    return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 
 def render(results: ResilienceResults, name: str) -> str:
@@ -74,6 +85,7 @@ def render(results: ResilienceResults, name: str) -> str:
         said_boundary=said_boundary,
         parameter_words=parameter_words,
         flight_file=flight_file,
+        vehicle_words=vehicle_words,
         survived=sum(flight.survived for flight in results.flights),
         flights=len(results.flights),
         style=Markup(style),

@@ -33,6 +33,8 @@ class CaseStore:
 
     def __init__(self, out: Path) -> None:
         self.folder = out / "cases"
+        # Of the code that is loaded: files may change while it flies.
+        self._code = [code_digest().encode(), *measuring_code("hsv.resilience.flights", "hsv.resilience.campaign")]
 
     @contextmanager
     def opened(self) -> Iterator[None]:
@@ -67,8 +69,7 @@ class CaseStore:
             return None
 
     def _path(self, case: Case) -> Path:
-        code = measuring_code("hsv.resilience.flights", "hsv.resilience.campaign")
-        digest = digest_of([case.text.encode(), code_digest().encode(), *code])
+        digest = digest_of([case.text.encode(), *self._code])
         return self.folder / f"{case.label}_{digest[:DIGITS]}.json"
 
 

@@ -138,9 +138,9 @@ class ResilienceResults:
 def said_boundary(fault: TriedFault, boundary: Boundary) -> str:
     """Return in words how far the nominal vehicle survives."""
     if boundary.survived is None:
-        return "nothing survived"
+        return f"lost at {fault.said(fault.harmless)}"
     if boundary.lost is None:
-        return f"survives {fault.said(fault.worst)}"
+        return f"not lost at {fault.said(fault.worst)}"
     survived, lost = (fault.said(fault.value(end)) for end in (boundary.survived, boundary.lost))
     return f"{survived}, lost at {lost}"
 

@@ -1,0 +1,119 @@
+"""The command that flies faults of rising severity."""
+
+import json
+import re
+
+import pytest
+from node_processes import short_scenario
+
+from hsv.campaign.executors import SerialExecutor
+from hsv.resilience.campaign import plan
+from hsv.resilience.run import CaseStore, run_resilience
+from hsv.resilience.summary import ResilienceResults
+
+FAULTS = "elevator_loss,pitch_rate_drop_out"
+
+
+@pytest.fixture
+def resilience(hsv, tmp_path):
+    """Fly two controllers with two faults in short flights by the command."""
+    short_scenario(tmp_path, duration=6, fault=2)
+    (tmp_path / "rigid.toml").write_text('extends = "short.toml"\n[notch]\nenabled = false\n')
+
+    def fly(*words, controllers="short.toml,rigid.toml", faults=FAULTS):
+        named = ("--controllers", controllers, "--faults", faults, "--workers", "1", "--out", "out")
+        return hsv("resilience", *named, *words)
+
+    return fly
+
+
+def test_two_controllers_and_two_faults_make_a_page_with_every_cell(resilience, hsv, tmp_path):
+    ran = resilience("--json")
+    assert ran.code == 0 and "flights on 1 cores: about" in ran.err
+    values = ran.json
+    assert values["cases_flown_now"] == 2 * 2 * 2 and len(values["cells"]) == 2 * 2 * 2 * 3
+    assert {cell["flights"] for cell in values["cells"]} == {5}
+    page = (tmp_path / "out/index.html").read_text()
+    links = re.findall(r'href="(flights/[^"]+)"', page)
+    assert {cell["worst_flight"] for cell in values["cells"]} <= set(links)
+    assert page.count('class="share"') == len(values["cells"])
+    assert all((tmp_path / "out" / link).is_file() for link in links)
+    assert "| elevator loss: effectiveness 0.9, 0.7, 0.5 |" in (tmp_path / "out/result.md").read_text()
+
+
+def test_the_worst_flight_flies_by_itself_as_it_did(resilience, hsv):
+    cells = resilience("--json", controllers="short.toml", faults="elevator_loss,elevator_drift").json["cells"]
+    lost = [cell for cell in cells if cell["survived"] < cell["flights"]]
+    whole = [cell for cell in cells if cell["survived"] == cell["flights"]]
+    for cell in (lost[0], whole[0]):
+        flown = hsv("simulate", f"out/{cell['worst_flight']}", "--json")
+        start = {"during": 0.9, "after": 3.0}[cell["time"]]
+        loss = cell["time_to_loss_s"]
+        assert flown.json["diverged_at_s"] == (None if loss is None else pytest.approx(start + loss))
+        assert flown.code == (0 if loss is None else 1)
+    assert lost[0]["time_to_loss_s"] is not None and whole[0]["time_to_loss_s"] is None
+
+
+def test_what_is_there_is_not_flown_anew_and_more_flies_beside_it(resilience):
+    assert resilience("--json", controllers="short.toml", faults="elevator_loss").json["cases_flown_now"] == 2
+    assert resilience("--json", controllers="short.toml", faults="elevator_loss").json["cases_flown_now"] == 0
+    assert resilience("--json", controllers="short.toml").json["cases_flown_now"] == 2
+
+
+def test_interrupted_it_goes_on_where_it_was(tmp_path):
+    scenario = str(short_scenario(tmp_path, duration=6, fault=2))
+    campaign, store = plan((scenario,), FAULTS.split(",")), CaseStore(tmp_path / "out")
+    seen = []
+
+    def interrupt(done):
+        seen.append(done)
+        if done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_resilience(campaign, store, SerialExecutor(), progress=interrupt)
+    [first] = store.folder.glob("*.json")
+    kept = first.stat().st_mtime_ns
+    assert run_resilience(campaign, store, SerialExecutor()) == len(campaign.cases) - 1
+    assert first.stat().st_mtime_ns == kept
+    whole = CaseStore(tmp_path / "whole")
+    run_resilience(campaign, whole, SerialExecutor())
+    assert ResilienceResults.read(campaign, store) == ResilienceResults.read(campaign, whole)
+    assert seen == [0, campaign.cases[0].flights]
+
+
+def test_a_damaged_case_is_flown_anew(tmp_path):
+    scenario = str(short_scenario(tmp_path, duration=6, fault=2))
+    campaign, store = plan((scenario,), ("elevator_loss",)), CaseStore(tmp_path / "out")
+    run_resilience(campaign, store, SerialExecutor())
+    first = min(store.folder.glob("*.json"))
+    first.write_text(first.read_text()[:-20])
+    assert run_resilience(campaign, store, SerialExecutor()) == 1
+
+
+def test_the_faults_are_listed(hsv):
+    listed = json.loads(hsv("resilience", "--list", "--json").out)
+    assert listed["elevator_loss"] == "effectiveness 0.9, 0.7, 0.5"
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("--faults", "nonsense"), "faults = 'nonsense': expected one of elevator_loss, "),
+        (("--faults", "elevator_loss,,"), "faults"),
+        (("--controllers", "nowhere"), "scenario 'nowhere': expected a path or one of "),
+        (("--controllers", "missing.toml"), "scenario 'missing.toml': cannot be read"),
+        (("--controllers", "short.toml,short.toml"), "controllers: 'short.toml' twice"),
+        (("--controllers", "short.toml,sub/short.toml"), "controllers: two files called short"),
+        (("--workers", "-1"), "workers = -1: expected 0 to 4096"),
+        (("--scheduler", "nonsense"), "scheduler = 'nonsense'"),
+        (("--out", "short.toml"), "out = 'short.toml': cannot be written"),
+    ],
+)
+def test_bad_settings_end_with_one_line(hsv, tmp_path, words, expected):
+    short_scenario(tmp_path, duration=6, fault=2)
+    (tmp_path / "sub").mkdir()
+    short_scenario(tmp_path / "sub", duration=6, fault=2)
+    refused = hsv("resilience", "--controllers", "short.toml", "--faults", "elevator_loss", *words)
+    assert refused.code == 2 and expected in refused.error
+    assert not list(tmp_path.glob("*/cases"))
