@@ -192,8 +192,11 @@ def test_defaults_are_no_fault():
             "fault.effectiveness = 1.1: expected double from",
         ),
         ((ELEVATOR, "loss_of_effectiveness", {"effectiveness": float("nan")}), "fault.effectiveness = nan: expected"),
-        ((ELEVATOR, "loss_of_effectiveness", {}), "fault.parameters = none: expected effectiveness"),
-        ((ELEVATOR, "float", {"alignment": 0.5, "size": 1.0}), "fault.parameters = alignment, size: expected"),
+        ((ELEVATOR, "loss_of_effectiveness", {}), "fault.effectiveness: missing, expected effectiveness"),
+        (
+            (ELEVATOR, "float", {"alignment": 0.5, "size": 1.0}),
+            "fault.size: unknown parameter, expected one of alignment, ",
+        ),
         (("pitch_rate", "lock_in_place", {}), "fault.channel = 'pitch_rate': expected one of fuel_equivalence_ratio"),
     ],
 )

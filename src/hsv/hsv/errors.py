@@ -1,6 +1,8 @@
 """Exceptions of the library: one base class, and one subclass per cause that also inherits the standard one."""
 
+import difflib
 import os
+from collections.abc import Iterable
 
 
 class HsvError(Exception):
@@ -49,6 +51,13 @@ class CampaignError(HsvError, ValueError):
 
 class ParameterError(HsvError, ValueError):
     """A parameter of a node or component with a wrong name, type, size or value."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message on an unknown ``name``, which asks for the nearest known one; empty if none is."""
+    names = list(known)
+    near = difflib.get_close_matches(name, names, 1) or [other for other in names if name and other.startswith(name)]
+    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def reason(error: OSError) -> str:

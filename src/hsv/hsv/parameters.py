@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, cast
 
-from hsv.errors import ParameterError
-from hsv.units import parse_quantity
+from hsv.errors import ParameterError, did_you_mean
+from hsv.units import in_unit_of, parse_quantity
 
 Value = bool | int | float | str | list[float] | list[str] | list[int]
 
@@ -46,13 +46,7 @@ class Parameter:
         """What a value must satisfy, in words."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
-        low, high = self.minimum, self.maximum
-        words = {
-            (False, False): "",
-            (True, False): f" of at least {low:.10g}",
-            (False, True): f" of at most {high:.10g}",
-            (True, True): f" from {low:.10g} to {high:.10g}",
-        }[(math.isfinite(low), math.isfinite(high))]
+        words = _range(self.minimum, self.maximum)
         if self.kind == "double_array":
             words = words or " of finite numbers"
         return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}"
@@ -100,6 +94,15 @@ class Parameter:
         return isinstance(value, int | float) and math.isfinite(value) and self.minimum <= value <= self.maximum
 
 
+def _range(low: float, high: float) -> str:
+    return {
+        (False, False): "",
+        (True, False): f" of at least {low:.10g}",
+        (False, True): f" of at most {high:.10g}",
+        (True, True): f" from {low:.10g} to {high:.10g}",
+    }[(math.isfinite(low), math.isfinite(high))]
+
+
 def _is_whole(value: object) -> bool:
     return isinstance(value, int) and not isinstance(value, bool)
 
@@ -118,27 +121,78 @@ def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[
     return {p.name: p.check(values.get(p.name, p.default)) for p in table}
 
 
-def table_values(parameters: Iterable[Parameter], tables: Mapping[str, Any]) -> dict[str, Any]:
+def read_number(parameter: Parameter, text: object, field: str) -> float:
+    """Return the number that a file has in ``text`` for a ``parameter``, or for an element of it, SI.
+
+    Raises:
+        ParameterError, QuantityError: No quantity in its unit, or out of its range, which is told in the unit given.
+    """
+    value = parse_quantity(text, parameter.unit or "1", field)
+    if not parameter.minimum <= value <= parameter.maximum:
+        raise ParameterError(f"{field} = {_shown(text)}: expected{limits_in_words(parameter, text)}")
+    return value
+
+
+def limits_in_words(parameter: Parameter, text: object) -> str:
+    """Return the range of a parameter with a space before it, in the unit in which the quantity ``text`` is written."""
+    ends, unit = in_unit_of((parameter.minimum, parameter.maximum), parameter.unit or "1", text)
+    return _range(*ends) + unit
+
+
+def table_values(
+    parameters: Iterable[Parameter], tables: Mapping[str, Any], read: Callable[..., float] = read_number
+) -> dict[str, Any]:
     """Return the flat values, SI, that ``tables``, as a file has them, give to the ``parameters`` named after them.
 
     One value stands for a list of it.
+
+    Args:
+        parameters: That there are.
+        tables: One in the other; their keys, with dots between, are names of parameters.
+        read: Reads a number, with the arguments of :func:`read_number`.
 
     Raises:
         ParameterError, QuantityError: A table, key or value that is not admitted, named.
     """
     known = {parameter.name: parameter for parameter in parameters}
     values: dict[str, Any] = {}
-    for name, entries in tables.items():
-        if isinstance(entries, Mapping):
-            values |= table_values(known.values(), {f"{name}.{key}": entry for key, entry in entries.items()})
-            continue
-        if name not in known:
-            near = [other for other in known if other.rpartition(".")[0] == name.rpartition(".")[0]] or known
-            raise ParameterError(f"{name}: unknown key, expected one of {', '.join(near) or 'no table'}")
-        parameter = known[name]
-        listed = entries if isinstance(entries, list) else [entries]
-        if parameter.kind.startswith("double"):
-            listed = [parse_quantity(entry, parameter.unit or "1", name) for entry in listed]
-        several = parameter.kind.endswith("_array") or isinstance(entries, list)
-        values[name] = parameter.check(listed if several else listed[0])
+    for name, entry in tables.items():
+        parameter = known.get(name)
+        if parameter is None:
+            entries = _entries_of(name, entry, known)
+            values |= table_values(known.values(), {f"{name}.{key}": entries[key] for key in entries}, read)
+        elif parameter.kind.startswith("double"):
+            several = isinstance(entry, list)
+            if several and parameter.kind == "double":
+                raise ParameterError(f"{name} = {_shown(entry)}: expected one value, not a list")
+            numbers = [
+                read(parameter, number, f"{name}[{i}]" if several else name)
+                for i, number in enumerate(entry if several else [entry])
+            ]
+            values[name] = numbers if parameter.kind == "double_array" else numbers[0]
+        else:
+            several = parameter.kind.endswith("_array") and not isinstance(entry, list)
+            try:
+                values[name] = parameter.check([entry] if several else entry)
+            except ParameterError as error:
+                hint = did_you_mean(entry, parameter.choices) if isinstance(entry, str) else ""
+                raise ParameterError(str(error).removeprefix("parameter ") + hint) from error
     return values
+
+
+def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:
+    """Return the entries of what is called ``name`` and is no parameter, if it is a table of them.
+
+    Raises:
+        ParameterError: There is no such table, or it is none.
+    """
+    depth = name.count(".") + 1
+    within, _, own = name.rpartition(".")
+    inside = [other.split(".")[depth] for other in known if other.startswith(f"{name}.")]
+    if inside and isinstance(entry, Mapping):
+        return entry
+    if inside:
+        raise ParameterError(f"{name} = {_shown(entry)}: expected a table of {', '.join(dict.fromkeys(inside))}")
+    beside = [other.split(".")[depth - 1] for other in known if other.startswith(f"{within}." if within else "")]
+    expected = ", ".join(dict.fromkeys(beside)) or "no table"
+    raise ParameterError(f"{name}: unknown key, expected one of {expected}{did_you_mean(own, beside)}")

@@ -195,6 +195,8 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
         v["sensors.inertial_angle_of_attack"],
         float(chosen.inertial_angle_of_attack),
     )
+    if inertial not in (0.0, 1.0):
+        raise ParameterError(f"parameter sensors.inertial_angle_of_attack = {inertial!r}: expected 0 or 1")
     on = np.zeros(N_STATES, np.bool_)
     for field in FIELDS:
         if field.name != "drift_time":

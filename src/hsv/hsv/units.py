@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -64,9 +65,15 @@ def factor(unit: str, to: str) -> float:
     return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
 
 
+def paper_unit(unit: str) -> str:
+    """Return the paper's unit of an SI unit; of a quotient that it has none for, that of the dividend converted."""
+    dividend, slash, divisor = unit.rpartition("/")
+    return PAPER_UNITS.get(unit) or (f"{paper_unit(dividend)}/{divisor}" if slash else unit)
+
+
 def to_paper(value: float, unit: str) -> tuple[float, str]:
     """Return ``value``, given in the SI ``unit``, in the paper's unit, and the name of that unit."""
-    paper = PAPER_UNITS.get(unit, unit)
+    paper = paper_unit(unit)
     return (value * factor(unit, paper) if paper != unit else value), paper
 
 
@@ -90,6 +97,16 @@ def si_unit_of(text: object) -> str:
 def written(value: float, unit: str) -> float | str:
     """Return a number in ``unit`` as a file has it: a text, where it has a unit. No digit is lost."""
     return value if unit == "1" else f"{value!r} {unit}"
+
+
+def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
+    """Return ``values``, given in the SI ``unit``, in the one of the quantity ``text``, and its name after a space."""
+    found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+    own = (found["unit"] or "") if found else ""
+    if not own:
+        return list(values), "" if unit == "1" else f" {unit}"
+    scale = factor(unit, own.replace("%", "percent"))
+    return [value * scale for value in values], f" {own}"
 
 
 def parse_quantity(text: object, unit: str, field: str) -> float:

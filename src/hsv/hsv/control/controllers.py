@@ -12,7 +12,6 @@ What such a class must have is in :mod:`hsv.control.controller`. One in C is ``c
 
 from __future__ import annotations
 
-import difflib
 import importlib
 from collections.abc import Mapping
 from importlib.metadata import entry_points
@@ -20,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
 from hsv.control.library import LibraryClass, library_place
-from hsv.errors import HsvError, ParameterError
+from hsv.errors import HsvError, ParameterError, did_you_mean
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.vehicle import Vehicle
 
@@ -100,8 +99,7 @@ def class_place(name: str) -> str:
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             return entry.value
-    near = difflib.get_close_matches(name, controller_names(), 1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
+    hint = did_you_mean(name, controller_names())
     raise ParameterError(
         f"controller = {name!r}: expected one of {', '.join(controller_names())}, package.module:Class or "
         f"path/lib.so:symbol{hint}"

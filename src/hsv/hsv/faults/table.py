@@ -13,9 +13,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
-from hsv.errors import ParameterError
-from hsv.parameters import Parameter
-from hsv.units import parse_quantity
+from hsv.errors import ParameterError, did_you_mean
+from hsv.parameters import Parameter, read_number
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -331,10 +330,14 @@ def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
         ParameterError: Unknown kind, or a channel that it does not support.
     """
     if kind not in FAULT_KINDS:
-        raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}")
+        hint = did_you_mean(kind, FAULT_KINDS)
+        raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}{hint}")
     described = FAULT_KINDS[kind]
     if channel not in described.channels:
-        raise ParameterError(f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}")
+        hint = did_you_mean(channel, described.channels)
+        raise ParameterError(
+            f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}{hint}"
+        )
     return (*described.parameters, *OCCURRENCE_PARAMETERS)
 
 
@@ -380,12 +383,16 @@ class Fault:
         table = fault_parameters(channel, kind)
         optional = {p.name: p.default for p in table if p.default is not None}
         due = [p.name for p in table if p.default is None]
+        for name in parameters:
+            if name not in optional and name not in due:
+                hint = did_you_mean(name, (*due, *optional))
+                raise ParameterError(
+                    f"fault.{name}: unknown parameter, expected one of {', '.join((*due, *optional))} for {kind}{hint}"
+                )
+        for name in due:
+            if name not in parameters:
+                raise ParameterError(f"fault.{name}: missing, expected {' and '.join(due)} for {kind}")
         given = {**optional, **parameters}
-        if {*given} != {*optional, *due}:
-            raise ParameterError(
-                f"fault.parameters = {', '.join(parameters) or 'none'}: expected "
-                f"{' and '.join(due) or 'none'} for {kind}, or also {', '.join(optional)}"
-            )
         return cls(channel, kind, tuple(given[p.name] for p in table))
 
     def __str__(self) -> str:
@@ -418,6 +425,7 @@ def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
         if not equals and len(due) == 1:
             name, quantity = due[0], text
         if name not in known:
-            raise ParameterError(f"fault.{name}: unknown parameter, expected one of {', '.join(known)}")
-        given[name] = parse_quantity(quantity, known[name].unit or "1", f"fault.{name}")
+            hint = did_you_mean(name, known)
+            raise ParameterError(f"fault.{name}: unknown parameter, expected one of {', '.join(known)}{hint}")
+        given[name] = read_number(known[name], quantity, f"fault.{name}")
     return Fault.of(channel, kind, given)

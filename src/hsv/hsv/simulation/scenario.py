@@ -6,6 +6,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,12 +17,12 @@ from pydantic import Field, StrictInt, ValidationError
 from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.library import inside
-from hsv.errors import HsvError, ParameterError, ScenarioError
+from hsv.errors import HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
 from hsv.faults.table import Fault, fault_parameters
 from hsv.inheritance import follow_extends, is_path
 from hsv.noise import SEED_PARAMETER
-from hsv.parameters import table_values
+from hsv.parameters import Parameter, limits_in_words, read_number, table_values
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope
 from hsv.simulation.distribution import KINDS, Distribution, read_distribution
 from hsv.simulation.fields import Reading, Table, Time
@@ -38,7 +39,7 @@ from hsv.simulation.tables import (
     VehicleTable,
 )
 from hsv.units import parse_quantity, si_unit_of, written
-from hsv.vehicle.plant import EQUIPMENT_PARAMETERS
+from hsv.vehicle.plant import EQUIPMENT_PARAMETERS, check_equipment
 from hsv.vehicle.vehicle import (
     DEFAULT_VEHICLE,
     SHIPPED_VEHICLES,
@@ -121,6 +122,9 @@ class Scenario(Table):
             values["fault.stops"] = [NEVER_TIME if fault.stop is None else fault.stop for fault in self.fault]
         return values | {"seed": self.seed} | self.equipment
 
+
+_PERIOD = 0.02
+"""Of control, s, until a design says it: whether equipment fits together does not depend on it."""
 
 EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in EQUIPMENT_PARAMETERS)
 """Tables of what is ideal unless they say otherwise."""
@@ -329,7 +333,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             **table,
             "name": name,
             "own": own,
-            "equipment": table_values(EQUIPMENT_PARAMETERS, _own_values(equipment, found)),
+            "equipment": table_values(EQUIPMENT_PARAMETERS, equipment, partial(_number, found)),
             "fault": _fault_rows(table.get("fault", ()), found),
             "limits": _limits(table.get("limits", {})),
             "vehicle": vehicle,
@@ -354,14 +358,19 @@ def _tables_in(value: object, field: str = "") -> Iterator[tuple[str, dict[str, 
             yield from _tables_in(entry, f"{field}[{index}]")
 
 
-def _own_values(tables: dict[str, Any], found: dict[int, Distribution], within: str = "") -> dict[str, Any]:
-    """Return tables, one in the other, with means in the place of distributions, which go to ``found``."""
-    values = {}
-    for key, entry in tables.items():
-        deeper = isinstance(entry, dict) and not entry.keys() & KINDS
-        place = f"{within}{key}"
-        values[key] = _own_values(entry, found, f"{place}.") if deeper else _own_value(place, entry, found)
-    return values
+def _number(found: dict[int, Distribution], parameter: Parameter, value: object, field: str) -> float:
+    """Return a number in a file, or the mean of a distribution in its place, which goes to ``found``.
+
+    Raises:
+        ScenarioError, ParameterError, QuantityError: None that the ``parameter`` admits.
+    """
+    if not isinstance(value, dict):
+        return read_number(parameter, value, field)
+    drawn = found[id(value)] = read_distribution(value, parameter.unit or "1", field)
+    if not parameter.minimum <= drawn.low < drawn.high <= parameter.maximum:
+        limits = limits_in_words(parameter, next(iter(value.values()))[0])
+        raise ScenarioError(f"{field} = {value!r}: expected all values{limits}")
+    return drawn.middle
 
 
 def _own_value(field: str, value: object, found: dict[int, Distribution]) -> Any:
@@ -404,14 +413,11 @@ def _fault_row(field: str, row: dict[str, Any], found: dict[int, Distribution]) 
         if key in common:
             continue
         if key not in table:
-            expected = ", ".join((*table, *(name for name in FaultTable.model_fields if name != "parameters")))
-            raise ScenarioError(f"{field}.{key}: unknown key, expected one of {expected}")
-        unit = table[key].unit or "1"
-        if isinstance(value, dict):
-            drawn = found[id(value)] = read_distribution(value, unit, f"{field}.{key}")
-            parameters[key] = drawn.middle
-        else:
-            parameters[key] = parse_quantity(value, unit, f"{field}.{key}")
+            expected = (*table, *(name for name in FaultTable.model_fields if name != "parameters"))
+            raise ScenarioError(
+                f"{field}.{key}: unknown key, expected one of {', '.join(expected)}{did_you_mean(key, expected)}"
+            )
+        parameters[key] = _number(found, table[key], value, f"{field}.{key}")
     return {**common, "parameters": parameters}
 
 
@@ -461,6 +467,11 @@ def _check(scenario: Scenario) -> None:
             Fault.of(fault.channel, fault.type, fault.parameters)
         except ParameterError as error:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
+    if scenario.equipment:
+        try:
+            check_equipment(scenario.equipment, scenario.vehicle.described.decoupled, _PERIOD)
+        except ParameterError as error:
+            raise ScenarioError(str(error).removeprefix("parameter ")) from error
     check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
     _check_starts(scenario)
 
@@ -479,20 +490,39 @@ def _check_starts(scenario: Scenario) -> None:
                     f"{table}[{index}].start = {start:g} s: "
                     f"expected a time before the flight's end, {scenario.duration:g} s"
                 )
+    for index, fault in enumerate(scenario.fault):
+        if fault.stop is not None and fault.stop <= fault.start:
+            raise ScenarioError(
+                f"fault[{index}].stop = {fault.stop:g} s: expected a time after its start, {fault.start:g} s"
+            )
+
+
+_DUE = {
+    "tuple_type": "a list of tables",
+    "model_type": "a table",
+    "string_type": "a text",
+    "int_type": "a whole number",
+    "greater_than_equal": "at least {ge}",
+    "less_than_equal": "at most {le}",
+}
+"""What is expected, by the type of a problem that pydantic finds; of others it says so itself."""
 
 
 def _first_problem(error: ValidationError) -> str:
     problem = error.errors()[0]
     field = _dotted(problem["loc"])
     if problem["type"] == "extra_forbidden":
-        return f"{field}: unknown key, expected one of {', '.join(_siblings(problem['loc']))}"
+        known = _siblings(problem["loc"])
+        hint = did_you_mean(str(problem["loc"][-1]), known)
+        return f"{field}: unknown key, expected one of {', '.join(known)}{hint}"
     if problem["type"] == "missing":
         return f"{field}: missing"
     if problem["type"] == "value_error":
         # The cause begins with the field's own name: the path of the field says more.
         _, equals, rest = str(problem["ctx"]["error"]).partition(" = ")
         return f"{field}{equals}{rest}"
-    return f"{field} = {problem['input']!r}: {problem['msg'][0].lower()}{problem['msg'][1:]}"
+    due = _DUE.get(problem["type"]) or problem["msg"].removeprefix("Input should be ")
+    return f"{field} = {problem['input']!r}: expected {due.format(**problem.get('ctx', {}))}"
 
 
 def _dotted(location: Iterable[int | str]) -> str:
@@ -508,4 +538,6 @@ def _siblings(location: tuple[int | str, ...]) -> list[str]:
         if isinstance(part, str):
             annotation = model.model_fields[part].annotation
             model = annotation if isinstance(annotation, type) else annotation.__args__[0]
-    return [name for name in model.model_fields if model is not Scenario or name not in _NO_KEYS]
+    if model is Scenario:
+        return [name for name in (*model.model_fields, *sorted(EQUIPMENT)) if name not in _NO_KEYS]
+    return list(model.model_fields)

@@ -88,8 +88,13 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereDa
     for name, standard in (("forward", 0.0), ("up", 0.0), ("lengths", 0.0), ("stays", 0.0)):
         given = v[f"gust.{name}"] or ([standard] * len(starts) if name != "lengths" else [])
         if len(given) != len(starts):
-            raise ParameterError(f"parameter gust.{name}: {len(given)} values, expected {len(starts)} as gust.starts")
+            raise ParameterError(
+                f"parameter gust.{name}: {len(given)} values, expected as many as gust.starts, {len(starts)}"
+            )
         columns[name] = np.array(given, np.float64)
+    for stays in v["gust.stays"]:
+        if stays not in (0.0, 1.0):
+            raise ParameterError(f"parameter gust.stays = {stays!r}: expected 0 or 1")
     wind = np.array([v["wind.forward"], v["wind.up"]])
     sigma = np.array([v["turbulence.sigma_forward"], v["turbulence.sigma_up"]])
     changed = (v["wind.shear"], v["density.offset"], v["density.sigma"])

@@ -61,6 +61,18 @@ PLANT_PARAMETERS = (
 EQUIPMENT_PARAMETERS = (*ACTUATOR_PARAMETERS, *ATMOSPHERE_PARAMETERS, *SENSOR_PARAMETERS)
 """Of what is ideal unless a scenario says otherwise; the tables of a scenario are called after them."""
 
+
+def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
+    """Refuse :data:`EQUIPMENT_PARAMETERS` that do not fit one another.
+
+    Raises:
+        ParameterError: Names the one that is wrong.
+    """
+    actuator_data(values, vehicle, period)
+    atmosphere_data(values, period)
+    sensor_data(values, period)
+
+
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 """Conditions of :func:`hsv.vehicle.dynamics.forces_in` in still air, with an engine that works."""
 

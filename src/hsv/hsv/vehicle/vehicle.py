@@ -13,7 +13,6 @@ registered vehicle is looked up, not imported: reading data runs no code.
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import json
 import math
@@ -28,7 +27,7 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.errors import HsvError, ParameterError, QuantityError, VehicleError
+from hsv.errors import HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
 from hsv.inheritance import EXTENDS, Tables, follow_extends, is_path
 from hsv.parameters import Parameter, check_all
 from hsv.units import parse_quantity
@@ -300,8 +299,7 @@ def _path(name: str) -> Path:
         return Path(name)
     place = SHIPPED_VEHICLES.get(name) or next((e.value for e in entry_points(group=GROUP) if e.name == name), "")
     if not place:
-        near = difflib.get_close_matches(name, vehicle_names(), 1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = did_you_mean(name, vehicle_names())
         raise VehicleError(
             f"vehicle {name!r}: expected one of {', '.join(vehicle_names())} or the path of a TOML file{hint}"
         )

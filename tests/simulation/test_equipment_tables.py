@@ -1,0 +1,165 @@
+"""Wrong tables of faults, actuators, air and sensors, and seeds: one line that says where and what was due."""
+
+import pytest
+
+from hsv.errors import ScenarioError
+from hsv.simulation.scenario import parse_scenario
+
+FLIGHT = """
+title = "a flight with equipment"
+duration = "20 s"
+{seed}
+[initial]
+altitude = "85000 ft"
+velocity = "7900 ft/s"
+
+{tables}
+"""
+
+FAULT = '[[fault]]\nchannel = "elevator_deflection"\nstart = "10 s"\n'
+ELEVATOR = "[actuator.elevator_deflection]\n"
+PITCH_RATE = "[sensors.pitch_rate]\n"
+GUST = '[gust]\nstarts = ["5 s", "8 s"]\n'
+
+WRONG = [
+    (FAULT + 'type = "loss"', "fault[0].type = 'loss': expected one of loss_of_effectiveness, reversal, "),
+    (FAULT + 'type = "baias"', "sensor_freeze (did you mean 'bias'?)"),
+    (FAULT, "fault[0].type: missing"),
+    ('[[fault]]\nchannel = "elevator_deflection"\ntype = "lock_in_place"', "fault[0].start: missing"),
+    (
+        '[[fault]]\nchannel = "elevator"\ntype = "bias"\nstart = "1 s"\noffset = "1 deg"',
+        "fault[0].channel = 'elevator': expected one of fuel_equivalence_ratio, elevator_deflection for bias "
+        "(did you mean 'elevator_deflection'?)",
+    ),
+    (
+        '[[fault]]\nchannel = "pitch_rate"\ntype = "hard_over"\nstart = "1 s"\nrate = "1 deg/s"',
+        "fault[0].channel = 'pitch_rate': expected one of fuel_equivalence_ratio, elevator_deflection for hard_over",
+    ),
+    (FAULT + 'type = "bias"', "fault[0].offset: missing, expected offset for bias"),
+    (
+        FAULT + 'type = "oscillation"\namplitude = "1 deg"',
+        "fault[0].frequency: missing, expected amplitude and frequency for oscillation",
+    ),
+    (FAULT + 'type = "bias"\nofset = "1 deg"', "fault[0].ofset: unknown key, expected one of offset, "),
+    (FAULT + 'type = "bias"\noffset = 1', "fault[0].offset = 1: the unit is missing, expected a finite quantity"),
+    (FAULT + 'type = "bias"\noffset = "1 m"', "fault[0].offset = '1 m': wrong unit, expected a finite quantity"),
+    (FAULT + 'type = "bias"\noffset = "90 deg"', "fault[0].offset = '90 deg': expected from -30 to 30 deg"),
+    (FAULT + 'type = "bias"\noffset = ["1 deg"]', "fault[0].offset = ['1 deg']: expected a finite quantity"),
+    (
+        FAULT + 'type = "bias"\noffset = { uniform = ["0 deg", "90 deg"] }',
+        "fault[0].offset = {'uniform': ['0 deg', '90 deg']}: expected all values from -30 to 30 deg",
+    ),
+    (FAULT + "type = { uniform = [0, 1] }", "fault[0].type = {'uniform': [0, 1]}: expected a text"),
+    (FAULT + 'type = "delay"\nsteps = 1.5', "fault[0].steps = 1.5: expected a whole number"),
+    (
+        FAULT + 'type = "stop_limit"\nlower = "0.1 rad"\nupper = "-0.1 rad"',
+        "fault[0].lower = 0.1: expected at most upper, -0.1",
+    ),
+    (
+        FAULT + 'type = "lock_in_place"\nrandom_on = "1 s"',
+        "fault[0].random_off = 0.0: expected above 0 where random_on is, and only there",
+    ),
+    (FAULT + 'type = "lock_in_place"\nstop = "5 s"', "fault[0].stop = 5 s: expected a time after its start, 10 s"),
+    ('[fault]\ntype = "lock_in_place"', "fault = {'type': 'lock_in_place'}: expected a list of tables"),
+    (
+        '[[actuator]]\nset = "elevator_50"',
+        "actuator = [{'set': 'elevator_50'}]: expected a table of fuel_equivalence_ratio, elevator_deflection",
+    ),
+    (
+        '[actuator.elevator]\nset = "elevator_50"',
+        "actuator.elevator: unknown key, expected one of fuel_equivalence_ratio, elevator_deflection "
+        "(did you mean 'elevator_deflection'?)",
+    ),
+    (
+        ELEVATOR + 'set = "elevator_500"',
+        "actuator.elevator_deflection.set = 'elevator_500': expected one of ideal, elevator_50, elevator_150, "
+        "elevator_20, elevator_first_order_20 (did you mean 'elevator_50'?)",
+    ),
+    (
+        '[actuator.fuel_equivalence_ratio]\nset = "elevator_50"',
+        "actuator.fuel_equivalence_ratio.set = 'elevator_50': expected one of ideal, fuel_10",
+    ),
+    (
+        ELEVATOR + "set = { uniform = [0, 1] }",
+        "actuator.elevator_deflection.set = {'uniform': [0, 1]}: expected one of ideal, elevator_50",
+    ),
+    (ELEVATOR + "order = 3", "actuator.elevator_deflection.order = 3: expected from 0 to 2"),
+    (ELEVATOR + "order = 1.5", "actuator.elevator_deflection.order = 1.5: expected 0, 1 or 2"),
+    (
+        ELEVATOR + "order = 1",
+        "actuator.elevator_deflection.natural_frequency: none given, expected one for an order of 1",
+    ),
+    (
+        ELEVATOR + 'set = "elevator_50"\nnatural_frequency = "8 Hz"',
+        "actuator.elevator_deflection.natural_frequency = '8 Hz': wrong unit, expected a finite quantity",
+    ),
+    (
+        ELEVATOR + 'set = "elevator_50"\nstop = ["10 deg", "20 deg"]',
+        "actuator.elevator_deflection.stop: 2 values, expected one",
+    ),
+    ('wind = "10 m/s"', "wind = '10 m/s': expected a table of forward, up, shear, shear_altitude"),
+    ('[winds]\nforward = "10 m/s"', "winds: unknown key, expected one of title, "),
+    ("[wind]\nforward = 10", "wind.forward = 10: the unit is missing, expected a finite quantity"),
+    (
+        '[wind]\nforwards = "10 m/s"',
+        "wind.forwards: unknown key, expected one of forward, up, shear, shear_altitude (did you mean 'forward'?)",
+    ),
+    ('[wind]\nforward = ["1 m/s", "2 m/s"]', "wind.forward = ['1 m/s', '2 m/s']: expected one value, not a list"),
+    ('[wind]\nforward = "999 km/h"', "wind.forward = '999 km/h': expected from -720 to 720 km/h"),
+    (
+        '[wind]\nforward = { uniform = ["0 m", "9 m"] }',
+        "wind.forward = {'uniform': ['0 m', '9 m']}: uniform = '0 m': wrong unit",
+    ),
+    ('[turbulence]\nsigma_up = "-2 m/s"', "turbulence.sigma_up = '-2 m/s': expected from 0 to 50 m/s"),
+    (GUST + 'up = "1 m/s"\nlengths = "500 m"', "gust.up: 1 values, expected as many as gust.starts, 2"),
+    (GUST, "gust.lengths: 0 values, expected as many as gust.starts, 2"),
+    (GUST + 'lengths = ["500 m", "1 s"]', "gust.lengths[1] = '1 s': wrong unit, expected a finite quantity"),
+    (GUST + 'lengths = ["500 m", "500 m"]\nstays = [0, 0.5]', "gust.stays = 0.5: expected 0 or 1"),
+    ('[density]\noffset = "5 kg/m^3"', "density.offset = '5 kg/m^3': wrong unit, expected a finite quantity"),
+    ('[density]\noffset = "200 %"', "density.offset = '200 %': expected from -50 to 100 %"),
+    (
+        '[sensors]\nset = "fin"',
+        "sensors.set = 'fin': expected one of ideal, fine, ghv, inertial (did you mean 'fine'?)",
+    ),
+    ('[sensors.pitch]\nnoise = "1 deg"', "sensors.pitch: unknown key, expected one of set, "),
+    (PITCH_RATE + 'noise = "1 deg"', "sensors.pitch_rate.noise = '1 deg': wrong unit, expected a finite quantity"),
+    (PITCH_RATE + 'noise = { sigma = "1 deg/s" }', "expected a number or { uniform = [least, largest] } or "),
+    (PITCH_RATE + "latency = 1.5", "sensors.pitch_rate.latency = 1.5: expected a whole number"),
+    (PITCH_RATE + "drop_out = 2", "sensors.pitch_rate.drop_out = 2: expected from 0 to 1"),
+    (
+        PITCH_RATE + 'minimum = "1 rad/s"\nmaximum = "0 rad/s"',
+        "sensors.pitch_rate.minimum = 1.0: expected less than maximum, 0.0",
+    ),
+    ("[sensors]\ninertial_angle_of_attack = 0.5", "sensors.inertial_angle_of_attack = 0.5: expected 0 or 1"),
+    ("seed = -1", "seed = -1: expected at least 0"),
+    ("seed = 1.0", "seed = 1.0: expected a whole number"),
+    ("seed = true", "seed = True: expected a whole number"),
+    ('seed = "1"', "seed = '1': expected a whole number"),
+    ("seed = 9007199254740993", "seed = 9007199254740993: expected at most 9007199254740992"),
+    ("seed = { uniform = [0, 9] }", "seed = {'uniform': [0, 9]}: expected a whole number"),
+]
+
+
+def flight(text):
+    """Return a scenario with tables, or with a line before all tables."""
+    own = {"tables": text, "seed": ""} if text.startswith("[") else {"tables": "", "seed": text}
+    return FLIGHT.format(**own)
+
+
+@pytest.mark.parametrize(("text", "message"), WRONG)
+def test_what_is_wrong_is_named_on_one_line(text, message):
+    with pytest.raises(ScenarioError) as raised:
+        parse_scenario(flight(text), "flight")
+    said = str(raised.value)
+    assert said.startswith("scenario 'flight': ")
+    assert message in said
+    assert "\n" not in said
+
+
+def test_the_flight_is_right_without_what_is_wrong():
+    right = flight(GUST + 'up = ["1 m/s", "2 ft/s"]\nlengths = ["500 m", "1000 ft"]')
+    assert parse_scenario(right, "flight").equipment == {
+        "gust.starts": [5.0, 8.0],
+        "gust.up": [1.0, 0.6096],
+        "gust.lengths": [500.0, 304.8],
+    }
