@@ -17,9 +17,11 @@ from hsv.cli.claims import claims
 from hsv.cli.conclude import conclude
 from hsv.cli.design import design
 from hsv.cli.diff import diff
+from hsv.cli.equipment import equipment
 from hsv.cli.export import export
 from hsv.cli.export_controller import export_controller
 from hsv.cli.fault import fault
+from hsv.cli.faults import faults
 from hsv.cli.figures import figures
 from hsv.cli.include import include
 from hsv.cli.info import info
@@ -66,6 +68,8 @@ for command in (
     check,
     scenarios,
     vehicles,
+    equipment,
+    faults,
     simulate,
     run,
     prepare,

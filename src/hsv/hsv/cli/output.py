@@ -110,6 +110,19 @@ def print_json(values: Mapping[str, Any]) -> None:
     sys.stdout.write(json_text(values, indent=2) + "\n")
 
 
+def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
+    """Print rows with the same keys, the headings; a line a row however wide, numbers at the right, none as ``-``."""
+    columns = []
+    for heading in rows[0]:
+        values = [row[heading] for row in rows]
+        texts = [v if isinstance(v, str) else "-" if v is None else f"{v:.5g}" for v in values]
+        width = max(map(len, (heading, *texts)))
+        align = str.ljust if any(isinstance(value, str) for value in values) else str.rjust
+        columns.append([align(text, width) for text in (heading, *texts)])
+    for number, line in enumerate(zip(*columns, strict=True)):
+        console.print(Text("  ".join(line).rstrip(), style="" if number else "bold"), soft_wrap=True)
+
+
 def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:
     """Print name, value and unit of every quantity, with an optional remark; remarks on what has no value come last."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")

@@ -1,0 +1,68 @@
+import pytest
+
+from hsv.faults.injector import FaultInjector
+from hsv.faults.table import FAULT_KINDS, read_fault
+from hsv.simulation.scenario import scenario_text
+
+
+def test_every_type_of_fault_is_listed(hsv):
+    listed = hsv("faults", "--json").json
+    assert list(listed) == list(FAULT_KINDS)
+    assert {entry["side"] for entry in listed.values()} == {"command", "dynamics", "effector", "engine", "sensor"}
+    out = hsv("faults").out
+    assert all(name in out for name in FAULT_KINDS)
+
+
+@pytest.mark.parametrize("units", ["si", "paper"])
+@pytest.mark.parametrize("kind", FAULT_KINDS)
+def test_a_fault_at_either_end_of_the_ranges_that_are_printed_can_be_injected(hsv, kind, units):
+    described = hsv("faults", kind, "--json", "--units", units).json
+    occurrence = ("intermittent_period", "intermittent_duty", "random_on", "random_off")
+    for channel in described["channels"]:
+        rows = [row for row in described["parameters"] if row["channel"] in ("", channel)]
+        assert {row["parameter"] for row in rows} >= {*occurrence}
+        for share in (1e-9, 1.0 - 1e-9):
+            given = [
+                f"{row['parameter']}={row['least'] + share * (row['largest'] - row['least'])!r} {row['unit']}"
+                for row in rows
+                if row["parameter"] not in (*occurrence, "steps")
+            ]
+            steps = [f"steps={row['least']:g}" for row in rows if row["parameter"] == "steps"]
+            fault = read_fault(channel, kind, given + steps)
+            injector = FaultInjector()
+            injector.inject(fault)
+            assert injector.parameters()["fault.types"] == [kind]
+
+
+def test_parameters_are_printed_in_the_unit_of_their_channel(hsv):
+    words = ("amplitude", "elevator_deflection", "30", "deg")
+    out = hsv("faults", "oscillation", "--units", "paper").out
+    assert any(all(word in line.split() for word in words) for line in out.splitlines())
+    rows = hsv("faults", "sensor_runaway", "--units", "paper", "--json").json["parameters"]
+    [rate] = [row for row in rows if row["parameter"] == "rate" and row["channel"] == "velocity"]
+    assert (rate["unit"], rate["default"]) == ("ft/s/s", None)
+    assert rate["largest"] == pytest.approx(3000.0 / 0.3048)
+    # Natural frequencies are no rates of angles.
+    assert "rad/s" in hsv("faults", "bandwidth", "--units", "paper").out
+
+
+def test_an_unknown_type_is_refused_with_the_nearest(hsv):
+    ran = hsv("faults", "oscilation")
+    assert ran.code == 2
+    assert ran.error.startswith("type = 'oscilation': expected one of loss_of_effectiveness, ")
+    assert ran.error.endswith("(did you mean 'oscillation'?)")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('[[fault]]\nchannel = "elevator_deflection"\ntype = "bias"\nstart = "1 s"', "fault[1].offset: missing, "),
+        ("[wind]\nforward = 10", "wind.forward = 10: the unit is missing, "),
+        ('[sensors]\nset = "fin"', "sensors.set = 'fin': expected one of ideal, fine, ghv, inertial "),
+    ],
+)
+def test_a_scenario_with_a_wrong_table_ends_a_command_with_one_line(hsv, tmp_path, table, message):
+    (tmp_path / "wrong.toml").write_text(f"{scenario_text('case1')}\n{table}\n")
+    ran = hsv("simulate", "wrong.toml")
+    assert ran.code == 2
+    assert ran.error.startswith(f"scenario 'wrong': {message}")
