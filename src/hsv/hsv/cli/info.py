@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption, UnitsOption
-from hsv.cli.output import Units, console, print_json, print_table, to_json
+from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
@@ -42,7 +43,7 @@ def info(
         measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
         print_json(description | ({"metrics": None} if problem else measured))
     else:
-        _print(description)
+        _print(description, units)
         if not problem:
             print_table(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", quantities, units)
     if problem:
@@ -50,7 +51,7 @@ def info(
     print_bag_warnings(opened)
 
 
-def _print(description: dict[str, Any]) -> None:
+def _print(description: dict[str, Any], units: Units) -> None:
     from rich.table import Table
 
     from hsv.simulation.fingerprint import in_words
@@ -65,7 +66,8 @@ def _print(description: dict[str, Any]) -> None:
         "fingerprint": in_words(description["fingerprint"], description["as_published"]),
         "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
         or "nothing",
-        "faults": _intervals(description["faults"], _fault),
+        "faults": _intervals(description["faults"], partial(_fault, units)),
+        **_equipment(description["equipment"], units),
         "saturation": _saturation(description["saturation"]),
         "tube": _tube(description["tube"]),
     }
@@ -85,10 +87,43 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
     return "; ".join(f"{name(i)}{_span(i)}" for i in intervals) or "none"
 
 
-def _fault(fault: dict[str, Any]) -> str:
+def _fault(units: Units, fault: dict[str, Any]) -> str:
     from hsv.recording.info import parameters_in_words
 
-    return f"{fault['type']} {parameters_in_words(fault)} of {fault['channel']}, "
+    parameters = parameters_in_words(fault, lambda value, unit: _quantity(value, unit, units))
+    return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
+
+
+def _quantity(value: float, unit: str, units: Units) -> str:
+    value, unit = shown((value, unit), units)
+    return f"{value:g} {unit}" if unit not in ("", "1") else f"{value:g}"
+
+
+def _equipment(equipment: dict[str, Any] | None, units: Units) -> dict[str, str]:
+    """Return lines on what is not ideal, none where all is."""
+    from hsv.recording.equipment import AIR
+    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+
+    if equipment is None:
+        return {}
+    si = dict(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
+
+    def quantities(numbers: dict[str, float]) -> str:
+        return ", ".join(f"{name} {_quantity(value, si[name], units)}" for name, value in numbers.items())
+
+    lines = {
+        "sensors": ("rms error ", quantities(equipment["measurement_error_rms"])),
+        "effectors": ("up to ", quantities(equipment["effector_largest_difference"])),
+        "air": (
+            "",
+            ", ".join(
+                f"{name} {' to '.join(_quantity(value, AIR[name][0], units) for value in ends)}"
+                for name, ends in equipment["air_range"].items()
+            ),
+        ),
+    }
+    ends = {"effectors": " from where they were told to be"}
+    return {key: f"{head}{text}{ends.get(key, '')}" for key, (head, text) in lines.items() if text}
 
 
 def _span(interval: dict[str, Any]) -> str:

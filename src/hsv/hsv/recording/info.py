@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hsv.errors import HsvError, RecordingError
-from hsv.graph.description import STATE, TUBE_STATUS
+from hsv.errors import HsvError, ParameterError, RecordingError
+from hsv.faults.table import fault_parameters as parameters_of
+from hsv.graph.description import ACTUATOR, STATE, TUBE_STATUS
 from hsv.recording.bag_warnings import bag_warnings
-from hsv.recording.flight import flight_fingerprint
+from hsv.recording.equipment import effectors, equipment_topics, measurement_errors, moving_air
+from hsv.recording.flight import flight_fingerprint, input_columns
 from hsv.recording.former import fault_parameters, fault_topic, saturation_topic
 from hsv.recording.reader import Bag
-from hsv.recording.steps import complete_stamps, cut_off
+from hsv.recording.steps import complete_stamps, cut_off, joined
 from hsv.simulation.fingerprint import as_published
 from hsv.simulation.scenario import Scenario, parse_scenario
+from hsv.vehicle.dynamics import INPUT_NAMES
 
 
 def describe(bag: Bag) -> dict[str, Any]:
@@ -27,8 +31,9 @@ def describe(bag: Bag) -> dict[str, Any]:
         ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
-        entry per interval of a channel), ``saturation`` and ``tube``; the last four are None without the topic that
-        tells. Times are simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
+        entry per interval of a channel), ``equipment`` (what of sensors, effectors and air is not ideal, SI),
+        ``saturation`` and ``tube``; the last five are None without the topic that tells. Times are simulated, in
+        seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
     fingerprint = _fingerprint(bag)
@@ -51,6 +56,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         ],
         "ending": ending(bag) if STATE in bag.roles else None,
         "faults": _faults(bag) if fault_topic(bag) in bag.roles else None,
+        "equipment": _equipment(bag) if STATE in bag.roles else None,
         "saturation": _saturation(bag) if saturation_topic(bag) in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
     }
@@ -103,10 +109,41 @@ def _faults(bag: Bag) -> list[dict[str, Any]]:
     return sorted(intervals, key=lambda interval: interval["start_s"])
 
 
-def parameters_in_words(fault: dict[str, Any]) -> str:
-    """Return the parameters of a described fault: the value of a single one, names and values of several."""
+def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], str]) -> str:
+    """Return the parameters of a described fault: the quantity of a single one, names and quantities of several.
+
+    Args:
+        fault: As described.
+        written: Writes a number with its SI unit, which is empty where it has none or the fault is of no known type.
+    """
     given = fault["parameters"]
-    return ", ".join(f"{f'{name} ' if len(given) > 1 else ''}{value:g}" for name, value in given.items())
+    try:
+        known = {parameter.name: parameter for parameter in parameters_of(fault["channel"], fault["type"])}
+    except ParameterError:
+        known = {}
+    words = []
+    for name, value in given.items():
+        if name in known and known[name].unit == "rad/s":
+            quantity = f"{value:g} rad/s"  # a frequency, in every system of units
+        else:
+            quantity = written(value, known[name].of(fault["channel"]).unit if name in known else "")
+        words.append(f"{name} {quantity}" if len(given) > 1 else quantity)
+    return ", ".join(words)
+
+
+def _equipment(bag: Bag) -> dict[str, Any] | None:
+    """Return what is not ideal: errors of measurement, the way between effectors and what they were told, the air."""
+    try:
+        topics = joined(bag, equipment_topics(bag))
+    except RecordingError:
+        return None
+    told = input_columns(topics[ACTUATOR]) if ACTUATOR in topics else np.empty((0, len(INPUT_NAMES)))
+    away = {name: were - told[:, INPUT_NAMES.index(name)] for name, were in effectors(topics).items()}
+    return {
+        "measurement_error_rms": {n: float(np.sqrt(np.mean(e**2))) for n, e in measurement_errors(topics).items()},
+        "effector_largest_difference": {name: float(np.nanmax(np.abs(way))) for name, way in away.items()},
+        "air_range": {name: [float(np.nanmin(air)), float(np.nanmax(air))] for name, air in moving_air(topics).items()},
+    }
 
 
 def _saturation(bag: Bag) -> dict[str, Any]:

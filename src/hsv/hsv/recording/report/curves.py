@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hsv.graph.description import STATE, TUBE_STATUS
+from hsv.recording.equipment import effectors, equipment_topics, measurement_errors, moving_air
 from hsv.recording.reader import Bag
-from hsv.recording.report.panels import PANELS, Curve, Kind, Panel, error_panel
+from hsv.recording.report.panels import AIR_PANELS, MEASUREMENT_ERRORS, PANELS, Curve, Kind, Panel, error_panel
 from hsv.recording.steps import joined
 
 
@@ -35,6 +36,7 @@ class _Source:
 
     def __init__(self, bag: Bag) -> None:
         names = dict.fromkeys(curve.topic for panel in PANELS for curve in panel.curves)
+        names |= dict.fromkeys(equipment_topics(bag))
         # A controller of one's own has no tube.
         self.columns = joined(bag, [name for name in names if name != TUBE_STATUS or name in bag.roles])
         self.time = self.columns[STATE]["header.stamp"] * 1e-9
@@ -67,6 +69,15 @@ def flight_curves(bag: Bag) -> FlightCurves:
         if np.isfinite(drawn[0].y).any():
             flight.panels.append(panel)
             flight.curves[panel.name] = drawn
+    for name, were in effectors(source.columns).items():
+        flight.curves[name].append(DrawnCurve(Kind.effector, "effector", were))
+    for panels, found, label in (
+        (MEASUREMENT_ERRORS, measurement_errors(source.columns), "measured less true"),
+        (AIR_PANELS, moving_air(source.columns), "air"),
+    ):
+        for name, y in found.items():
+            flight.panels.append(panels[name])
+            flight.curves[panels[name].name] = [DrawnCurve(Kind.actual, label, y)]
     if "level" in flight.curves:
         flight.curves["level"].append(DrawnCurve(Kind.bound, "edge of the set", np.ones(2)))
     centre, half_width = source.tube("tube_centre"), source.tube("tube_half_width")

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from hsv.graph.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
 from hsv.recording.former import saturation_topic
 from hsv.recording.info import parameters_in_words
 from hsv.recording.reader import Bag
 from hsv.recording.report.panels import INPUTS
+from hsv.recording.report.text import quantity
 from hsv.recording.track import expecting_fields
 
 JOIN_WITHIN = 0.5
@@ -63,8 +65,11 @@ def flight_events(bag: Bag, description: dict[str, Any]) -> list[Event]:
 
 def _faults(description: dict[str, Any]) -> Iterator[Event]:
     for fault in description["faults"] or ():
-        channel = fault["channel"].replace("_", " ")
-        text = f"{channel}: {fault['type'].replace('_', ' ')} {parameters_in_words(fault)}"
+        channel, kind = (escape(fault[key].replace("_", " ")) for key in ("channel", "type"))
+        # Names of a foreign bag are text, quantities are there in both systems of units.
+        named = {str(escape(name)): value for name, value in fault["parameters"].items()}
+        parameters = parameters_in_words({**fault, "parameters": named}, quantity)
+        text = Markup(f"{channel}: {kind} {parameters}".rstrip())
         yield Event(fault["start_s"], fault["end_s"], "fault", text, fault["channel"])
 
 

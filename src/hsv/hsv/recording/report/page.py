@@ -13,7 +13,7 @@ from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
 from hsv.recording.report import text
 from hsv.recording.report.comparison import comparisons
-from hsv.recording.report.panels import GROUPS
+from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
 from hsv.recording.report.values import Quantity, Section, Table
@@ -63,11 +63,14 @@ def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
         "section": lambda value: isinstance(value, Section),
     }
     plots, numbers = payload(runs)
+    panels = all_panels(runs)
+    drawn = {panel.group for panel in panels}
     return environment.get_template("page.html.j2").render(
         runs=runs,
         paper_units=paper_units,
-        groups=GROUPS,
-        panels=all_panels(runs),
+        groups={key: heading for key, heading in GROUPS.items() if key not in OF_EQUIPMENT or key in drawn},
+        panels=panels,
+        effectors=any(curve["kind"] == Kind.effector for panel in plots["panels"] for curve in panel["curves"]),
         metrics={name: metric for name, metric in METRICS.items() if any(name in run.metrics for run in runs)},
         comparisons=comparisons(runs),
         shipped_scenarios=scenario_names(),

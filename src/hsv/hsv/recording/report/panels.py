@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from hsv.graph.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
+from hsv.recording.equipment import AIR
+from hsv.vehicle.dynamics import STATE_NAMES, STATE_UNITS
 
 
 class Kind(StrEnum):
@@ -16,6 +18,7 @@ class Kind(StrEnum):
     reference = "reference"
     filtered = "filtered"
     actuator = "actuator"
+    effector = "effector"
     bound = "bound"
 
 
@@ -48,9 +51,14 @@ GROUPS = {
     "attitude": "Attitude",
     "elastic": "Elastic modes",
     "inputs": "Inputs",
+    "sensors": "Sensors: measured less true",
+    "air": "Air",
     "tube": "Tube",
 }
 """Headings of the groups, in the order of the page."""
+
+OF_EQUIPMENT = ("sensors", "air")
+"""Groups that a page has where a flight has something in them."""
 
 INPUTS = ("fuel_equivalence_ratio", "elevator_deflection")
 
@@ -112,6 +120,23 @@ ERRORS = (
     ("Error of pitch angle", "rad"),
     ("Error of pitch rate", "rad/s"),
 )
+
+
+MEASUREMENT_ERRORS = {
+    name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors", ())
+    for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
+}
+"""By state; the curve is a difference of two topics."""
+
+AIR_PANELS = {
+    name: Panel(name, title, AIR[name][0], "air", ())
+    for name, title in (
+        ("wind_forward", "Wind from behind"),
+        ("wind_up", "Wind from below"),
+        ("density_factor", "Density for that of the model"),
+    )
+}
+"""By field of the air."""
 
 
 def error_panel(component: int) -> Panel:

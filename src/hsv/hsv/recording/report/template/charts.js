@@ -7,6 +7,7 @@ const css = (name) => getComputedStyle(document.documentElement).getPropertyValu
 const LOOKS = {
   actual: { dash: "solid", width: 1.4 },
   actuator: { dash: "dash", width: 1.2 },
+  effector: { dash: "dot", width: 1.4 },
   nominal: { dash: "dash", width: 1.1 },
   reference: { dash: "dot", width: 1.2 },
   filtered: { dash: "dot", width: 1.1 },
