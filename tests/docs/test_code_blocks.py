@@ -1,6 +1,7 @@
 """The Python code on pages of the documentation runs, block after block, as a reader would type it."""
 
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -8,8 +9,10 @@ from pathlib import Path
 import matplotlib
 import pytest
 
+from hsv.faults.table import FAULT_KINDS, read_fault
+
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = ["python.md", "vehicle.md"]
+PAGES = ["python.md", "vehicle.md", "hardware.md"]
 MODULES = {"python.md": ("mine", "class Mine")}
 """Pages that tell to put a block into a module: its name, and what the block has in it."""
 
@@ -55,6 +58,35 @@ def test_commands_of_the_page_take_a_vehicle_from_its_file_to_a_certified_flight
     write_files("vehicle.md", tmp_path)
     commands = re.findall(r"^    (hsv .*)$", (DOCS / "vehicle.md").read_text(encoding="utf-8"), re.MULTILINE)
     assert [command.split()[1] for command in commands[-3:]] == ["design", "verify", "simulate"]
+    for command in commands:
+        ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
+        assert ran.returncode == 0, f"{command}: {ran.stderr}"
+
+
+def test_the_page_on_hardware_has_every_type_of_fault_in_the_order_in_which_they_act():
+    rows = re.findall(
+        r"^\| (\w+) \| (\w+(?:, \w+)*) \|$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    listed = [(side, kind) for side, kinds in rows for kind in kinds.split(", ")]
+    assert listed == [(kind.side, name) for name, kind in FAULT_KINDS.items()]
+
+
+def test_faults_that_the_page_on_hardware_injects_are_faults():
+    commands = re.findall(
+        r"^    hsv fault inject (.*)$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    injected = [shlex.split(command.partition(" --duration")[0]) for command in commands]
+    assert [str(read_fault(channel, kind, parameters)) for channel, kind, *parameters in injected] == [
+        "oscillation amplitude 0.00872665 frequency 2 of elevator_deflection",
+        "loss_of_effectiveness effectiveness 0.8 of elevator_deflection",
+    ]
+
+
+@pytest.mark.long
+def test_commands_of_the_page_on_hardware_run(tmp_path):
+    write_files("hardware.md", tmp_path)
+    commands = re.findall(r"^    (hsv (?!fault ).*)$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert [command.split()[1] for command in commands] == ["faults", "equipment", "montecarlo", "montecarlo"]
     for command in commands:
         ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
         assert ran.returncode == 0, f"{command}: {ran.stderr}"
