@@ -1,0 +1,81 @@
+"""Flights of the graph with all that is not ideal at once: those of the library, and repeated, bit for bit."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import numpy as np
+import pytest
+from injected_fault import last_line
+from node_processes import Processes, recorded_steps
+from real_hardware import ELEVATOR, scenario_file
+from waiting import output_of, wait_until
+
+from hsv.recording.flight import input_columns, state_columns
+from hsv.recording.reader import Bag
+from hsv.replay.attached import complete_steps, flown_parameters
+from hsv.replay.engine import replay, rerun
+from hsv.replay.processes import processes_of
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+
+@pytest.mark.parametrize("composed", [(), ("--composed",)], ids=["separate", "composed"])
+def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, composed: tuple[str, ...]) -> None:
+    scenario = scenario_file(shared_processes.folder, "everything")
+    path = shared_processes.folder / "".join(("flown", *composed))
+    done = shared_processes.run("hsv", "run", scenario, "--no-report", "--bag", path, *composed)
+    assert done.returncode == 0, done.stdout
+    bag, history = Bag(path), fly(assemble_flight(load_scenario(str(scenario)))).history
+    recorded = {
+        "state": state_columns(bag.columns("/hsv/state")),
+        "measurement": state_columns(bag.columns("/hsv/measurement"), "state."),
+        "filtered_pitch_rate": bag.columns("/hsv/filtered_state")["filtered_pitch_rate"],
+        "deviation": state_columns(bag.columns("/hsv/nominal"), "deviation."),
+        "command": input_columns(bag.columns("/hsv/command")),
+        "actuator": input_columns(bag.columns("/hsv/actuator")),
+    }
+    for name, column in recorded.items():
+        assert np.array_equal(column, getattr(history, name)), name
+    forces = bag.columns("/hsv/forces")
+    assert np.any(forces["wind_up"] != 0.0)
+    assert np.any(forces["effector.elevator_deflection"] != recorded["actuator"][:, 1])
+
+
+@pytest.mark.long
+def test_a_fault_with_parameters_injected_in_flight_is_repeated(processes: Processes) -> None:
+    scenario = scenario_file(processes.folder, "everything", duration="3600 s")
+    path = processes.folder / "injected"
+    words = ["--bag", path, "--real-time-factor", "4.0", "--no-report"]
+    flight = processes.start("hsv", "run", scenario, *words)
+
+    def fly_until(step: int) -> None:
+        def flown() -> bool:
+            assert flight.poll() is None, flight.communicate()[0]
+            return recorded_steps(path) >= step
+
+        wait_until(flown, [flight.pid], lambda: recorded_steps(path))
+
+    fly_until(50)
+    oscillation = ("oscillation", "amplitude=0.3 deg", "frequency=0.7 Hz", "random_on=0.4 s", "random_off=0.2 s")
+    first = None
+    for fault in ((ELEVATOR, *oscillation), ("pitch_rate", "sensor_bias", "0.01 deg/s")):
+        answer = processes.run("hsv", "fault", "inject", *fault, "--duration", "5 s", "--json")
+        assert answer.returncode == 0, answer.stdout
+        first = first or json.loads(last_line(answer))["step"]
+    fly_until(first + 400)
+    flight.send_signal(signal.SIGINT)
+    output = output_of(flight)
+    assert flight.returncode == 130, output
+
+    bag = Bag(path)
+    values = flown_parameters(bag)
+    values.shared["duration"] = complete_steps(bag) * values.shared["period"]
+    results = [replay(bag, process, values, lambda *_: None) for process in processes_of("tube_mpc").values()]
+    results += rerun(bag, "tube_mpc", values, lambda *_: None)
+    assert len(results) == 10
+    assert [r.process.node.name for r in results if not r.identical] == []

@@ -1,0 +1,58 @@
+"""Changes of Case 1 that give it, for a few seconds, actuators, sensors, air and faults that are not ideal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+SHORT = {"duration": "6 s", "seed": 7, "fault": []}
+
+ACTUATORS = {"actuator": {"elevator_deflection": {"set": "elevator_50"}, "fuel_equivalence_ratio": {"set": "fuel_10"}}}
+SENSORS = {"sensors": {"set": "fine"}}
+AIR = {
+    "turbulence": {"sigma_forward": "2 ft/s", "sigma_up": "2 ft/s"},
+    "gust": {"starts": ["2 s"], "forward": ["10 ft/s"], "up": ["5 ft/s"], "lengths": ["500 m"], "stays": [0.0]},
+}
+
+
+def faults(*rows: dict[str, Any]) -> dict[str, Any]:
+    """Return the table of these faults, which begin after one second unless they say otherwise."""
+    return {"fault": [{"start": "1 s", **row} for row in rows]}
+
+
+ELEVATOR, FUEL = "elevator_deflection", "fuel_equivalence_ratio"
+HARDWARE: dict[str, dict[str, Any]] = {
+    "actuators": ACTUATORS,
+    "sensors": SENSORS,
+    "air": AIR,
+    "oscillation": faults({"channel": ELEVATOR, "type": "oscillation", "amplitude": "0.2 deg", "frequency": "1 Hz"}),
+    "bandwidth": ACTUATORS | faults({"channel": ELEVATOR, "type": "bandwidth", "natural_frequency": "20 rad/s"}),
+    "engine": faults(
+        {"channel": "engine", "type": "thrust_loss", "share": "95 %", "stop": "4 s"},
+        {"channel": "engine", "type": "inlet_unstart", "start": "3 s", "stop": "3.5 s"},
+    ),
+    "sensor faults": SENSORS
+    | faults(
+        {"channel": "pitch_angle", "type": "sensor_bias", "offset": "0.05 deg"},
+        {"channel": "velocity", "type": "sensor_freeze", "start": "2 s", "stop": "4 s"},
+    ),
+    "delay": faults({"channel": FUEL, "type": "delay", "steps": 3}),
+    "random loss": faults(
+        {"channel": ELEVATOR, "type": "loss_of_effectiveness", "effectiveness": 0.8, "random_on": "0.2 s"}
+        | {"random_off": "0.3 s"}
+    ),
+}
+RANDOM = ("sensors", "air", "sensor faults", "random loss", "everything")
+HARDWARE["everything"] = (
+    ACTUATORS | SENSORS | AIR | {"fault": [row for h in HARDWARE.values() for row in h.get("fault", ())]}
+)
+"""By name; the last is all of them at once."""
+
+
+def scenario_file(folder: Path, name: str, **changes: Any) -> Path:
+    """Write Case 1 with this hardware to a scenario, and return its path."""
+    path = folder / f"{name}.toml"
+    path.write_text(tomli_w.dumps({"extends": "case1"} | SHORT | HARDWARE[name] | changes))
+    return path
