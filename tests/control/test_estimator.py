@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_are
 
-from hsv.control.estimator import ESTIMATOR_PARAMETERS, estimate_step, estimator_data, steady_gain, transition
+from hsv.control.estimator import estimate_step, estimator_data, scratch, steady_gain, transition
+from hsv.control.estimator_parameters import PROCESS_PARAMETERS
 from hsv.errors import ParameterError
 from hsv.faults.laws import fault_memory, fault_rows
 from hsv.faults.table import SENSOR
@@ -20,7 +21,7 @@ VEHICLE = load_vehicle().coupled()
 START = trim(VEHICLE, 26060.4, 2407.92)
 A, B = jacobian(START.state, START.input, VEHICLE)
 SENSORS = sensor_data({"sensors.set": "ghv"}, T)
-PROCESS = np.array(ESTIMATOR_PARAMETERS[2].default)
+PROCESS = np.array([p.default for p in PROCESS_PARAMETERS])
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +59,7 @@ def test_scalar_gain_is_the_textbooks():
 def flown(estimator, measured, seconds=20.0, offset=0.0):
     """Return truth and estimate of a flight about the trim, its elevator off by a constant that no one knows."""
     rows = fault_rows([SENSOR], [], T)
-    memory, sensors, work = fault_memory(rows), sensor_state(), np.empty((4, 9))
+    memory, sensors, work = fault_memory(rows), sensor_state(), scratch()
     x, y, state, estimate = START.state.copy(), np.empty(9), np.zeros(11), np.empty(9)
     command, truth, found = START.input.copy(), [], []
     for k in range(round(seconds / T)):
@@ -98,9 +99,9 @@ def test_it_is_a_function_of_what_it_is_given(estimator):
 @pytest.mark.parametrize(
     ("values", "noise", "message"),
     [
-        ({}, np.zeros(9), "estimator.noise = .*: expected 5 numbers above 0"),
-        ({"estimator.noise": [1.0, 2.0]}, np.ones(9), "estimator.noise = .*: expected 5 numbers above 0"),
-        ({"estimator.process": [1.0]}, np.ones(9), "estimator.process = .*: expected 11 numbers above 0"),
+        ({}, np.zeros(9), "estimator.noise.altitude = 0: expected above 0, its sensor has no noise"),
+        ({"estimator.noise.pitch_rate": -1.0}, np.ones(9), "estimator.noise.pitch_rate = -1.0: expected"),
+        ({"estimator.process.altitude": 0.0}, np.ones(9), "estimator.process.altitude = 0.0: expected"),
     ],
 )
 def test_what_is_no_estimator_is_refused(values, noise, message):

@@ -24,23 +24,28 @@ from hsv.simulation.scenario import load_scenario
 pytestmark = pytest.mark.graph
 
 
-@pytest.mark.parametrize("composed", [(), ("--composed",)], ids=["separate", "composed"])
-def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, composed: tuple[str, ...]) -> None:
-    scenario = scenario_file(shared_processes.folder, "everything")
-    path = shared_processes.folder / "".join(("flown", *composed))
-    done = shared_processes.run("hsv", "run", scenario, "--no-report", "--bag", path, *composed)
+@pytest.mark.parametrize(
+    ("name", "words"), [("everything", ()), ("everything estimated", ()), ("everything estimated", ("--composed",))]
+)
+def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, name: str, words: tuple[str, ...]) -> None:
+    scenario = scenario_file(shared_processes.folder, name)
+    path = shared_processes.folder / "".join((scenario.stem, *words))
+    done = shared_processes.run("hsv", "run", scenario, "--no-report", "--bag", path, *words)
     assert done.returncode == 0, done.stdout
     bag, history = Bag(path), fly(assemble_flight(load_scenario(str(scenario)))).history
+    filtered = [message for _, message in bag.decode("/hsv/filtered_state")]
+    measured = state_columns(bag.columns("/hsv/measurement"), "state.")
+    assert {len(message.estimate) for message in filtered} == {9 if "estimated" in name else 0}
     recorded = {
         "state": state_columns(bag.columns("/hsv/state")),
-        "measurement": state_columns(bag.columns("/hsv/measurement"), "state."),
-        "filtered_pitch_rate": bag.columns("/hsv/filtered_state")["filtered_pitch_rate"],
+        "estimate": np.array([message.estimate for message in filtered]) if "estimated" in name else measured,
+        "filtered_pitch_rate": np.array([message.filtered_pitch_rate for message in filtered]),
         "deviation": state_columns(bag.columns("/hsv/nominal"), "deviation."),
         "command": input_columns(bag.columns("/hsv/command")),
         "actuator": input_columns(bag.columns("/hsv/actuator")),
     }
-    for name, column in recorded.items():
-        assert np.array_equal(column, getattr(history, name)), name
+    for column, values in recorded.items():
+        assert np.array_equal(values, getattr(history, column)), column
     forces = bag.columns("/hsv/forces")
     assert np.any(forces["wind_up"] != 0.0)
     assert np.any(forces["effector.elevator_deflection"] != recorded["actuator"][:, 1])
@@ -48,7 +53,7 @@ def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, compos
 
 @pytest.mark.long
 def test_a_fault_with_parameters_injected_in_flight_is_repeated(processes: Processes) -> None:
-    scenario = scenario_file(processes.folder, "everything", duration="3600 s")
+    scenario = scenario_file(processes.folder, "everything estimated", duration="3600 s")
     path = processes.folder / "injected"
     words = ["--bag", path, "--real-time-factor", "4.0", "--no-report"]
     flight = processes.start("hsv", "run", scenario, *words)
@@ -75,7 +80,10 @@ def test_a_fault_with_parameters_injected_in_flight_is_repeated(processes: Proce
     bag = Bag(path)
     values = flown_parameters(bag)
     values.shared["duration"] = complete_steps(bag) * values.shared["period"]
-    results = [replay(bag, process, values, lambda *_: None) for process in processes_of("tube_mpc").values()]
+    results = [replay(bag, process, values, lambda *_: None) for process in processes_of("tube_mpc", True).values()]
     results += rerun(bag, "tube_mpc", values, lambda *_: None)
     assert len(results) == 10
     assert [r.process.node.name for r in results if not r.identical] == []
+    for node in ("notch_filter", "tube_mpc"):
+        done = processes.run("hsv", "replay", path, "--over-dds", "--node", node)
+        assert done.stdout.count("identical in every byte") == 1, done.stdout

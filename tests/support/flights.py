@@ -23,7 +23,7 @@ def step_by_step(parts: Components) -> dict[str, np.ndarray]:
     rows = [
         {
             "state": signals.state,
-            "measurement": signals.measurement,
+            "estimate": signals.estimate,
             "filtered_pitch_rate": signals.filtered_pitch_rate,
             "deviation": signals.deviation,
             "nominal_input": signals.nominal_input,

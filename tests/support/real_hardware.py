@@ -11,6 +11,7 @@ SHORT = {"duration": "6 s", "seed": 7, "fault": []}
 
 ACTUATORS = {"actuator": {"elevator_deflection": {"set": "elevator_50"}, "fuel_equivalence_ratio": {"set": "fuel_10"}}}
 SENSORS = {"sensors": {"set": "fine"}}
+ESTIMATOR = {"sensors": {"set": "ghv"}, "estimator": {"enabled": True}}
 AIR = {
     "turbulence": {"sigma_forward": "2 ft/s", "sigma_up": "2 ft/s"},
     "gust": {"starts": ["2 s"], "forward": ["10 ft/s"], "up": ["5 ft/s"], "lengths": ["500 m"], "stays": [0.0]},
@@ -26,6 +27,7 @@ ELEVATOR, FUEL = "elevator_deflection", "fuel_equivalence_ratio"
 HARDWARE: dict[str, dict[str, Any]] = {
     "actuators": ACTUATORS,
     "sensors": SENSORS,
+    "estimator": ESTIMATOR,
     "air": AIR,
     "oscillation": faults({"channel": ELEVATOR, "type": "oscillation", "amplitude": "0.2 deg", "frequency": "1 Hz"}),
     "bandwidth": ACTUATORS | faults({"channel": ELEVATOR, "type": "bandwidth", "natural_frequency": "20 rad/s"}),
@@ -44,15 +46,15 @@ HARDWARE: dict[str, dict[str, Any]] = {
         | {"random_off": "0.3 s"}
     ),
 }
-RANDOM = ("sensors", "air", "sensor faults", "random loss", "everything")
-HARDWARE["everything"] = (
-    ACTUATORS | SENSORS | AIR | {"fault": [row for h in HARDWARE.values() for row in h.get("fault", ())]}
-)
-"""By name; the last is all of them at once."""
+RANDOM = ("sensors", "estimator", "air", "sensor faults", "random loss", "everything", "everything estimated")
+_FAULTS = {"fault": [row for hardware in HARDWARE.values() for row in hardware.get("fault", ())]}
+HARDWARE["everything"] = ACTUATORS | SENSORS | AIR | _FAULTS
+HARDWARE["everything estimated"] = ACTUATORS | ESTIMATOR | AIR | _FAULTS
+"""By name."""
 
 
 def scenario_file(folder: Path, name: str, **changes: Any) -> Path:
     """Write Case 1 with this hardware to a scenario, and return its path."""
-    path = folder / f"{name}.toml"
+    path = folder / f"{name.replace(' ', '_')}.toml"
     path.write_text(tomli_w.dumps({"extends": "case1"} | SHORT | HARDWARE[name] | changes))
     return path

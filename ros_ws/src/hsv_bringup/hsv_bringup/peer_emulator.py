@@ -39,14 +39,15 @@ class PeerEmulatorNode(LockstepNode):
         bag = Bag(values["peer_emulator.bag"])
         self._under_test = values["peer_emulator.node"]
         self._limit = values["peer_emulator.timeout"]
-        me = next(n for n in description.graph(self.controller) if n.name == self._under_test)
+        me = next(n for n in description.graph(self.controller, self.estimator) if n.name == self._under_test)
         self._is_plant = me is description.PLANT
         self._steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, me.subscribes)
         self._recorded = {topic: [data for _, data in bag.messages(topic)] for topic in me.subscribes}
+        self._delayed = () if self._is_plant else me.delayed
         self._answered = dict.fromkeys(me.publishes, 0)
         self._fed = 0
         self._output = BagWriter(Path(values["peer_emulator.directory"]))
-        self._emulated = description.peers(me, self.controller, recorded=False)
+        self._emulated = description.peers(me, self.controller, recorded=False, estimator=self.estimator)
         self._peers: dict[str, Node] = {}
         published = {topic: publisher for peer in self._emulated for topic, publisher in self._emulate(peer, me)}
         self._feeds = {topic: published[topic] for topic in me.subscribes}
@@ -113,7 +114,9 @@ class PeerEmulatorNode(LockstepNode):
             self.finish(0)
         elif self._fed < self._steps and done >= self._fed + self._is_plant:
             for topic, publisher in self._feeds.items():
-                publisher.publish(self._recorded[topic][self._fed])
+                step = self._fed - (topic in self._delayed)
+                if step >= 0:
+                    publisher.publish(self._recorded[topic][step])
             self._fed += 1
             if self._fed % 200 == 0:
                 print(f"step {self._fed}", flush=True)

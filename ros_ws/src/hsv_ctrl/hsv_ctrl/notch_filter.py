@@ -1,15 +1,16 @@
-"""The notch filter node: filters the pitch rate of every measured state."""
+"""The notch filter node: filters the pitch rate of every measured state, or of what an estimator makes of it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hsv.control.notch_filter import NotchFilter
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
 from hsv.graph.description import NOTCH_FILTER
 from hsv.simulation.blocks import Signals
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
-from hsv_node.parameters import declare
+from hsv_node.parameters import declare, declare_vehicle
 
 
 class NotchFilterNode(BlockNode):
@@ -17,7 +18,11 @@ class NotchFilterNode(BlockNode):
 
     def __init__(self) -> None:
         super().__init__(NOTCH_FILTER, "filter")
-        self.component = NotchFilter.from_parameters(declare(self, NotchFilter.PARAMETERS))
+        if self.estimator:
+            declare_vehicle(self)
+        # Of what only an estimator needs, a node without one has none.
+        table = NotchFilter.PARAMETERS if self.estimator else NOTCH_PARAMETERS
+        self.component = NotchFilter.from_parameters(declare(self, (*table, ESTIMATOR_ENABLED)))
 
     def stepped(self, signals: Signals) -> None:
         """Tell that it goes on."""

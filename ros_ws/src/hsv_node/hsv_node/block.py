@@ -31,7 +31,9 @@ class BlockNode(PeerNode):
         self._answers = [
             (FILL[topic], message_class(TOPICS[topic])(), self.create_step_publisher(topic)) for topic in role.publishes
         ]
-        for topic in role.subscribes:
+        delayed = self.role.delayed
+        self._delays = {topic: int(topic in delayed) for topic in self.role.subscribes}
+        for topic in self.role.subscribes:
             self.create_step_subscription(topic, partial(self.on_message, topic))
 
     def start_run(self, run: Run) -> None:
@@ -44,13 +46,16 @@ class BlockNode(PeerNode):
 
     def on_message(self, topic: str, message: Any) -> None:
         """Step as soon as all messages of a step are there."""
-        given = self._given
+        given, delays = self._given, self._delays
         given[topic] = message
-        if len(given) < len(self.role.subscribes) or any(other.step != message.step for other in given.values()):
+        step = message.step + delays[topic]
+        # Before the first step there is none.
+        due = [name for name in delays if step > 0 or not delays[name]]
+        if any(name not in given or given[name].step + delays[name] != step for name in due):
             return
         signals = self.signals
-        for name, due in given.items():
-            READ[name](due, signals)
+        for name in due:
+            READ[name](given[name], signals)
         try:
             self.advance(signals)
         except RunError as error:

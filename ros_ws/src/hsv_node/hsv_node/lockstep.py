@@ -11,6 +11,7 @@ from hsv_msgs.msg import Ready, Run, VehicleState
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 
 from hsv.control.controllers import class_place
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
@@ -51,7 +52,7 @@ class LockstepNode(ProcessNode):
             task: What its diagnostics tell of, in a word or two.
         """
         super().__init__(role.name)
-        self.role, self._task = role, task
+        self._task = task
         place = f"one {role.name} a domain and namespace (ROS_DOMAIN_ID, -r __ns:=)"
         self.claim_name(f"{place}, and another name for every other node (-r __node:=)")
         for topic in role.own_topics:
@@ -60,6 +61,8 @@ class LockstepNode(ProcessNode):
             refuse_unknown(self, role.name, self.of_others)
         values = declare(self, LOCKSTEP_PARAMETERS)
         self.recorded, self.controller = bool(values["recorder"]), str(values["controller"])
+        self.estimator = bool(values[ESTIMATOR_ENABLED.name])
+        self.role = description.flown_role(role, self.estimator)
         if not description.controller_node(self.controller).foreign:
             class_place(self.controller)
         self._inputs: dict[str, Any] = {}
@@ -74,7 +77,7 @@ class LockstepNode(ProcessNode):
         self.linked: dict[str, str] = {}
         """Full names of the nodes at the other ends of the links, by role, as :meth:`missing_links` last saw them."""
         if role.known_by:
-            for topic, peer in description.links(role, self.controller, self.recorded):
+            for topic, peer in description.links(self.role, self.controller, self.recorded, self.estimator):
                 self._links.setdefault(topic, []).append(peer)
 
     def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:

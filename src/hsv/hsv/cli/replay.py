@@ -43,7 +43,7 @@ def replay(
     from hsv.recording.former import require_interface_version
     from hsv.recording.reader import Bag
     from hsv.replay import engine
-    from hsv.replay.attached import controller_of, flown_parameters, refuse_vacuous, supply
+    from hsv.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
     from hsv.replay.processes import processes_of
     from hsv.simulation.trust import require_trust
 
@@ -55,7 +55,7 @@ def replay(
     controller = controller_of(values)
     # Of all nodes: a section of one node in the bag's parameters brings no other, unseen.
     values = values.updated({"controller": controller})
-    processes = processes_of(controller)
+    processes = processes_of(controller, estimated(values))
     if node and node not in processes:
         raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}")
     if node and rerun:

@@ -3,8 +3,9 @@
 It predicts with the equations of motion of the design's vehicle under the command of the step before, and corrects with
 a gain that is the steady one about the trim where the flight starts. Beside the nine states it estimates an offset of
 each input, which takes up what the model does not know: a fault, another vehicle, wind. Of the measurement it uses the
-five rigid states; the elastic ones are predicted. Its estimate takes the measurement's place, also where the nominal
-model is scheduled by altitude and velocity.
+five rigid states; the elastic ones are predicted. Its estimate takes the measurement's place for the controller and the
+notch filter. The nominal model is scheduled by altitude and velocity as measured: to wait for the estimate would be a
+hop more in every step.
 
 The gain is found by iterating the Riccati equation in arithmetic that is the same on every processor.
 """
@@ -12,34 +13,28 @@ The gain is found by iterating the Riccati equation in arithmetic that is the sa
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
 
+from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS, NOISE_PARAMETERS, PROCESS_PARAMETERS
 from hsv.elimination import solve
 from hsv.errors import DesignError, ParameterError
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, jacobian
-from hsv.vehicle.integration import advance
+from hsv.parameters import check_all
+from hsv.sensors import SENSOR_PARAMETERS, sensor_data
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, jacobian
+from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import Trim
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 N_ESTIMATED = N_STATES + N_INPUTS
 """The states and an offset of each input."""
 
-ESTIMATOR_PARAMETERS = (
-    Parameter("estimator.enabled", False, "true: an estimate takes the place of the measurement"),
-    Parameter("estimator.noise", [], "standard deviation of each rigid state's measurement; empty: the sensors'"),
-    Parameter(
-        "estimator.process",
-        [7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 1e-2],
-        "noise that drives each state and each input's offset, SI per root of a second",
-        "",
-        1e-12,
-        1e6,
-    ),
-)
+_SENSED = ("sensors.set", *(f"sensors.{name}.noise" for name in STATE_NAMES[:N_RIGID]))
+"""Parameters that say how noisy the sensors are."""
 
 _SETTLED = 1e-12
 """Relative change of the gain in an iteration, at most, where it is steady."""
@@ -56,10 +51,15 @@ class EstimatorData(NamedTuple):
     substeps: int
 
 
+def no_estimator(vehicle: VehicleParameters, period: float) -> EstimatorData:
+    """Return what stands for none: it has no gain."""
+    return EstimatorData(np.zeros((0, N_RIGID)), np.zeros(N_STATES), vehicle, period, 2)
+
+
 def estimator_data(
     values: Mapping[str, object], noise: np.ndarray, vehicle: VehicleParameters, start: Trim, period: float
 ) -> EstimatorData:
-    """Return the estimator that :data:`ESTIMATOR_PARAMETERS` describe.
+    """Return the estimator that :data:`hsv.control.estimator_parameters.ESTIMATOR_PARAMETERS` describe.
 
     Args:
         values: Parameters.
@@ -73,16 +73,21 @@ def estimator_data(
         DesignError: No steady gain was found.
     """
     v = check_all(ESTIMATOR_PARAMETERS, values)
-    deviations = np.array(v["estimator.noise"] or noise[:N_RIGID], np.float64)
-    process = np.array(v["estimator.process"], np.float64)
-    for name, found, size in (("noise", deviations, N_RIGID), ("process", process, N_ESTIMATED)):
-        if found.shape != (size,) or not (found > 0.0).all():
-            raise ParameterError(f"parameter estimator.{name} = {found.tolist()}: expected {size} numbers above 0")
+    deviations = np.array([v[p.name] or sensed for p, sensed in zip(NOISE_PARAMETERS, noise[:N_RIGID], strict=True)])
+    for parameter, deviation in zip(NOISE_PARAMETERS, deviations, strict=True):
+        if not deviation > 0.0:
+            raise ParameterError(f"parameter {parameter.name} = 0: expected above 0, its sensor has no noise")
+    process = np.array([v[p.name] for p in PROCESS_PARAMETERS])
     A, B = jacobian(start.state, start.input, vehicle)
     gain, iterations = steady_gain(A, B, period, process * np.sqrt(period), deviations)
     if iterations >= _MOST_ITERATIONS or not np.isfinite(gain).all():
         raise DesignError(f"estimator: no steady gain after {iterations} iterations, expected other noise")
     return EstimatorData(gain, start.state.copy(), vehicle, period, 2)
+
+
+def scratch() -> np.ndarray:
+    """Return the array (4, 9) that :func:`estimate_step` wants: that of the integration and a row for the input."""
+    return np.empty((len(workspace()) + 1, N_STATES))
 
 
 @njit(cache=True, error_model="numpy")
@@ -196,7 +201,7 @@ def estimate_step(
         step: k.
         measurement: y.
         command: u of the step before (2); step 0 does not need it.
-        work: See :func:`hsv.vehicle.integration.workspace`, and one row more (4, 9).
+        work: Scratch, see :func:`scratch`.
         estimate: Written.
     """
     if step == 0:
@@ -218,3 +223,37 @@ def estimate_step(
             state[i] += data.gain[i, j] * (measurement[j] - estimate[j])
     for i in range(N_STATES):
         estimate[i] = state[i]
+
+
+class Estimator:
+    """The estimator of a flight, step by step."""
+
+    PARAMETERS = (
+        *ESTIMATOR_PARAMETERS,
+        *INITIAL_PARAMETERS,
+        *(p for p in SENSOR_PARAMETERS if p.name in _SENSED),
+        *VEHICLE_PARAMETERS,
+    )
+
+    def __init__(self, data: EstimatorData) -> None:
+        self.data = data
+        self._state = np.zeros(N_ESTIMATED)
+        self._work = scratch()
+        self.step(1, data.start, np.zeros(N_INPUTS))  # compile now: a cold cache must not stall a flight
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
+        """Build from :attr:`PARAMETERS` for a control ``period`` (s).
+
+        Raises:
+            ParameterError, DesignError, TrimError: As :func:`estimator_data`, or a wrong value, named.
+        """
+        nominal, start = initial_trim(values)
+        sensed = sensor_data({name: values[name] for name in _SENSED if name in values}, period)
+        return cls(estimator_data(values, sensed.noise, nominal, start, period))
+
+    def step(self, step: int, measurement: np.ndarray, command: np.ndarray) -> np.ndarray:
+        """Return the estimate (9) of the state in ``step``; see :func:`estimate_step`."""
+        estimate = np.empty(N_STATES)
+        estimate_step(self.data, self._state, step, measurement, command, self._work, estimate)
+        return estimate

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
+from hsv.control.estimator import Estimator
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.elementary import tangent
 from hsv.elimination import solve
 from hsv.errors import ParameterError
@@ -220,12 +222,14 @@ class NotchResult:
 
 
 class NotchFilter:
-    """Sections in series on the pitch rate; without sections the pitch rate passes."""
+    """Sections in series on the pitch rate, which passes where there are none; an estimator may stand before them."""
 
-    PARAMETERS = NOTCH_PARAMETERS
+    PARAMETERS = (*NOTCH_PARAMETERS, *Estimator.PARAMETERS)
 
-    def __init__(self, sections: Sequence[NotchSection], period: float) -> None:
+    def __init__(self, sections: Sequence[NotchSection], period: float, estimator: Estimator | None = None) -> None:
         self.sections = tuple(sections)
+        self.estimator = estimator
+        """What makes the state, whose pitch rate is filtered, of a measurement; None: it is the measurement"""
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
@@ -234,14 +238,17 @@ class NotchFilter:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from the parameters of :data:`NOTCH_PARAMETERS`.
+        """Build from the parameters of :data:`NOTCH_PARAMETERS` and, where there is one, those of the estimator.
 
         Raises:
             ParameterError: A wrong value, or arrays of different lengths.
+            DesignError, TrimError: As :meth:`hsv.control.estimator.Estimator.from_parameters`.
         """
-        v = check_all(NOTCH_PARAMETERS, values)
+        v = check_all((*NOTCH_PARAMETERS, ESTIMATOR_ENABLED), values)
         sections = flown_sections(values)
-        return cls(sections if v["notch.enabled"] else [], v["period"])
+        period = v["period"]
+        estimator = Estimator.from_parameters(values, period) if v[ESTIMATOR_ENABLED.name] else None
+        return cls(sections if v["notch.enabled"] else [], period, estimator)
 
     def reset(self) -> None:
         """Forget the past: the next step starts at rest for its own input."""

@@ -115,6 +115,9 @@ class NodeDescription:
     """Further topics that only this role publishes, not in every step."""
     block: Block | None = None
     """What it steps, if it does."""
+    delayed: tuple[str, ...] = ()
+    """Those of the topics that it subscribes, and the first of them, of which it takes the message of the step before.
+    """
     foreign: bool = False
     """Whether it is not one of this bench's: it knows the messages alone, and announces itself to nobody."""
 
@@ -154,11 +157,18 @@ def _carrying(wanted: Iterable[SignalType]) -> tuple[str, ...]:
 def _stepping(block: Block, package: str, first: str, **others: Any) -> NodeDescription:
     """Return the node that steps ``block``, known by the type of the topic ``first``."""
     publishes = tuple(topic for topic in CARRIED if _publisher(topic) is block)
-    subscribes = _carrying((*block.inputs, *block.delayed))
-    return NodeDescription(block.name, package, block.name, publishes, subscribes, TOPICS[first], block=block, **others)
+    needed = _carrying((*block.inputs, *block.delayed))
+    delayed = tuple(topic for topic in needed if not {*CARRIED[topic]} & {*block.inputs})
+    subscribes = (*delayed, *(topic for topic in needed if topic not in delayed))
+    return NodeDescription(
+        block.name, package, block.name, publishes, subscribes, TOPICS[first], block=block, delayed=delayed, **others
+    )
 
 
-NOTCH_FILTER = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
+ESTIMATOR = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
+"""The node of the notch filter where an estimator flies, which is told the commands."""
+
+NOTCH_FILTER = replace(ESTIMATOR, subscribes=_carrying(blocks.NOTCH_FILTER.inputs), delayed=())
 NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL)
 FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
 
@@ -206,9 +216,15 @@ def controller_node(controller: str) -> NodeDescription:
     return replace(CONTROLLER, package=package, executable=executable, foreign=True)
 
 
-def graph(controller: str = TUBE_MPC.name) -> tuple[NodeDescription, ...]:
-    """Return all nodes of the graph with the named controller, in start order."""
-    return (RECORDER, NOTCH_FILTER, NOMINAL_TRAJECTORY, controller_node(controller), FAULT_INJECTOR, PLANT)
+def flown_role(role: NodeDescription, estimator: bool) -> NodeDescription:
+    """Return what ``role`` is in a graph with or without an ``estimator``."""
+    return ESTIMATOR if estimator and role.name == ESTIMATOR.name else role
+
+
+def graph(controller: str = TUBE_MPC.name, estimator: bool = False) -> tuple[NodeDescription, ...]:
+    """Return all nodes of the graph with the named controller, with or without an ``estimator``, in start order."""
+    notch_filter = flown_role(NOTCH_FILTER, estimator)
+    return (RECORDER, notch_filter, NOMINAL_TRAJECTORY, controller_node(controller), FAULT_INJECTOR, PLANT)
 
 
 def step_topics(controller: str) -> tuple[str, ...]:
@@ -217,18 +233,20 @@ def step_topics(controller: str) -> tuple[str, ...]:
     return tuple(topic for topic in TOPICS if topic in published)
 
 
-def peers(me: NodeDescription, controller: str, recorded: bool) -> list[NodeDescription]:
+def peers(me: NodeDescription, controller: str, recorded: bool, estimator: bool = False) -> list[NodeDescription]:
     """Return the other nodes of the graph that ``me`` flies in, the recorder only if ``recorded``."""
-    nodes = graph(me.name if me.name in CONTROLLERS else controller)
+    nodes = graph(me.name if me.name in CONTROLLERS else controller, estimator)
     return [node for node in nodes if node.name != me.name and (recorded or node is not RECORDER)]
 
 
-def links(me: NodeDescription, controller: str, recorded: bool) -> list[tuple[str, NodeDescription]]:
+def links(
+    me: NodeDescription, controller: str, recorded: bool, estimator: bool = False
+) -> list[tuple[str, NodeDescription]]:
     """Return the (topic, other node) pairs that ``me`` must be matched with, the recorder's if ``recorded``."""
     return [
         (topic, other)
         for topic in TOPICS
-        for other in peers(me, controller, recorded)
+        for other in peers(me, controller, recorded, estimator)
         if topic in {*me.publishes} & {*other.subscribes} | {*me.subscribes} & {*other.publishes}
     ]
 

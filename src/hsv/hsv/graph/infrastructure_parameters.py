@@ -7,11 +7,13 @@ without the components of all other nodes: five nodes start at the same time.
 from __future__ import annotations
 
 from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.parameters import Parameter
 
 LOCKSTEP_PARAMETERS = (
     Parameter("recorder", True, "whether a recorder belongs to the graph"),
     *CONTROLLER_PARAMETERS,
+    ESTIMATOR_ENABLED,
 )
 """Parameters that every node declares."""
 

@@ -13,6 +13,7 @@ from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_ch
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.injector import FaultInjector
@@ -21,6 +22,7 @@ from hsv.graph.description import (
     COMMAND,
     FAULT_INJECTOR,
     NOMINAL,
+    NOTCH_FILTER,
     PLANT,
     STATE,
     TOPICS,
@@ -45,7 +47,7 @@ DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
 
 _OF_THE_RUN = {
     p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
-} - {p.name for p in CONTROLLER_PARAMETERS}
+} - {p.name for p in (*CONTROLLER_PARAMETERS, ESTIMATOR_ENABLED)}
 """Parameters that say how and where the flight was made, such as its pace and files, and nothing of the flight."""
 
 LEAST_ACTIVE_TIME = 10.0
@@ -127,6 +129,11 @@ def _attached(bag: Bag, name: str) -> ParameterSections:
 def controller_of(values: ParameterSections) -> str:
     """Return the controller that these parameters choose, as a scenario names it; nothing is loaded."""
     return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
+
+
+def estimated(values: ParameterSections) -> bool:
+    """Tell whether an estimator flies with these parameters."""
+    return bool(check_all((ESTIMATOR_ENABLED,), values.of(NOTCH_FILTER.name))[ESTIMATOR_ENABLED.name])
 
 
 def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:

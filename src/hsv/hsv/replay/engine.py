@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 from rosbags.serde import SerdeError
@@ -17,7 +18,7 @@ from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track, expecting_fields
-from hsv.replay.attached import broken_off, complete_steps
+from hsv.replay.attached import broken_off, complete_steps, estimated
 from hsv.replay.processes import Process, processes_of
 
 Progress = Callable[[str, int, int], None]
@@ -102,7 +103,11 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
     if process.restarts:
         step(())
         steps -= 1
-    messages = zip(*(track.cut(steps).decode() for track in recorded), strict=True)
+    delayed = [topic in process.delayed for topic in process.inputs]
+    columns = (
+        chain([(0, None)] * late, t.cut(steps - late).decode()) for t, late in zip(recorded, delayed, strict=True)
+    )
+    messages = zip(*columns, strict=True)
     with expecting_fields(bag.path):
         for number, inputs in enumerate(messages):
             if number % PROGRESS_INTERVAL == 0:
@@ -128,7 +133,7 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
     with expecting_fields(bag.path):
         commands = None if COMMAND in _published(controller) else bag.decode(COMMAND)
         tracks = fly(bag.types, controller, values, progress, str(bag.path), commands)
-    return [compare_process(bag, process, tracks) for process in processes_of(controller).values()]
+    return [compare_process(bag, process, tracks) for process in processes_of(controller, estimated(values)).values()]
 
 
 def fly(
@@ -152,7 +157,7 @@ def fly(
     Raises:
         RecordingError: ``types`` lack a field, or commands are missing.
     """
-    flown = processes_of(controller)
+    flown = processes_of(controller, estimated(values))
     components = {name: process.block.build(values.of(name)) for name, process in flown.items()}
     made = {
         name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
@@ -165,9 +170,11 @@ def fly(
     first = True
     while first or latest[STATE].status == 0:
         for name, process in flown.items():
-            if commands is not None and COMMAND in process.inputs:
+            delayed = process.delayed
+            if commands is not None and COMMAND in process.inputs and COMMAND not in delayed:
                 latest[COMMAND] = _next(commands, source)
-            inputs = () if process.restarts and first else tuple(latest[topic] for topic in process.inputs)
+            given = () if process.restarts and first else process.inputs
+            inputs = tuple(None if first and topic in delayed else latest[topic] for topic in given)
             outputs = made[name]
             process.step(components[name], inputs, outputs.messages, types.types.__getitem__)
             outputs.keep()

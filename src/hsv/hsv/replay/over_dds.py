@@ -11,6 +11,7 @@ from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, NodeDescript
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.reader import Bag
+from hsv.replay.attached import estimated
 from hsv.replay.engine import ProcessComparison, Progress, compare_process, require
 from hsv.replay.processes import processes_of
 
@@ -24,7 +25,7 @@ def replay_all(
         RecordingError: A topic that is needed is missing; no process has been started.
         RunError: A process failed; its last words are in the message.
     """
-    under_test = [processes_of(controller)[name] for name in names]
+    under_test = [processes_of(controller, estimated(values))[name] for name in names]
     for process in under_test:
         require(bag, (*process.inputs, *process.outputs))
     if not bag.messages(RUN):
@@ -57,9 +58,9 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
         repeated = Path(folder, "rerun")
         steps = len(bag.messages(STATE))
         run = {"recorder": True, "bag.directory": str(repeated)}
-        _run(graph(controller), values.updated(run), Path(folder), PLANT.name, steps, progress)
+        _run(graph(controller, estimated(values)), values.updated(run), Path(folder), PLANT.name, steps, progress)
         made = Bag(repeated)
-        for process in processes_of(controller).values():
+        for process in processes_of(controller, estimated(values)).values():
             yield compare_process(bag, process, {topic: made.track(topic) for topic in process.outputs})
 
 

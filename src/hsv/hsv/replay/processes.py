@@ -60,30 +60,41 @@ class Process:
         return (*self.node.subscribes, STATE) if self.restarts else self.node.subscribes
 
     @property
+    def delayed(self) -> tuple[str, ...]:
+        """Those of them that one step needs of the step before, of which the first needs none."""
+        return () if self.restarts else self.node.delayed
+
+    @property
     def outputs(self) -> tuple[str, ...]:
         """Topics that one step gives."""
         return self.node.publishes
 
     def step(
-        self, component: Any, inputs: Sequence[Message], outputs: Mapping[str, Message], message_class: MessageClass
+        self,
+        component: Any,
+        inputs: Sequence[Message | None],
+        outputs: Mapping[str, Message],
+        message_class: MessageClass,
     ) -> None:
         """Step ``component`` from its input messages, none for the first step of the owner of time, to its ``outputs``.
 
-        Those are by topic, and filled in place.
+        None stands for one of the step before the first. Outputs are by topic, and filled in place.
         """
         signals = Signals()
         if inputs:
             for topic, message in zip(self.inputs, inputs, strict=True):
-                READ[topic](message, signals)
+                if message is not None:
+                    READ[topic](message, signals)
         self.block.step(component, signals)
         for topic, message in outputs.items():
             FILL[topic](signals, message, message_class)
 
 
-def processes_of(controller: str) -> dict[str, Process]:
+def processes_of(controller: str, estimator: bool = False) -> dict[str, Process]:
     """Return the processes of a graph with ``controller``, by node, in the order in which a step passes through them.
 
     A controller that is a foreign node is none of them: nobody here can repeat what it did.
     """
-    found = [Process(node, node.block) for node in graph(controller) if node.block is not None and not node.foreign]
+    nodes = graph(controller, estimator)
+    found = [Process(node, node.block) for node in nodes if node.block is not None and not node.foreign]
     return {process.node.name: process for process in sorted(found, key=lambda found: LOOP.index(found.block))}

@@ -19,7 +19,7 @@ from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInpu
 from hsv.control.controllers import build_controller
 from hsv.errors import HsvError
 from hsv.signals import SignalType
-from hsv.vehicle.dynamics import PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, PITCH_RATE
 
 if TYPE_CHECKING:  # a node imports its own component alone
     from hsv.control.design import ControlDesign
@@ -80,8 +80,8 @@ class Signals:
     nominal_status: int
     """:class:`hsv.control.nominal_law.NominalStatus`"""
 
-    command: np.ndarray
-    """u (2)"""
+    command: np.ndarray = np.zeros(N_INPUTS)
+    """u (2); that of the step before until the controller has said it, of which step 0 has none"""
     saturated: np.ndarray
     """(2) whether the limits have changed it"""
     diagnostics: ControllerResult
@@ -157,8 +157,9 @@ def _fly(plant: Plant, signals: Signals) -> None:
 
 
 def _filter(notch: NotchFilter, signals: Signals) -> None:
-    result = notch.step(float(signals.measurement[PITCH_RATE]))
-    signals.estimate = signals.measurement
+    measured, estimator = signals.measurement, notch.estimator
+    signals.estimate = measured if estimator is None else estimator.step(signals.step, measured, signals.command)
+    result = notch.step(float(signals.estimate[PITCH_RATE]))
     signals.filtered_pitch_rate, signals.filter_state = result.filtered_pitch_rate, result.filter_state
 
 
@@ -198,6 +199,7 @@ NOTCH_FILTER = Block(
     inputs=(types.MEASUREMENT,),
     outputs=(types.ESTIMATE, types.FILTERED_PITCH_RATE, types.FILTER_STATE),
     step=_filter,
+    delayed=(types.COMMAND,),  # of the estimator, where one flies: the nodes hear it there alone
     state=(types.FILTER_STATE,),
 )
 NOMINAL_TRAJECTORY = Block(

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
+from hsv.control.estimator import estimate_step, no_estimator
 from hsv.control.nominal_law import NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
@@ -55,8 +56,8 @@ class History(NamedTuple):
 
     state: np.ndarray
     """x (n + 1, 9)"""
-    measurement: np.ndarray
-    """(n + 1, 9)"""
+    estimate: np.ndarray
+    """(n + 1, 9), what the controller was given for the state: the measurement, or what an estimator makes of it"""
     filtered_pitch_rate: np.ndarray
     """q_f (n + 1), rad/s"""
     deviation: np.ndarray
@@ -143,6 +144,7 @@ def _fly(
     plant: Any,
     plant_memory: Any,
     plant_faults: Any,
+    estimator: Any,
     notch: Any,
     nominal: Any,
     nominal_call: Any,
@@ -171,10 +173,11 @@ def _fly(
     vehicle, period, substeps = plant.vehicle, plant.period, plant.substeps
     lowest, highest = plant.actuators.minimum, plant.actuators.maximum
     effector, work = plant_memory.effector, plant_memory.work
-    rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
     S, new = np.empty(n * (n + m)), np.empty(n)
     planned = len(nominal.gains) > 0
+    estimating = len(estimator.gain) > 0
+    estimated, estimator_work = np.zeros(n + m), np.empty((4, n))
     for i in range(n):
         x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
     u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
@@ -194,8 +197,15 @@ def _fly(
                 sense(x, plant, plant_memory, plant_faults, k, measurement)
         for i in range(n):
             history.state[k, i] = x[i]
-            history.measurement[k, i] = measurement[i]
-            estimate[i] = measurement[i]
+        if estimating:
+            estimate_step(estimator, estimated, k, measurement, u, estimator_work, estimate)
+        else:
+            for i in range(n):
+                estimate[i] = measurement[i]
+        for i in range(n):
+            history.estimate[k, i] = estimate[i]
+        if k == 0:
+            rest(notch, estimate[PITCH_RATE], filter_state)
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
@@ -206,7 +216,7 @@ def _fly(
                 u_r[i] = reference.input[row, i]
         for i in range(len(s)):
             s[i] = filter_state[i]
-        q_f[0] = filter_step(notch, filter_state, measurement[PITCH_RATE])
+        q_f[0] = filter_step(notch, filter_state, estimate[PITCH_RATE])
         history.filtered_pitch_rate[k] = q_f[0]
         for i in range(n):
             history.deviation[k, i] = x_n[i]
@@ -354,10 +364,10 @@ def fly_into(history: History, components: Components) -> int:
         ControllerError, ParameterError: As :func:`fly`.
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
-    injector = components.fault_injector
+    notch, injector = components.notch_filter, components.fault_injector
     commanded = injector.rows((COMMAND,))
     tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
-    given, cuts, arrays = _loop_arrays(2 * len(components.notch_filter.data.D), memory_of(tube))
+    given, cuts, arrays = _loop_arrays(2 * len(notch.data.D), memory_of(tube))
     nominal_call = controller_call = NO_CALL
     callbacks = []
     if not nominal.law.compiled_with_loop:
@@ -380,7 +390,8 @@ def fly_into(history: History, components: Components) -> int:
             plant.data,
             plant.memory(),
             None if plant.is_ideal(injector.known) else PlantFaults.of(injector.known, plant.period),
-            components.notch_filter.data,
+            notch.estimator.data if notch.estimator else no_estimator(plant.vehicle, plant.period),
+            notch.data,
             nominal.data,
             nominal_call,
             tube,

@@ -80,7 +80,7 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
         for k in range(steps):
             if k == steps // 2:
                 steppers["its copy"] = _copy(parts.controller)
-            filtered = parts.notch_filter.step(flight.history.measurement[k, PITCH_RATE])
+            filtered = parts.notch_filter.step(flight.history.estimate[k, PITCH_RATE])
             for name, stepper in steppers.items():
                 inputs = _inputs(k, flight, filtered.filtered_pitch_rate, filtered.filter_state)
                 answered, expected = stepper.step(inputs).u_unsaturated, flight.history.u_unsaturated[k]
@@ -102,7 +102,7 @@ def _copy(controller: Controller) -> Controller:
 
 def _inputs(k: int, flight: Flight, filtered_pitch_rate: float, filter_state: np.ndarray) -> ControllerInput:
     history = flight.history
-    rows = history.measurement, flight.reference, flight.reference_input, history.deviation, history.nominal_input
+    rows = history.estimate, flight.reference, flight.reference_input, history.deviation, history.nominal_input
     # Copies: a controller may keep or change what it was given.
     x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
     return ControllerInput(k, x, filtered_pitch_rate, x_r, u_r, x_n, u_n, filter_state.copy())

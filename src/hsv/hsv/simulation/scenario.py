@@ -16,6 +16,7 @@ from pydantic import Field, StrictInt, ValidationError
 
 from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
+from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
 from hsv.errors import HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
@@ -71,7 +72,7 @@ class Scenario(Table):
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
     """Key of all that is random"""
     equipment: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of what is not ideal, SI; in a file, tables of actuators, air and sensors"""
+    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors and estimator"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
     limits: dict[str, float] = Field(default_factory=dict)
@@ -126,8 +127,10 @@ class Scenario(Table):
 _PERIOD = 0.02
 """Of control, s, until a design says it: whether equipment fits together does not depend on it."""
 
-EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in EQUIPMENT_PARAMETERS)
-"""Tables of what is ideal unless they say otherwise."""
+_EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *ESTIMATOR_PARAMETERS)
+
+EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
+"""Tables of what is ideal unless they say otherwise, and of the estimator for sensors that are not."""
 
 _NO_KEYS = ("name", "own", "equipment")
 """Fields that a file has not, or has otherwise."""
@@ -333,7 +336,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
             **table,
             "name": name,
             "own": own,
-            "equipment": table_values(EQUIPMENT_PARAMETERS, equipment, partial(_number, found)),
+            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, partial(_number, found)),
             "fault": _fault_rows(table.get("fault", ()), found),
             "limits": _limits(table.get("limits", {})),
             "vehicle": vehicle,

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
-from hsv.errors import ParameterError, QuantityError
 from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
@@ -29,10 +28,11 @@ from hsv.vehicle.atmosphere import (
 )
 from hsv.vehicle.dynamics import air_relative, forces, forces_in
 from hsv.vehicle.envelope import in_model_range
+from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
 from hsv.vehicle.integration import workspace
-from hsv.vehicle.parameters import COEFFICIENT_UNITS, MODELS, VehicleParameters
-from hsv.vehicle.trim import Trim, trim
-from hsv.vehicle.vehicle import COUPLING_PARAMETER, VEHICLE_PARAMETERS, Vehicle
+from hsv.vehicle.parameters import COEFFICIENT_UNITS, VehicleParameters
+from hsv.vehicle.trim import Trim
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 
 class FlightStatus(IntEnum):
@@ -47,10 +47,7 @@ PLANT_PARAMETERS = (
     Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
     Parameter("substeps", 2, "Runge-Kutta steps per control period", "", 1, 100),
     Parameter("duration", 200.0, "simulated time to fly", "s", 0.0, 1e5),
-    Parameter("vehicle.model", "CM", "coupled model (paper eq. 1) or decoupled model (eq. 4)", choices=MODELS),
-    COUPLING_PARAMETER,
-    Parameter("initial.altitude", 26060.4, "altitude of the initial trim, in the vehicle's range", "m"),
-    Parameter("initial.velocity", 2407.92, "velocity of the initial trim, in the vehicle's range", "m/s"),
+    *INITIAL_PARAMETERS,
     *(
         Parameter(f"vehicle.perturbation.{name}", 0.0, f"relative change of {name.replace('_', ' ')}", "", -0.9, 10.0)
         for name in COEFFICIENT_UNITS
@@ -260,16 +257,8 @@ class Plant:
             ParameterError, TrimError: A wrong value, named.
         """
         v = check_all(PLANT_PARAMETERS, values)
-        flown = Vehicle.from_parameters(values)
-        flown.check_envelope(PLANT_PARAMETERS, v)
-        try:
-            nominal = flown.coupled(v["vehicle.coupling"])
-        except QuantityError as error:
-            raise ParameterError(f"parameter vehicle.{error}") from error
-        if v["vehicle.model"] == "DM":
-            nominal = nominal.decoupled()
+        nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
-        initial = trim(nominal, v["initial.altitude"], v["initial.velocity"])
         equipment = {p.name: values[p.name] for p in (*EQUIPMENT_PARAMETERS, SEED_PARAMETER) if p.name in values}
         return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"], equipment)
 
