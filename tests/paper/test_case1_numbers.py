@@ -46,6 +46,8 @@ def within_limits(name, metrics):
         "case1_tube_dm_family",
         "case1_integral_heavy",
         "case1_integral_light",
+        "case1_realistic",
+        "case1_hard_sensors",
     ],
 )
 def test_limits_of_the_scenario_are_kept(flown, name):
