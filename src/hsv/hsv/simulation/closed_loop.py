@@ -173,6 +173,7 @@ def _fly(
     vehicle, period, substeps = plant.vehicle, plant.period, plant.substeps
     lowest, highest = plant.actuators.minimum, plant.actuators.maximum
     effector, work = plant_memory.effector, plant_memory.work
+    rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
     S, new = np.empty(n * (n + m)), np.empty(n)
     planned = len(nominal.gains) > 0
@@ -197,15 +198,14 @@ def _fly(
                 sense(x, plant, plant_memory, plant_faults, k, measurement)
         for i in range(n):
             history.state[k, i] = x[i]
+            history.estimate[k, i] = measurement[i]
+            estimate[i] = measurement[i]
         if estimating:
             estimate_step(estimator, estimated, k, measurement, u, estimator_work, estimate)
-        else:
             for i in range(n):
-                estimate[i] = measurement[i]
-        for i in range(n):
-            history.estimate[k, i] = estimate[i]
-        if k == 0:
-            rest(notch, estimate[PITCH_RATE], filter_state)
+                history.estimate[k, i] = estimate[i]
+            if k == 0:
+                rest(notch, estimate[PITCH_RATE], filter_state)
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
