@@ -10,10 +10,11 @@ from hsv.simulation.scenario import load_scenario
 
 def warm() -> None:
     """Step every component and fly every compiled loop once."""
-    components = assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1})
-    fly(components)
-    for _ in steps(components):
-        pass
+    for name in ("case1", "case1_realistic", "case1_hard_sensors"):
+        components = assemble(flight_parameters(load_scenario(name)) | {"duration": 0.1})
+        fly(components)
+        for _ in steps(components):
+            pass
 
 
 if __name__ == "__main__":

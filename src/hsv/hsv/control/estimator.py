@@ -51,11 +51,6 @@ class EstimatorData(NamedTuple):
     substeps: int
 
 
-def no_estimator(vehicle: VehicleParameters, period: float) -> EstimatorData:
-    """Return what stands for none: it has no gain."""
-    return EstimatorData(np.zeros((0, N_RIGID)), np.zeros(N_STATES), vehicle, period, 2)
-
-
 def estimator_data(
     values: Mapping[str, object], noise: np.ndarray, vehicle: VehicleParameters, start: Trim, period: float
 ) -> EstimatorData:

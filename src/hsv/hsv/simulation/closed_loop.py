@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
-from hsv.control.estimator import estimate_step, no_estimator
+from hsv.control.estimator import estimate_step
 from hsv.control.nominal_law import NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
@@ -159,7 +159,8 @@ def _fly(
     """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
 
     Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without ``plant_faults``
-    the plant is ideal: another function is compiled, which does what :func:`advance_plant` would in a tenth less time.
+    the plant is ideal, without ``estimator`` there is none; other functions are compiled for these, as what is not used
+    would take a tenth of the time.
     """
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory = arrays
     n, m = len(x), len(u_n)
@@ -177,7 +178,6 @@ def _fly(
     last = len(reference.state) - 1
     S, new = np.empty(n * (n + m)), np.empty(n)
     planned = len(nominal.gains) > 0
-    estimating = len(estimator.gain) > 0
     estimated, estimator_work = np.zeros(n + m), np.empty((4, n))
     for i in range(n):
         x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
@@ -200,7 +200,7 @@ def _fly(
             history.state[k, i] = x[i]
             history.estimate[k, i] = measurement[i]
             estimate[i] = measurement[i]
-        if estimating:
+        if estimator is not None:
             estimate_step(estimator, estimated, k, measurement, u, estimator_work, estimate)
             for i in range(n):
                 history.estimate[k, i] = estimate[i]
@@ -381,6 +381,8 @@ def fly_into(history: History, components: Components) -> int:
             address, state, parameters = controller.kernel
             memory = state.copy()
             controller_call = call_of(address, given, arrays.wanted, memory, parameters)
+    # Of an estimator, whose sensors are hardly ideal, one function is enough.
+    ideal = plant.is_ideal(injector.known) and notch.estimator is None
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
             nominal.law.reset()
@@ -389,8 +391,8 @@ def fly_into(history: History, components: Components) -> int:
             plant.initial.state.copy(),
             plant.data,
             plant.memory(),
-            None if plant.is_ideal(injector.known) else PlantFaults.of(injector.known, plant.period),
-            notch.estimator.data if notch.estimator else no_estimator(plant.vehicle, plant.period),
+            None if ideal else PlantFaults.of(injector.known, plant.period),
+            notch.estimator.data if notch.estimator else None,
             notch.data,
             nominal.data,
             nominal_call,
