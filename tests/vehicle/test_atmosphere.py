@@ -146,7 +146,10 @@ def test_speed_of_sound_is_that_of_the_standard_atmosphere():
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"gust.starts": [1.0, 2.0], "gust.lengths": [10.0]}, "gust.lengths: 1 values, expected as many as gust.starts, 2"),
+        (
+            {"gust.starts": [1.0, 2.0], "gust.lengths": [10.0]},
+            "gust.lengths: 1 values, expected as many as gust.starts, 2",
+        ),
         ({"gust.starts": [1.0]}, "gust.lengths: 0 values, expected as many as gust.starts, 1"),
         ({"turbulence.sigma_up": -1.0}, "turbulence.sigma_up = -1.0: expected double from 0 to 50 m/s"),
         ({"density.offset": 3}, "density.offset = 3: expected double"),
