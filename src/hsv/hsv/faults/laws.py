@@ -126,7 +126,7 @@ def fault_memory(rows: FaultRows, earlier: FaultRows | None = None, memory: np.n
 
 def _identity(rows: FaultRows, i: int) -> tuple[Any, ...]:
     """Return what tells a fault from others: all but its stop, which a clearance in flight moves."""
-    return tuple(np.delete(rows.table[i], STOP).tolist())
+    return tuple(value for column, value in enumerate(rows.table[i].tolist()) if column != STOP)
 
 
 @njit(cache=True, error_model="numpy")
