@@ -59,6 +59,8 @@ class ExportedBlock:
 class ExportedNotchFilter(ExportedBlock):
     """As :class:`hsv.control.notch_filter.NotchFilter`."""
 
+    estimator = None
+
     def __init__(self, library: Path) -> None:
         super().__init__(library, "notch_filter")
 

@@ -16,7 +16,9 @@ def contracting():
     """Two vertices whose absolute values contract: here every way has a solution."""
     A = np.array([[[0.5, 0.2], [-0.1, 0.6]], [[0.4, 0.25], [-0.1, 0.55]]])
     G = np.broadcast_to(np.eye(2), (2, 2, 2))
-    system = ErrorSystem(A, G, np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros((2, 2)), ("a", "b"))
+    system = ErrorSystem(
+        A, np.zeros((len(A), 2, 2)), G, np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros((2, 2)), ("a", "b")
+    )
     return TubeProblem(system, DisturbanceSet(np.array([-1.0, -0.5]), np.array([1.0, 0.5])))
 
 
@@ -57,7 +59,9 @@ def test_where_a_set_exists_no_sequence_leaves_it(contracting, method):
 
 
 def test_a_box_is_exact_for_a_scalar():
-    system = ErrorSystem(np.array([[[0.5]]]), np.ones((1, 1, 1)), np.ones((1, 1)), np.zeros((1, 1)), ("a",))
+    system = ErrorSystem(
+        np.array([[[0.5]]]), np.zeros((1, 1, 1)), np.ones((1, 1, 1)), np.ones((1, 1)), np.zeros((1, 1)), ("a",)
+    )
     problem = TubeProblem(system, DisturbanceSet(np.array([-1.0]), np.array([1.0])))
     for method in (box, modal_box, zonotope):
         assert method(problem).half_width[0] == pytest.approx(2.0, rel=1e-5)

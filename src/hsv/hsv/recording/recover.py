@@ -30,7 +30,7 @@ from hsv.recording.metadata import (
 )
 from hsv.recording.reader import Bag
 from hsv.recording.scan import MESSAGE_HEADER, Scan, content
-from hsv.recording.topic import readable_profiles
+from hsv.recording.topic import mended_profiles
 from hsv.recording.writer import CHUNK_BYTES, mcap_path
 
 _PROFILES = "offered_qos_profiles"
@@ -228,8 +228,8 @@ class _Copy:
             self._schemas[key] = self._writer.register_schema(*key)
         name = channel.topic
         if name not in self._channels:
-            if not readable_profiles(channel.metadata.get(_PROFILES, "")):
-                channel = replace(channel, metadata={**channel.metadata, _PROFILES: ""})
+            profiles = mended_profiles(channel.metadata.get(_PROFILES, ""))
+            channel = replace(channel, metadata={**channel.metadata, _PROFILES: profiles})
             self._topics[name] = channel, schema
             self._tallies[name] = Tally()
             self._channels[name] = self._writer.register_channel(

@@ -61,12 +61,38 @@ class Qos:
 
 
 def readable_profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in the metadata of a channel; none where a damage has left no such text."""
+    """Return the profiles in the metadata of a channel, the default for what a damage has left of no sense."""
     try:
         profiles = yaml.safe_load(text)
     except yaml.YAMLError:
         return []
-    return profiles if isinstance(profiles, list) and all(isinstance(p, dict) for p in profiles) else []
+    if not isinstance(profiles, list) or not all(isinstance(profile, dict) for profile in profiles):
+        return []
+    usual = Qos().as_dict()
+    return [{key: _sound(key, profile.get(key), default) for key, default in usual.items()} for profile in profiles]
+
+
+def mended_profiles(text: str) -> str:
+    """Return the ``text`` of profiles, written anew where it is damaged; empty where nothing of it is left."""
+    profiles = readable_profiles(text)
+    if not profiles:
+        return ""
+    return text if profiles == yaml.safe_load(text) else yaml.safe_dump(profiles, sort_keys=False)
+
+
+_WORDS = {
+    "history": {"keep_last", "keep_all", "system_default", "unknown"},
+    "reliability": {"reliable", "best_effort", "system_default", "best_available", "unknown"},
+    "durability": {"volatile", "transient_local", "system_default", "best_available", "unknown"},
+    "liveliness": {"automatic", "manual_by_topic", "system_default", "best_available", "unknown"},
+}
+
+
+def _sound(key: str, value: Any, default: Any) -> Any:
+    if isinstance(default, dict):
+        times = value if isinstance(value, dict) else {}
+        return value if all(isinstance(times.get(part), int) for part in default) else default
+    return value if isinstance(value, type(default)) and value in _WORDS.get(key, (value,)) else default
 
 
 @dataclass(frozen=True, slots=True)
