@@ -15,6 +15,7 @@ from typing import Self
 
 from hsv.errors import ParameterError, did_you_mean
 from hsv.parameters import Parameter, read_number
+from hsv.units import parse_quantity
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -29,10 +30,13 @@ class Channel:
     travel: float
 
 
+_STOP = parse_quantity("30 deg", "rad", "stop")
+"""Of the elevator, rad, every bit as a file that says 30 deg has it"""
+
 CHANNELS = {
     **{
         name: Channel("" if unit == "1" else unit, travel)
-        for name, unit, travel in zip(INPUT_NAMES, INPUT_UNITS, (1.5, math.radians(30.0)), strict=True)
+        for name, unit, travel in zip(INPUT_NAMES, INPUT_UNITS, (1.5, _STOP), strict=True)
     },
     ENGINE: Channel("", 1.0),
     **{
