@@ -134,6 +134,10 @@ _WIDTH = _P("width", "whole width", "{}", 0.0, 1.0)
 _AMPLITUDE = _P("amplitude", "amplitude", "{}", 0.0, 1.0)
 _FREQUENCY = _P("frequency", "frequency", "Hz", 1e-3, 100.0)
 _PHASE = _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0)
+_GROWING_OFFSET = (
+    _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
+    _P("limit", "largest offset", "{}", 0.0, 1.0),
+)
 _UNSTART = (
     _P("thrust_factor", "thrust that remains", "", 0.0, 1.0, 0.0),
     _P("lift_factor", "lift for that of the started inlet", "", 0.0, 2.0, 0.8),
@@ -222,10 +226,7 @@ FAULT_KINDS = {
         EFFECTOR,
         INPUT_NAMES,
         "the effector is off by more and more",
-        (
-            _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
-            _P("limit", "largest offset", "{}", 0.0, 1.0),
-        ),
+        _GROWING_OFFSET,
     ),
     "oscillation": FaultKind(
         OSCILLATION,
@@ -301,10 +302,7 @@ FAULT_KINDS = {
         SENSOR,
         STATE_NAMES,
         "the sensor is off by more and more",
-        (
-            _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
-            _P("limit", "largest offset", "{}", 0.0, 1.0),
-        ),
+        _GROWING_OFFSET,
     ),
     "sensor_drop_out": FaultKind(
         SENSOR_DROP_OUT,

@@ -135,46 +135,18 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
         step: k.
     """
     actuators, effector, atmosphere, _, conditions, work = memory
-    p, air = data.vehicle, data.atmosphere
+    air, period, substeps, seed = data.atmosphere, data.period, data.substeps, data.seed
+    driven = (data.actuators, actuators, faults.effector, faults.effector_memory, step, seed, effector, work)
     if air.still and len(faults.engine.table) == 0:
-        advance_equipped(
-            x,
-            actuator,
-            p,
-            data.period,
-            data.substeps,
-            data.actuators,
-            actuators,
-            faults.effector,
-            faults.effector_memory,
-            step,
-            data.seed,
-            effector,
-            work,
-        )
+        advance_equipped(x, actuator, data.vehicle, period, substeps, *driven)
         return
     if not air.still:
-        atmosphere_step(air, atmosphere, step, data.seed, x[0], x[1], conditions[:3])
+        atmosphere_step(air, atmosphere, step, seed, x[0], x[1], conditions[:3])
     speed, turn, _, _ = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
     mach = speed / speed_of_sound(x[0])
     engine, engine_memory = faults.engine, faults.engine_memory
-    apply_engine_faults(engine, engine_memory, step, data.seed, x[2] - turn, mach, actuator[0], conditions[3:])
-    advance_equipped(
-        x,
-        actuator,
-        p,
-        data.period,
-        data.substeps,
-        data.actuators,
-        actuators,
-        faults.effector,
-        faults.effector_memory,
-        step,
-        data.seed,
-        effector,
-        work,
-        conditions,
-    )
+    apply_engine_faults(engine, engine_memory, step, seed, x[2] - turn, mach, actuator[0], conditions[3:])
+    advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, conditions)
 
 
 @njit(cache=True, error_model="numpy")
