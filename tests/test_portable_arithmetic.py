@@ -69,6 +69,7 @@ ON_THE_PATH = (
     "simulation/foreign.py",
     "simulation/scenario.py",
     "simulation/tables.py",
+    "simulation/values.py",
 )
 """Files that decide a flight, from the scenario's text to the last step."""
 

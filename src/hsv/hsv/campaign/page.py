@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
@@ -19,6 +18,7 @@ from hsv.errors import CampaignError, ControllerError, reason
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import compressed
+from hsv.recording.report.templates import environment_of
 from hsv.simulation.closed_loop import Flight
 from hsv.vehicle.plant import Plant
 
@@ -45,14 +45,7 @@ def write_page(results: Results, out: Path) -> None:
 
 def render(results: Results) -> str:
     """Return the page."""
-    environment = Environment(
-        loader=PackageLoader("hsv.campaign", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": text.number, "words": text.words}
+    environment = environment_of("hsv.campaign")
     worst = worst_flights(results)
     shown = distributions(results)
     return environment.get_template("page.html.j2").render(

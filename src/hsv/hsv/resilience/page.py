@@ -6,12 +6,12 @@ from importlib.resources import files
 from pathlib import Path
 
 import tomli_w
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.campaign.store import write_whole
 from hsv.errors import CampaignError, reason
 from hsv.recording.report import text
+from hsv.recording.report.templates import environment_of
 from hsv.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
 from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundary
@@ -63,14 +63,7 @@ def vehicle_words(vehicle: int) -> str:
 def render(results: ResilienceResults, name: str) -> str:
     """Return the page (``index.html``) or the Markdown (``result.md``)."""
     html = name.endswith(".html")
-    environment = Environment(
-        loader=PackageLoader("hsv.resilience", "template"),
-        autoescape=html,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": text.number, "words": text.words}
+    environment = environment_of("hsv.resilience", escaped=html)
     style = files("hsv.recording.report").joinpath("template", "style.css").read_text(encoding="utf-8")
     return environment.get_template(f"{name}.j2").render(
         campaign=results.campaign,

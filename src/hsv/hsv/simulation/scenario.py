@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from importlib.resources import files
@@ -20,12 +20,12 @@ from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
 from hsv.errors import HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
-from hsv.faults.table import Fault, fault_parameters
+from hsv.faults.table import Fault
 from hsv.inheritance import follow_extends, is_path
 from hsv.noise import SEED_PARAMETER
-from hsv.parameters import Parameter, limits_in_words, read_number, table_values
+from hsv.parameters import table_values
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope
-from hsv.simulation.distribution import KINDS, Distribution, read_distribution
+from hsv.simulation.distribution import KINDS, Distribution
 from hsv.simulation.fields import Reading, Table, Time
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.tables import (
@@ -39,7 +39,8 @@ from hsv.simulation.tables import (
     TubeTable,
     VehicleTable,
 )
-from hsv.units import parse_quantity, si_unit_of, written
+from hsv.simulation.values import fault_tables, number, own_value, tables_in
+from hsv.units import parse_quantity
 from hsv.vehicle.plant import EQUIPMENT_PARAMETERS, check_equipment
 from hsv.vehicle.vehicle import (
     DEFAULT_VEHICLE,
@@ -331,13 +332,13 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
         found = reading.drawn
-        own = {key: {k: _own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
+        own = {key: {k: own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
         given = {
             **table,
             "name": name,
             "own": own,
-            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, partial(_number, found)),
-            "fault": _fault_rows(table.get("fault", ()), found),
+            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, partial(number, found)),
+            "fault": fault_tables(table.get("fault", ()), found),
             "limits": _limits(table.get("limits", {})),
             "vehicle": vehicle,
         }
@@ -347,81 +348,7 @@ def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[
         raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
     except HsvError as error:
         raise ScenarioError(f"scenario {name!r}: {error}") from error
-    return scenario, {field: found[id(place)] for field, place in _tables_in(whole) if id(place) in found}
-
-
-def _tables_in(value: object, field: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield every table in ``value``, with its place as a field is called."""
-    if isinstance(value, dict):
-        yield field, value
-        for key, entry in value.items():
-            yield from _tables_in(entry, f"{field}.{key}" if field else key)
-    elif isinstance(value, list):
-        for index, entry in enumerate(value):
-            yield from _tables_in(entry, f"{field}[{index}]")
-
-
-def _number(found: dict[int, Distribution], parameter: Parameter, value: object, field: str) -> float:
-    """Return a number in a file, or the mean of a distribution in its place, which goes to ``found``.
-
-    Raises:
-        ScenarioError, ParameterError, QuantityError: None that the ``parameter`` admits.
-    """
-    if not isinstance(value, dict):
-        return read_number(parameter, value, field)
-    drawn = found[id(value)] = read_distribution(value, parameter.unit or "1", field)
-    if not parameter.minimum <= drawn.low < drawn.high <= parameter.maximum:
-        limits = limits_in_words(parameter, next(iter(value.values()))[0])
-        raise ScenarioError(f"{field} = {value!r}: expected all values{limits}")
-    return drawn.middle
-
-
-def _own_value(field: str, value: object, found: dict[int, Distribution]) -> Any:
-    """Return an entry of a controller's own table with means in the place of distributions, which go to ``found``.
-
-    Which unit is due only the controller's class knows: it is taken from their first value.
-    """
-    if isinstance(value, list):
-        return [_own_value(field, entry, found) for entry in value]
-    if not isinstance(value, dict):
-        return value
-    pair = next(iter(value.values()), None)
-    first = pair[0] if isinstance(pair, list) and pair else None
-    drawn = found[id(value)] = read_distribution(value, si_unit_of(first), field)
-    return written(drawn.middle, drawn.unit)
-
-
-def _fault_rows(rows: object, found: dict[int, Distribution]) -> object:
-    """Return the faults in a file as :class:`FaultTable` has them; distributions in them go to ``found``.
-
-    Raises:
-        ScenarioError, QuantityError: Names the field that is wrong.
-    """
-    if not isinstance(rows, list | tuple):
-        return rows
-    return [_fault_row(f"fault[{i}]", row, found) if isinstance(row, dict) else row for i, row in enumerate(rows)]
-
-
-def _fault_row(field: str, row: dict[str, Any], found: dict[int, Distribution]) -> dict[str, Any]:
-    common = {key: row[key] for key in FaultTable.model_fields if key in row and key != "parameters"}
-    channel, kind = (row.get(key) for key in ("channel", "type"))
-    if not (isinstance(channel, str) and isinstance(kind, str)):
-        return common  # which is refused
-    try:
-        table = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
-    except ParameterError as error:
-        raise ScenarioError(str(error).replace("fault.", f"{field}.", 1)) from error
-    parameters = {}
-    for key, value in row.items():
-        if key in common:
-            continue
-        if key not in table:
-            expected = (*table, *(name for name in FaultTable.model_fields if name != "parameters"))
-            raise ScenarioError(
-                f"{field}.{key}: unknown key, expected one of {', '.join(expected)}{did_you_mean(key, expected)}"
-            )
-        parameters[key] = _number(found, table[key], value, f"{field}.{key}")
-    return {**common, "parameters": parameters}
+    return scenario, {field: found[id(place)] for field, place in tables_in(whole) if id(place) in found}
 
 
 def _shipped() -> Any:

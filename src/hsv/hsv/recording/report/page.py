@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.errors import RecordingError
@@ -16,6 +15,7 @@ from hsv.recording.report.comparison import comparisons
 from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
+from hsv.recording.report.templates import environment_of
 from hsv.recording.report.values import Quantity, Section, Table
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import scenario_names
@@ -49,14 +49,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, paper_units: bool = False) -
 
 def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
     """Return the page."""
-    environment = Environment(
-        loader=PackageLoader("hsv.recording.report", "template"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {"number": text.number, "words": text.words}
+    environment = environment_of("hsv.recording.report")
     environment.tests |= {
         "quantity": lambda value: isinstance(value, Quantity),
         "table": lambda value: isinstance(value, Table),
