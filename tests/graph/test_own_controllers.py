@@ -153,10 +153,12 @@ def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, w
 
 
 def test_two_controllers_end_the_run(processes: Processes) -> None:
-    path = scenario(processes.folder, "node", 'controller = "node:"')
+    # Paced, so that the second joins before the flight is over, however long its start takes.
+    path = scenario(processes.folder, "node", 'controller = "node:"', duration=200.0)
     for name in ("one", "two"):
         processes.start("ros2", "run", "hsv_example_node", "regulator", "--ros-args", "-r", f"__node:={name}")
-    done = processes.run("hsv", "run", path, "--composed", "--no-report", "--bag", processes.folder / "bag")
+    paced = ("--real-time-factor", "2", "--step-timeout", "30")
+    done = processes.run("hsv", "run", path, "--composed", "--no-report", *paced, "--bag", processes.folder / "bag")
     # The second may join in flight, and its answer come before DDS tells whose it is.
     assert done.returncode == 1, done.stdout
     [said] = [line for line in done.stdout.splitlines() if "publish /hsv/command: expected one controller" in line]
