@@ -59,7 +59,7 @@ class NominalLaw(Protocol):
         """Return the nominal input for x_n (9), ``deviation``."""
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     """Return x' P x over the first states, as many as P (s, s) has rows."""
     total = 0.0

@@ -134,7 +134,7 @@ class Polytope:
         return S[:, :n], S[:, n:]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _clamp(value: float, low: float, high: float) -> float:
     # Written so that a NaN (a diverged flight) becomes ``low`` and never an index.
     if not value > low:
@@ -142,7 +142,7 @@ def _clamp(value: float, low: float, high: float) -> float:
     return high if value > high else value
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _piece(breakpoints: np.ndarray, value: float) -> int:
     i = 0
     while i < len(breakpoints) - 2 and value >= breakpoints[i + 1]:
@@ -150,7 +150,7 @@ def _piece(breakpoints: np.ndarray, value: float) -> int:
     return i
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _weight(axis: Any, piece: int, local: float, vertex: int) -> float:
     c = axis.coefficients
     return ((c[0, piece, vertex] * local + c[1, piece, vertex]) * local + c[2, piece, vertex]) * local + c[
@@ -158,7 +158,7 @@ def _weight(axis: Any, piece: int, local: float, vertex: int) -> float:
     ]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def schedule(polytope: Any, altitude: float, velocity: float, S: np.ndarray) -> bool:
     """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope."""
     h_axis, v_axis = polytope.altitude, polytope.velocity

@@ -23,7 +23,7 @@ from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import memory_of, no_tube, tube_step
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
-from hsv.faults.laws import apply_command_faults, fault_memory
+from hsv.faults.laws import START, apply_command_faults, fault_memory
 from hsv.faults.table import COMMAND
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
@@ -185,6 +185,8 @@ def _fly(
     # Copied when another row holds: views of rows in every step take a twentieth of the loop's time.
     defect, row = np.empty(n), -1
     rows = len(history.filtered_pitch_rate)
+    # Before, the command arrives as it is: what a call would take is a twentieth of the loop's time.
+    first_fault = faults.table[:, START].min() if len(faults.table) > 0 else rows
     for k in range(rows):
         if k > 0:
             if plant_faults is None:
@@ -248,7 +250,11 @@ def _fly(
             history.command[k, i] = u[i]
         if planned:
             nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, S, new)
-        apply_command_faults(faults, remembered, k, plant.seed, u, actuator)
+        if k < first_fault:
+            for i in range(m):
+                actuator[i] = u[i]
+        else:
+            apply_command_faults(faults, remembered, k, plant.seed, u, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
         if not in_model_range(x, vehicle.angle_limit):
