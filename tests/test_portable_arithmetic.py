@@ -29,6 +29,7 @@ ON_THE_PATH = (
     "inheritance.py",
     "signals.py",
     "timing.py",
+    "links.py",
     "noise.py",
     "sensors.py",
     "units.py",

@@ -165,14 +165,17 @@ def test_stops_of_the_actuator_hold_whatever_fails():
     assert flown([(elevator("effector_scale", factor=-1.0), 0), (elevator("bias", offset=-0.5), 0)])[0].min() == -STOP
 
 
-def equipped(commands, actuator=None, faults=()):
+def equipped(commands, actuator=None, faults=(), late=0.0):
     start = trim(VEHICLE, 26060.4, 2407.92)
     data = actuator_data(actuator or {}, VEHICLE, T)
     rows = fault_rows([DYNAMICS, EFFECTOR], faults, T)
     memory, effector, state = fault_memory(rows), start.input.copy(), actuators_at_rest(start.input)
     x, work = start.state.copy(), workspace()
+    before = start.input
     for k, command in enumerate(commands):
-        advance_equipped(x, start.input + command, VEHICLE, T, 2, data, state, rows, memory, k, 0, effector, work)
+        driven = (data, state, rows, memory, k, 0, effector, work, None, before, late)
+        advance_equipped(x, start.input + command, VEHICLE, T, 2, *driven)
+        before = start.input + command
     return x, effector
 
 
@@ -187,6 +190,37 @@ def test_vehicle_with_ideal_actuators_is_the_bare_one_to_the_bit():
     assert_array_equal(equipped(COMMANDS)[0], x)
     later = elevator("bias", offset=0.1)
     assert_array_equal(equipped(COMMANDS, faults=[(later, 50, NEVER)])[0], x)
+
+
+@pytest.mark.parametrize("late", [0.4, 1.0, 2.7, 4.0 - 1e-9])
+def test_a_late_command_switches_within_the_period(late):
+    start, tau = trim(VEHICLE, 26060.4, 2407.92), late * H
+    x, work, before = start.state.copy(), workspace(), start.input
+    for command in start.input + COMMANDS:
+        advance(x, before, VEHICLE, tau, 40, work)
+        advance(x, command, VEHICLE, T - tau, 40, work)
+        before = command
+    # Both are accurate to far more than what a tenth of a substep would change.
+    found = equipped(COMMANDS, late=late)[0]
+    assert_allclose(found, x, rtol=1e-5)
+    assert np.abs(equipped(COMMANDS, late=late - 0.1)[0] - x).max() > 100.0 * np.abs(found - x).max()
+
+
+@pytest.mark.parametrize("late", [0.4, 2.7])
+def test_an_actuator_follows_a_late_command_from_when_it_is_there(late):
+    lag = {"actuator.elevator_deflection.set": "elevator_first_order_20"}
+    states = []
+    rows, data = fault_rows([DYNAMICS, EFFECTOR], (), T), actuator_data(lag, VEHICLE, T)
+    start = trim(VEHICLE, 26060.4, 2407.92)
+    memory, effector, state = fault_memory(rows), start.input.copy(), actuators_at_rest(start.input)
+    x, work, before, expected = start.state.copy(), workspace(), start.input, start.input[1]
+    for k, command in enumerate(start.input + COMMANDS):
+        advance_equipped(x, command, VEHICLE, T, 2, data, state, rows, memory, k, 0, effector, work, None, before, late)
+        expected = before[1] + (expected - before[1]) * math.exp(-20.0 * late * H)
+        expected = command[1] + (expected - command[1]) * math.exp(-20.0 * (T - late * H))
+        states.append(state[1, 0] - expected)
+        before = command
+    assert np.abs(states).max() < 1e-14
 
 
 def test_vehicle_with_very_fast_actuators_is_nearly_the_bare_one():

@@ -1,4 +1,4 @@
-"""Wrong tables of faults, actuators, air and sensors, and seeds: one line that says where and what was due."""
+"""Wrong tables of faults, actuators, air, sensors and links, and seeds: one line that says where and what was due."""
 
 import pytest
 
@@ -131,6 +131,23 @@ WRONG = [
         "sensors.pitch_rate.minimum = 1.0: expected less than maximum, 0.0",
     ),
     ("[sensors]\ninertial_angle_of_attack = 0.5", "sensors.inertial_angle_of_attack = 0.5: expected 0 or 1"),
+    ("[link]\ncommand = 1", "link.command = 1: expected a table of delay, jitter, loss, burst, corruption, checksum"),
+    ("[link.comand]\ndelay = 1", "expected one of measurement, computational_delay, command (did you mean 'command'?)"),
+    ("[link.command]\nlost = 0.1", "link.command.lost: unknown key, expected one of delay, jitter, loss, burst, "),
+    ("[link.command]\ndelay = 1.5", "link.command.delay = 1.5: expected a whole number"),
+    ('[link.command]\ndelay = "20 ms"', "link.command.delay = '20 ms': wrong unit, expected a finite quantity"),
+    ("[link.command]\ndelay = 51", "link.command.delay = 51: expected from 0 to 50"),
+    ("[link.measurement]\nloss = 2", "link.measurement.loss = 2: expected from 0 to 1"),
+    (
+        '[link.measurement]\nloss = "90 %"\nburst = 2',
+        "link.measurement.burst = 2.0: expected 0, or at least 9",
+    ),
+    ("[link.measurement]\nchecksum = 1", "link.measurement.checksum = 1: expected bool"),
+    (
+        "[link]\ncomputational_delay = 0.02",
+        "link.computational_delay = 0.02: the unit is missing, expected a finite quantity",
+    ),
+    ('[link]\ncomputational_delay = "-5 ms"', "link.computational_delay = '-5 ms': expected from 0 to 1000 ms"),
     ("seed = -1", "seed = -1: expected at least 0"),
     ("seed = 1.0", "seed = 1.0: expected a whole number"),
     ("seed = true", "seed = True: expected a whole number"),

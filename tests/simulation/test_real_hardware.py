@@ -33,6 +33,34 @@ def test_the_seed_decides_all_that_is_random_and_nothing_else(name):
     assert (fly(parts(name, seed=8)).fingerprint != first) == (name in RANDOM)
 
 
+def flown_with(link, **changes):
+    return fly(assemble_flight(load_scenario("case1", SHORT | {"link": link} | changes)))
+
+
+def test_computing_for_whole_periods_is_a_delay_of_the_command_to_the_bit():
+    computing, trim = flown_with({"computational_delay": "60 ms"}), parts("air").plant.initial.input
+    assert computing.fingerprint == flown_with({"command": {"delay": 3}}).fingerprint
+    assert computing.fingerprint == flown_with({"computational_delay": "20 ms", "command": {"delay": 2}}).fingerprint
+    history = computing.history
+    assert np.array_equal(history.actuator[:3], np.tile(trim, (3, 1)))
+    assert np.array_equal(history.actuator[3:], history.command[:-3])
+
+
+def test_time_of_computation_has_no_jump_at_a_whole_period():
+    def elevator(delay):
+        return flown_with({"computational_delay": delay}).history.command[:, 1]
+
+    whole = elevator("20 ms")
+    assert np.abs(elevator("19.999 ms") - whole).max() < 1e-3 * np.abs(elevator("15 ms") - whole).max()
+    assert np.abs(elevator("20.001 ms") - whole).max() < 1e-3 * np.abs(elevator("25 ms") - whole).max()
+
+
+def test_what_the_controller_hears_is_the_state_of_steps_before():
+    history = flown_with({"measurement": {"delay": 2}}).history
+    assert np.array_equal(history.estimate[2:], history.state[:-2])
+    assert np.array_equal(history.estimate[:2], history.state[[0, 0]])
+
+
 def test_an_estimator_makes_the_hard_sensors_flyable():
     def elevator_rms(**changes):
         flight = fly(assemble_flight(load_scenario("case1", {"sensors": {"set": "ghv"}, "seed": 1} | changes)))

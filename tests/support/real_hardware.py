@@ -1,4 +1,4 @@
-"""Changes of Case 1 that give it, for a few seconds, actuators, sensors, air and faults that are not ideal."""
+"""Changes of Case 1 that give it, for a few seconds, actuators, sensors, air, links and faults that are not ideal."""
 
 from __future__ import annotations
 
@@ -12,6 +12,13 @@ SHORT = {"duration": "6 s", "seed": 7, "fault": []}
 ACTUATORS = {"actuator": {"elevator_deflection": {"set": "elevator_50"}, "fuel_equivalence_ratio": {"set": "fuel_10"}}}
 SENSORS = {"sensors": {"set": "fine"}}
 ESTIMATOR = {"sensors": {"set": "ghv"}, "estimator": {"enabled": True}}
+LINKS = {
+    "link": {
+        "computational_delay": "27 ms",
+        "measurement": {"delay": 1, "loss": 0.05, "burst": 2, "corruption": 0.01},
+        "command": {"jitter": 1, "loss": 0.05, "corruption": 0.02, "checksum": True},
+    }
+}
 AIR = {
     "turbulence": {"sigma_forward": "2 ft/s", "sigma_up": "2 ft/s"},
     "gust": {"starts": ["2 s"], "forward": ["10 ft/s"], "up": ["5 ft/s"], "lengths": ["500 m"], "stays": [0.0]},
@@ -29,6 +36,8 @@ HARDWARE: dict[str, dict[str, Any]] = {
     "sensors": SENSORS,
     "estimator": ESTIMATOR,
     "air": AIR,
+    "links": LINKS,
+    "computation": {"link": {"computational_delay": "7 ms"}},
     "oscillation": faults({"channel": ELEVATOR, "type": "oscillation", "amplitude": "0.2 deg", "frequency": "1 Hz"}),
     "bandwidth": ACTUATORS | faults({"channel": ELEVATOR, "type": "bandwidth", "natural_frequency": "20 rad/s"}),
     "engine": faults(
@@ -46,10 +55,10 @@ HARDWARE: dict[str, dict[str, Any]] = {
         | {"random_off": "0.3 s"}
     ),
 }
-RANDOM = ("sensors", "estimator", "air", "sensor faults", "random loss", "everything", "everything estimated")
+RANDOM = ("sensors", "estimator", "air", "links", "sensor faults", "random loss", "everything", "everything estimated")
 _FAULTS = {"fault": [row for hardware in HARDWARE.values() for row in hardware.get("fault", ())]}
-HARDWARE["everything"] = ACTUATORS | SENSORS | AIR | _FAULTS
-HARDWARE["everything estimated"] = ACTUATORS | ESTIMATOR | AIR | _FAULTS
+HARDWARE["everything"] = ACTUATORS | SENSORS | AIR | LINKS | _FAULTS
+HARDWARE["everything estimated"] = ACTUATORS | ESTIMATOR | AIR | LINKS | _FAULTS
 """By name."""
 
 

@@ -9,14 +9,15 @@ from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.errors import ParameterError
-from hsv.faults.injector import FAULT_PARAMETERS, FaultInjector
+from hsv.faults.injector import FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
 from hsv.graph.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
 from hsv.graph.exchange import fault_in, stamp_of
+from hsv.links import command_link
 from hsv.simulation.blocks import Signals
 from hsv.timing import NEVER, first_step
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
-from hsv_node.parameters import declare
+from hsv_node.parameters import declare, declare_vehicle
 
 
 class FaultInjectorNode(BlockNode):
@@ -24,7 +25,11 @@ class FaultInjectorNode(BlockNode):
 
     def __init__(self) -> None:
         super().__init__(FAULT_INJECTOR, "faults")
-        values = declare(self, FAULT_PARAMETERS)
+        values = declare(self, (*FAULT_PARAMETERS, *LINK_PARAMETERS))
+        if not command_link(values, values["period"]).ideal:
+            # Of what only a link needs, an injector without one has none.
+            declare_vehicle(self)
+            values = declare(self, FaultInjector.PARAMETERS)
         self._period = values["period"]
         self._controller = controller_node(self.controller)
         self._due = 0

@@ -62,8 +62,9 @@ def _losses(components: Components) -> FaultRows:
     """
     plant, known = components.plant, components.fault_injector.known
     data = plant.data
-    if not (data.actuators.ideal and data.atmosphere.still and data.sensors.ideal):
-        raise RunError("C build: actuators, air and sensors are ideal in it, expected a scenario with these")
+    linked = data.late == 0.0 and data.link.ideal and components.fault_injector.link.ideal
+    if not (data.actuators.ideal and data.atmosphere.still and data.sensors.ideal and linked):
+        raise RunError("C build: actuators, air, sensors and links are ideal in it, expected a scenario with these")
     rows = components.fault_injector.rows((COMMAND,))
     others = len(rows.table) < len(known) or np.any(rows.table[:, CODE] != LOSS)
     if others or rows.table[:, OCCURRENCE].any() or rows.table[:, PARAMETER + 1].any():

@@ -34,7 +34,7 @@ SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc":
 
 NOT_TOLD = (
     *("vehicle.perturbation.", "fault.", "seed"),
-    *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors."),
+    *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors.", "link."),
 )
 """Beginnings of parameters that a controller of one's own is not told: how the vehicle really is, what will fail."""
 

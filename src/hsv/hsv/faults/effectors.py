@@ -41,12 +41,13 @@ def move_effectors(
     rows: Any,
     memory: np.ndarray,
     step: int,
-    substep: int,
+    substep: float,
     command: np.ndarray,
     angle_of_attack: float,
     effector: np.ndarray,
+    length: float = 1.0,
 ) -> None:
-    """Move the actuators over one substep and write what the vehicle is given over it into ``effector`` (2).
+    """Move the actuators over one substep, or a share of it; write into ``effector`` (2) what the vehicle is given.
 
     Args:
         data: :class:`hsv.vehicle.actuators.ActuatorData`.
@@ -54,25 +55,26 @@ def move_effectors(
         rows: Faults of dynamics and effectors, of which those act that their ``memory`` says.
         memory: See :mod:`hsv.faults.laws`.
         step: k.
-        substep: From 0.
+        substep: From 0, where it begins.
         command: That reaches the actuators (2).
         angle_of_attack: rad, for what floats along the flow.
         effector: What it was over the substep before; replaced.
+        length: In substeps.
     """
     n = len(rows.table)
-    middle = (substep + 0.5) * data.substep
+    middle, h = (substep + 0.5 * length) * data.substep, length * data.substep
     for channel in range(len(command)):
         order = data.order[channel]
         map = (data.map[channel, 0], data.map[channel, 1], data.map[channel, 2], data.map[channel, 3])
         frequency, damping = data.natural_frequency[channel], data.damping_ratio[channel]
         minimum, maximum, rate = data.minimum[channel], data.maximum[channel], data.rate_limit[channel]
-        slowed = False
+        changed = length != 1.0
         for i in range(n):
             if memory[i, ACTING] == 1.0 and int(rows.table[i, CHANNEL]) == channel:
                 if int(rows.table[i, CODE]) == BANDWIDTH and rows.table[i, PARAMETER] < frequency:
                     frequency = rows.table[i, PARAMETER]
                     order = max(order, 1)
-                    slowed = True
+                    changed = True
                 elif int(rows.table[i, CODE]) == RATE_LIMIT:
                     rate = min(rate, rows.table[i, PARAMETER])
                 elif int(rows.table[i, CODE]) == STOP_LIMIT:
@@ -80,8 +82,8 @@ def move_effectors(
                         max(minimum, rows.table[i, PARAMETER]),
                         min(maximum, rows.table[i, PARAMETER + 1]),
                     )
-        if slowed:
-            map = actuator_map(order, frequency, damping, data.substep)
+        if changed and order > 0:
+            map = actuator_map(order, frequency, damping, h)
         after, speed, position = actuator_step(
             order,
             map,
@@ -92,13 +94,13 @@ def move_effectors(
             maximum,
             rate,
             data.acceleration_limit[channel],
-            data.substep,
+            h,
         )
         replaced = False
         for i in range(n):
             here = memory[i, ACTING] == 1.0 and int(rows.table[i, CHANNEL]) == channel
             if here and int(rows.table[i, CODE]) >= SCALE:
-                if memory[i, ONSET] == step and substep == 0:
+                if memory[i, ONSET] == step and substep == 0.0:
                     memory[i, KEPT] = effector[channel]
                 if int(rows.table[i, CODE]) >= LOCK:
                     replaced = int(rows.table[i, CODE]) != FLOAT
@@ -154,11 +156,13 @@ def advance_equipped(
     effector: np.ndarray,
     work: Any,
     conditions: Any = None,
+    before: Any = None,
+    late: float = 0.0,
 ) -> None:
     """Replace ``x`` (9) by the state one ``period`` (s) later, ``command`` (2) held by what drives the actuators.
 
-    While actuators are ideal and no fault of theirs acts, the vehicle takes the command, within the stops, as
-    :func:`hsv.vehicle.integration.advance` does; else both move on the substeps of the actuators.
+    While actuators are ideal, the command is there in time and no fault of theirs acts, the vehicle takes the command,
+    within the stops, as :func:`hsv.vehicle.integration.advance` does; else both move on the substeps of the actuators.
 
     Args:
         x: State, replaced.
@@ -175,13 +179,21 @@ def advance_equipped(
         effector: What the vehicle was given last (2), replaced.
         work: See :func:`hsv.vehicle.integration.workspace`.
         conditions: Of air and engine (7), held, or none.
+        before: The command of the period before (2), where this one may be late.
+        late: Substeps after which it is there.
     """
-    if begin_faults(rows, memory, step, seed) == 0 and data.ideal:
+    if begin_faults(rows, memory, step, seed) == 0 and data.ideal and late == 0.0:
         for i in range(len(command)):
             effector[i] = min(max(command[i], data.minimum[i]), data.maximum[i])
             state[i, POSITION], state[i, RATE] = effector[i], 0.0
         advance(x, effector, p, period, substeps, work, conditions)
     else:
         for j in range(SUBSTEPS):
-            move_effectors(data, state, rows, memory, step, j, command, x[2], effector)
-            advance(x, effector, p, data.substep, 1, work, conditions)
+            share = min(max(late - j, 0.0), 1.0)
+            if before is not None and share > 0.0:
+                move_effectors(data, state, rows, memory, step, j, before, x[2], effector, share)
+                advance(x, effector, p, share * data.substep, 1, work, conditions)
+            if share < 1.0:
+                rest = 1.0 - share
+                move_effectors(data, state, rows, memory, step, j + share, command, x[2], effector, rest)
+                advance(x, effector, p, rest * data.substep, 1, work, conditions)

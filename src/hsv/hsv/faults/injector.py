@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -12,10 +12,13 @@ from hsv.errors import ParameterError
 from hsv.faults.laws import FaultRows, apply_command_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
 from hsv.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
+from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state, receive
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
 from hsv.timing import NEVER, first_step
 from hsv.vehicle.dynamics import N_INPUTS
+from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 FAULT_PARAMETERS = (
     Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
@@ -26,6 +29,9 @@ FAULT_PARAMETERS = (
     Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
     Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
 )
+LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
+"""Of the way of the command to the injector."""
+
 NEVER_TIME = 1e9
 """Stop (s) of a fault that does not end, where others do."""
 
@@ -45,34 +51,55 @@ class FaultResult:
 class FaultInjector:
     """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on.
 
-    What acts on the command is applied here; the rest is told to the vehicle.
+    What acts on the command is applied here, to what the link of the command leaves of it; the rest is told to the
+    vehicle.
     """
 
-    PARAMETERS: ClassVar = FAULT_PARAMETERS
+    PARAMETERS = (*FAULT_PARAMETERS, *LINK_PARAMETERS, *INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
 
-    def __init__(self, scheduled: Sequence[ScheduledFault] = (), period: float = 0.02, seed: int = 0) -> None:
+    def __init__(
+        self,
+        scheduled: Sequence[ScheduledFault] = (),
+        period: float = 0.02,
+        seed: int = 0,
+        link: LinkData | None = None,
+        before: np.ndarray | None = None,
+    ) -> None:
+        """Take the faults of a schedule.
+
+        Args:
+            scheduled: Faults.
+            period: T (s).
+            seed: Of the flight.
+            link: On which the command comes; None: an ideal one.
+            before: The input (2) that came on it until the flight began.
+        """
         # The first measurement is there before anybody can have told the sensors of a fault.
         self.scheduled = tuple(
             row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
         )
         self.period, self.seed = period, seed
+        self.link = link or command_link({}, period)
+        self._before = np.zeros(N_INPUTS) if before is None else before
         self.reset()
         self.step(0, np.zeros(N_INPUTS))  # compile now: a cold cache must not stall a flight
         self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`FAULT_PARAMETERS`.
+        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`, and of a link where the flight starts.
 
         Raises:
-            ParameterError: A wrong value, or arrays of different lengths.
+            ParameterError, TrimError: A wrong value, named, or arrays of different lengths.
         """
         v = check_all(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
+        link = command_link(values, period)
+        flown = (period, seed, link, None if link.ideal else initial_trim(values)[1].input)
         names = ("channels", "types", "parameters", "starts", "stops")
         columns = [v[f"fault.{name}"] for name in names]
         if columns[0] == ["none"]:
-            return cls((), period, seed)
+            return cls((), *flown)
         columns[-1] = list(columns[-1]) or [NEVER_TIME] * len(columns[0])
         for name, column in zip(names, columns, strict=True):
             if len(column) != len(columns[0]):
@@ -86,7 +113,7 @@ class FaultInjector:
             )
             for channel, kind, text, start, stop in zip(*columns, strict=True)
         ]
-        return cls(scheduled, period, seed)
+        return cls(scheduled, *flown)
 
     def reset(self) -> None:
         """Return to the schedule: what was injected or cleared in flight is forgotten."""
@@ -94,6 +121,11 @@ class FaultInjector:
         self._next = 0
         self._rows = self.rows((COMMAND,))
         self._memory = fault_memory(self._rows)
+        self._link_state = self.link_state()
+
+    def link_state(self) -> np.ndarray:
+        """Return the state of the link with which a flight begins."""
+        return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str]) -> FaultRows:
         """Return the faults of some sides that are known now, for compiled functions."""
@@ -151,6 +183,9 @@ class FaultInjector:
     def step(self, step: int, command: np.ndarray) -> FaultResult:
         """Return what becomes of ``command`` (2) in ``step``."""
         actuator = np.empty(N_INPUTS)
+        if not self.link.ideal:
+            command = command.copy()
+            receive(self.link, self._link_state, step, self.seed, command)
         apply_command_faults(self._rows, self._memory, step, self.seed, command, actuator)
         self._next = step + 1
         return FaultResult(actuator, self.acting(step))

@@ -25,6 +25,7 @@ from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
 from hsv.faults.laws import START, apply_command_faults, fault_memory
 from hsv.faults.table import COMMAND
+from hsv.links import receive
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
@@ -150,6 +151,8 @@ def _fly(
     nominal_call: Any,
     tube: Any,
     controller_call: Any,
+    link: Any,
+    link_state: Any,
     faults: Any,
     remembered: np.ndarray,
     reference: Any,
@@ -159,8 +162,8 @@ def _fly(
     """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
 
     Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without ``plant_faults``
-    the plant is ideal, without ``estimator`` there is none; other functions are compiled for these, as what is not used
-    would take a tenth of the time.
+    the plant is ideal, and so is the ``link`` of the command, without ``estimator`` there is none; other functions are
+    compiled for these, as what is not used would take a tenth of the time.
     """
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory = arrays
     n, m = len(x), len(u_n)
@@ -250,11 +253,12 @@ def _fly(
             history.command[k, i] = u[i]
         if planned:
             nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, S, new)
-        if k < first_fault:
-            for i in range(m):
-                actuator[i] = u[i]
-        else:
-            apply_command_faults(faults, remembered, k, plant.seed, u, actuator)
+        for i in range(m):
+            actuator[i] = u[i]
+        if plant_faults is not None:
+            receive(link, link_state, k, plant.seed, actuator)
+        if k >= first_fault:
+            apply_command_faults(faults, remembered, k, plant.seed, actuator, actuator)
         for i in range(m):
             history.actuator[k, i] = actuator[i]
         if not in_model_range(x, vehicle.angle_limit):
@@ -388,7 +392,7 @@ def fly_into(history: History, components: Components) -> int:
             memory = state.copy()
             controller_call = call_of(address, given, arrays.wanted, memory, parameters)
     # Of an estimator, whose sensors are hardly ideal, one function is enough.
-    ideal = plant.is_ideal(injector.known) and notch.estimator is None
+    ideal = plant.is_ideal(injector.known) and injector.link.ideal and notch.estimator is None
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
             nominal.law.reset()
@@ -404,6 +408,8 @@ def fly_into(history: History, components: Components) -> int:
             nominal_call,
             tube,
             controller_call,
+            None if ideal else injector.link,
+            None if ideal else injector.link_state(),
             commanded,
             fault_memory(commanded),
             nominal.reference.data,

@@ -22,6 +22,7 @@ from hsv.errors import HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
 from hsv.faults.table import Fault
 from hsv.inheritance import follow_extends, is_path
+from hsv.links import COMMAND_LINK_PARAMETERS
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import table_values
 from hsv.simulation.commands import Breakpoints, CommandTable, breakpoints, check_envelope
@@ -73,7 +74,7 @@ class Scenario(Table):
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
     """Key of all that is random"""
     equipment: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors and estimator"""
+    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors, links and estimator"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
     limits: dict[str, float] = Field(default_factory=dict)
@@ -128,7 +129,7 @@ class Scenario(Table):
 _PERIOD = 0.02
 """Of control, s, until a design says it: whether equipment fits together does not depend on it."""
 
-_EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *ESTIMATOR_PARAMETERS)
+_EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *COMMAND_LINK_PARAMETERS, *ESTIMATOR_PARAMETERS)
 
 EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
 """Tables of what is ideal unless they say otherwise, and of the estimator for sensors that are not."""

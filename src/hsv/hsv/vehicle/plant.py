@@ -14,10 +14,20 @@ from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
 from hsv.faults.table import COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
+from hsv.links import (
+    COMPUTATION_PARAMETER,
+    MEASUREMENT_LINK_PARAMETERS,
+    LinkData,
+    command_link,
+    computation,
+    link_state,
+    measurement_link,
+    receive,
+)
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
 from hsv.sensors import SENSOR_PARAMETERS, SensorData, measure, sensor_data, sensor_state
-from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, ActuatorData, actuator_data, actuators_at_rest
+from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, ActuatorData, actuator_data, actuators_at_rest
 from hsv.vehicle.atmosphere import (
     ATMOSPHERE_PARAMETERS,
     AtmosphereData,
@@ -26,7 +36,7 @@ from hsv.vehicle.atmosphere import (
     atmosphere_step,
     speed_of_sound,
 )
-from hsv.vehicle.dynamics import air_relative, forces, forces_in
+from hsv.vehicle.dynamics import N_STATES, air_relative, forces, forces_in
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
 from hsv.vehicle.integration import advance, workspace
@@ -53,14 +63,20 @@ PLANT_PARAMETERS = (
         for name in COEFFICIENT_UNITS
     ),
 )
-"""Beside those of the vehicle, its actuators and sensors, and the air."""
+"""Beside those of the vehicle, its actuators, sensors and links, and the air."""
 
-EQUIPMENT_PARAMETERS = (*ACTUATOR_PARAMETERS, *ATMOSPHERE_PARAMETERS, *SENSOR_PARAMETERS)
+EQUIPMENT_PARAMETERS = (
+    *ACTUATOR_PARAMETERS,
+    *ATMOSPHERE_PARAMETERS,
+    *SENSOR_PARAMETERS,
+    *MEASUREMENT_LINK_PARAMETERS,
+    COMPUTATION_PARAMETER,
+)
 """Of what is ideal unless a scenario says otherwise; the tables of a scenario are called after them."""
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
-    """Refuse :data:`EQUIPMENT_PARAMETERS` that do not fit one another.
+    """Refuse :data:`EQUIPMENT_PARAMETERS`, or those of the command's link, that do not fit one another.
 
     Raises:
         ParameterError: Names the one that is wrong.
@@ -68,6 +84,8 @@ def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, pe
     actuator_data(values, vehicle, period)
     atmosphere_data(values, period)
     sensor_data(values, period)
+    measurement_link(values)
+    command_link(values, period)
 
 
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
@@ -75,7 +93,10 @@ CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 
 
 class PlantData(NamedTuple):
-    """The plant for compiled functions; ``period`` T (s)."""
+    """The plant for compiled functions; ``period`` T (s).
+
+    The actuators have the command of a period ``late`` substeps after its beginning.
+    """
 
     vehicle: VehicleParameters
     period: float
@@ -83,20 +104,25 @@ class PlantData(NamedTuple):
     actuators: ActuatorData
     atmosphere: AtmosphereData
     sensors: SensorData
+    link: LinkData
+    late: float
     seed: int
 
 
 class PlantMemory(NamedTuple):
     """What the plant keeps from step to step beside the state x, replaced in place.
 
-    Position and rate of the actuators (2, 2); what the vehicle was given last (2); the states of the atmosphere and of
-    the sensors; the conditions (7) of the last period; scratch.
+    Position and rate of the actuators (2, 2); what reached them last and what the vehicle was given last (2 each); the
+    states of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period;
+    scratch.
     """
 
     actuators: np.ndarray
+    command: np.ndarray
     effector: np.ndarray
     atmosphere: np.ndarray
     sensors: np.ndarray
+    link: np.ndarray
     conditions: np.ndarray
     work: np.ndarray
 
@@ -128,17 +154,18 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
 
     Args:
         x: State, replaced.
-        actuator: What reaches the actuators (2), held.
+        actuator: What reaches the actuators (2), from then on held.
         data: :class:`PlantData`.
         memory: :class:`PlantMemory`.
         faults: :class:`PlantFaults`.
         step: k.
     """
-    actuators, effector, atmosphere, _, conditions, work = memory
+    actuators, before, effector, atmosphere, _, _, conditions, work = memory
     air, period, substeps, seed = data.atmosphere, data.period, data.substeps, data.seed
     driven = (data.actuators, actuators, faults.effector, faults.effector_memory, step, seed, effector, work)
     if air.still and len(faults.engine.table) == 0:
-        advance_equipped(x, actuator, data.vehicle, period, substeps, *driven)
+        advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, None, before, data.late)
+        _hold(actuator, before)
         return
     if not air.still:
         atmosphere_step(air, atmosphere, step, seed, x[0], x[1], conditions[:3])
@@ -146,17 +173,25 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
     mach = speed / speed_of_sound(x[0])
     engine, engine_memory = faults.engine, faults.engine_memory
     apply_engine_faults(engine, engine_memory, step, seed, x[2] - turn, mach, actuator[0], conditions[3:])
-    advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, conditions)
+    advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, conditions, before, data.late)
+    _hold(actuator, before)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _hold(actuator: np.ndarray, before: np.ndarray) -> None:
+    for i in range(len(before)):
+        before[i] = actuator[i]
 
 
 @njit(cache=True, error_model="numpy")
 def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measurement: np.ndarray) -> None:
-    """Write into ``measurement`` (9) what the sensors say of ``x`` (9) in ``step``; see :func:`advance_plant`."""
+    """Write into ``measurement`` (9) what comes of what sensors say of ``x`` (9); see :func:`advance_plant`."""
     if data.sensors.ideal and len(faults.sensor.table) == 0:
         for i in range(len(x)):
             measurement[i] = x[i]
     else:
         measure(data.sensors, memory.sensors, faults.sensor, faults.sensor_memory, step, data.seed, x, measurement)
+    receive(data.link, memory.link, step, data.seed, measurement)
 
 
 @dataclass(frozen=True)
@@ -177,7 +212,7 @@ class PlantResult:
 
 
 class Plant:
-    """The vehicle under held inputs, with its actuators and sensors, in its air.
+    """The vehicle under held inputs, with its actuators and sensors and the link behind these, in its air.
 
     It starts in the trim of the *nominal* vehicle in still air, perturbed or not.
     """
@@ -215,6 +250,8 @@ class Plant:
             actuator_data(self._equipment, vehicle, period),
             atmosphere_data(self._equipment, period),
             sensor_data(self._equipment, period),
+            measurement_link(self._equipment),
+            SUBSTEPS * computation(self._equipment, period)[1],
             check_all((SEED_PARAMETER,), self._equipment)[SEED_PARAMETER.name],
         )
         self.reset()
@@ -243,9 +280,11 @@ class Plant:
         return Plant(vehicle, self.initial, self.period, self.steps, self.data.substeps, self._equipment)
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
-        """Tell whether actuators and sensors are ideal, the air still, and no fault in a schedule changes that."""
-        equipped = not (self.data.actuators.ideal and self.data.atmosphere.still and self.data.sensors.ideal)
-        return not equipped and all(row.fault.kind.side == COMMAND for row in scheduled)
+        """Tell whether the equipment is ideal and the air still, and no fault in a schedule changes that."""
+        data = self.data
+        ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal
+        in_time = data.atmosphere.still and data.late == 0.0
+        return ideal and in_time and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
@@ -261,7 +300,9 @@ class Plant:
         """Return the memory with which a flight begins: actuators at rest in trim, still air."""
         held = self.initial.input
         air = atmosphere_state(self.data.atmosphere)
-        return PlantMemory(actuators_at_rest(held), held.copy(), air, sensor_state(), CALM.copy(), workspace())
+        sensors, link = sensor_state(), link_state(self.data.link, N_STATES)
+        at_rest = actuators_at_rest(held)
+        return PlantMemory(at_rest, held.copy(), held.copy(), air, sensors, link, CALM.copy(), workspace())
 
     def place(self, step: int, state: np.ndarray) -> None:
         """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""

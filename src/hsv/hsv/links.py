@@ -1,0 +1,215 @@
+"""Links of the loop that are not ideal: payloads that come late, get lost or are corrupted, compiled.
+
+There is a link from the sensors to the filter, the trajectory and the controller, and one from the controller to the
+fault injector. In every step something is sent and something is taken: the payload alone is withheld, never the message
+of a step, for which the loop waits. The receiver keeps the last payload that came. Before the flight, payloads like its
+first came from the sensors, and the input of the trim from the controller.
+
+A payload that is corrupted has one bit of one of its numbers turned over, of the 64 of a float. With a checksum, or
+where that makes a number that is not finite or beyond :data:`LARGEST`, the receiver notices, and the payload is lost.
+
+The time that the controller computes is told apart: its whole periods delay the link of the command, what remains of it
+is the time in a period from which on the actuators have the command, see :func:`computation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, uint64
+
+from hsv.errors import ParameterError
+from hsv.noise import STREAMS, uniforms
+from hsv.parameters import Parameter, check_all
+
+LONGEST_DELAY = 50
+"""Steps."""
+
+LARGEST = 1e6
+"""Magnitude (SI) above which a receiver knows that a number is corrupted."""
+
+MEASUREMENT_LINK, COMMAND_LINK = "measurement", "command"
+
+_CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
+"""Place of a link among the streams of its random numbers."""
+
+
+def _parameters(link: str) -> tuple[Parameter, ...]:
+    where = f"link.{link}"
+    return (
+        Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, float(LONGEST_DELAY)),
+        Parameter(f"{where}.jitter", 0.0, "it is late by up to so many more, drawn", "", 0.0, float(LONGEST_DELAY)),
+        Parameter(f"{where}.loss", 0.0, "probability that a payload is lost: the last one is held", "", 0.0, 1.0),
+        Parameter(f"{where}.burst", 0.0, "mean number lost in a row; 0: each is lost on its own", "", 0.0, 1e6),
+        Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is turned over", "", 0.0, 1.0),
+        Parameter(f"{where}.checksum", False, "true: a corrupted payload is noticed, and lost"),
+    )
+
+
+COMPUTATION_PARAMETER = Parameter(
+    "link.computational_delay", 0.0, "from the measurement to the command that answers it", "s", 0.0, 1.0
+)
+MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
+COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
+
+NEWEST, LOSING, BEGUN, GIVEN = range(4)
+"""Columns of the state: the step of the payload that was taken last; whether the one before was lost; whether there
+was a payload yet; from the last one on, the payload that was taken last, and then those that may still come."""
+
+_LOSS, _DELAY, _CORRUPTION = STREAMS["link_loss"], STREAMS["link_delay"], STREAMS["link_corruption"]
+
+
+class LinkData(NamedTuple):
+    """A link for compiled functions: delays in steps, and probabilities.
+
+    Of a loss: ``loss`` in step 0, then ``loss_after_arrival`` and ``loss_after_loss``.
+    """
+
+    channel: int
+    delay: int
+    jitter: int
+    loss: float
+    loss_after_arrival: float
+    loss_after_loss: float
+    corruption: float
+    checksum: bool
+    ideal: bool
+
+
+def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
+    """Return the time that the controller computes in whole periods, and the share of one that remains.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    time = check_all((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
+    periods = round(time / period, 9)  # the rounding of the division allowed for
+    whole = math.floor(periods)
+    return whole, periods - whole
+
+
+def measurement_link(values: Mapping[str, object]) -> LinkData:
+    """Return the link that :data:`MEASUREMENT_LINK_PARAMETERS` describe.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    return _link(MEASUREMENT_LINK, values, 0)
+
+
+def command_link(values: Mapping[str, object], period: float) -> LinkData:
+    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, with the whole periods of the computation.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    return _link(COMMAND_LINK, values, computation(values, period)[0])
+
+
+def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
+    v = check_all(_parameters(name), values)
+    delay, jitter, loss, burst, corruption, checksum = v.values()
+    for field in ("delay", "jitter"):
+        if not v[f"link.{name}.{field}"].is_integer():
+            raise ParameterError(
+                f"parameter link.{name}.{field} = {v[f'link.{name}.{field}']}: expected a whole number"
+            )
+    # Of a chain that is lossy for so long on average, and as often as is said (Gilbert 1960).
+    least = max(1.0, loss / (1.0 - loss)) if loss < 1.0 else 1.0
+    if burst and burst < least:
+        raise ParameterError(f"parameter link.{name}.burst = {burst}: expected 0, or at least {least:.6g}")
+    bursts = burst > 0.0 and loss < 1.0
+    return LinkData(
+        _CHANNELS[name],
+        int(delay) + computing,
+        int(jitter),
+        loss,
+        loss / (burst * (1.0 - loss)) if bursts else loss,
+        1.0 - 1.0 / burst if bursts else loss,
+        corruption,
+        checksum,
+        not (delay or computing or jitter or loss or corruption),
+    )
+
+
+def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> np.ndarray:
+    """Return the state of a ``link`` of payloads of so many numbers.
+
+    ``before``: what was sent until the flight begins; the first payload of it where none is given.
+    """
+    state = np.zeros(GIVEN + size * (link.delay + link.jitter + 2))
+    if before is not None:
+        _begin(state, before)
+    return state
+
+
+@njit(cache=True, error_model="numpy")
+def _begin(state: np.ndarray, payload: np.ndarray) -> None:
+    """Fill a link with one ``payload``."""
+    n = len(payload)
+    for i in range(len(state) - GIVEN):
+        state[GIVEN + i] = payload[i % n]
+    state[NEWEST] = -len(state)
+    state[BEGUN] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def receive(link: Any, state: np.ndarray, step: int, seed: int, payload: np.ndarray) -> None:
+    """Replace the ``payload`` (n) that is sent in ``step`` by what the receiver has then.
+
+    Args:
+        link: :class:`LinkData`.
+        state: See :func:`link_state`, replaced.
+        step: k; steps follow one another from 0 on.
+        seed: Of the flight.
+        payload: Replaced.
+    """
+    if link.ideal:
+        return
+    n = len(payload)
+    if state[BEGUN] == 0.0:
+        _begin(state, payload)
+    slots = link.delay + link.jitter + 1
+    sent = GIVEN + n * (1 + step % slots)
+    for i in range(n):
+        state[sent + i] = payload[i]
+    newest = step - link.delay
+    if link.jitter > 0:
+        drawn, _ = uniforms(seed, step, _DELAY + link.channel)
+        newest -= int(drawn * (link.jitter + 1))
+    arrives = newest > state[NEWEST]
+    if link.loss > 0.0:
+        drawn, _ = uniforms(seed, step, _LOSS + link.channel)
+        due = link.loss_after_loss if state[LOSING] == 1.0 else link.loss_after_arrival
+        lost = drawn < (link.loss if step == 0 else due)
+        state[LOSING] = 1.0 if lost else 0.0
+        arrives = arrives and not lost
+    if arrives:
+        come = GIVEN + n * (1 + newest % slots)
+        if not link.corruption > 0.0 or _passes(link, state, come, n, step, seed):
+            for i in range(n):
+                state[GIVEN + i] = state[come + i]
+            state[NEWEST] = newest
+    for i in range(n):
+        payload[i] = state[GIVEN + i]
+
+
+@njit(cache=True, error_model="numpy")
+def _passes(link: Any, state: np.ndarray, come: int, n: int, step: int, seed: int) -> bool:
+    """Corrupt the payload at ``come``, if that is drawn; tell whether the receiver takes it."""
+    drawn, place = uniforms(seed, step, _CORRUPTION + link.channel)
+    if not drawn < link.corruption:
+        return True
+    if link.checksum:
+        return False
+    bit = int(place * (64 * n))
+    number = come + bit // 64
+    words, turned = state.view(np.uint64), uint64(1) << uint64(bit % 64)
+    words[number] ^= turned
+    if abs(state[number]) <= LARGEST:
+        return True
+    words[number] ^= turned  # it may come again, late
+    return False
