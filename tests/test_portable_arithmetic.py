@@ -17,7 +17,7 @@ import hsv
 
 SOURCES = Path(hsv.__file__).parent
 
-EXACT = {"floor", "ceil", "rint", "trunc", "fabs", "sqrt", "memcpy", "memmove", "memset"}
+EXACT = {"floor", "ceil", "rint", "trunc", "fabs", "fmod", "sqrt", "memcpy", "memmove", "memset"}
 """Functions of the C library whose result IEEE 754 or their purpose leaves no choice about."""
 
 PYTHON = ("NRT_", "Py", "_Py", "numba_gil_", "numba_unpickle", "numba_do_raise", "numba_runtime_", "numba_complex_")

@@ -1,4 +1,4 @@
-"""Bags of flights whose sensors, actuators and air are not ideal: what information and report say of them."""
+"""Bags of flights whose sensors, links, actuators and air are not ideal: what information and report say of them."""
 
 import math
 
@@ -8,6 +8,7 @@ from recorded_flight import record_flight
 
 from hsv.cli.info import info
 from hsv.cli.output import Units
+from hsv.noise import STREAMS, uniforms
 from hsv.recording.info import describe, parameters_in_words
 from hsv.recording.report.events import flight_events
 from hsv.recording.report.page import render
@@ -57,6 +58,22 @@ def test_what_is_not_ideal_is_described(equipped):
     assert described["air_range"] == {"wind_up": [pytest.approx(0.9144)] * 2}
 
 
+def test_steps_in_which_a_link_held_are_counted(tmp_path, capsys):
+    (tmp_path / "linked.toml").write_text(
+        'extends = "case1"\n[link.measurement]\nloss = 0.2\n[link.command]\nloss = 0.1\ndelay = 1\n'
+    )
+    bag = record_flight(tmp_path / "bag", str(tmp_path / "linked.toml"), duration=4.0, fault=1.0)
+    lost = {
+        name: sum(uniforms(0, step, STREAMS["link_loss"] + channel)[0] < share for step in range(1, 201))
+        for channel, (name, share) in enumerate([("measurement", 0.2), ("command", 0.1)])
+    }
+    # In step 1 the command of step 0 is due; all others differ from those before.
+    assert describe(bag)["equipment"]["held_steps"] == lost
+    info(bag.path, Units.si, False)
+    said = f"links        held measurement in {lost['measurement']} steps, command in {lost['command']} steps\n"
+    assert said in capsys.readouterr().out
+
+
 def test_nothing_is_said_of_an_ideal_flight(ideal, capsys):
     assert not any(describe(ideal)["equipment"].values())
     assert {panel.group for panel in all_panels(reported_runs([ideal]))} == {
@@ -70,7 +87,7 @@ def test_nothing_is_said_of_an_ideal_flight(ideal, capsys):
     assert "less true" not in page and "filtered, effector" not in page and 'id="air"' not in page
     info(ideal.path, Units.si, False)
     out = capsys.readouterr().out
-    assert not any(line.startswith(("sensors", "effectors", "air")) for line in out.splitlines())
+    assert not any(line.startswith(("sensors", "links", "effectors", "air")) for line in out.splitlines())
 
 
 def test_the_report_plots_measured_less_true_effector_and_wind(equipped):

@@ -113,6 +113,7 @@ def _equipment(equipment: dict[str, Any] | None, units: Units) -> dict[str, str]
 
     lines = {
         "sensors": ("rms error ", quantities(equipment["measurement_error_rms"])),
+        "links": ("held ", ", ".join(f"{name} in {count} steps" for name, count in equipment["held_steps"].items())),
         "effectors": ("up to ", quantities(equipment["effector_largest_difference"])),
         "air": (
             "",

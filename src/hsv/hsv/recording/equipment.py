@@ -1,4 +1,4 @@
-"""What a bag tells of sensors, effectors and air that are not ideal."""
+"""What a bag tells of sensors, links, effectors and air that are not ideal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hsv.graph.description import ACTUATOR, FORCES, MEASUREMENT, STATE
+from hsv.graph.description import ACTUATOR, COMMAND, FORCES, MEASUREMENT, STATE
 from hsv.recording.columns import Columns
 from hsv.recording.flight import input_columns, state_columns
 from hsv.recording.reader import Bag
@@ -20,7 +20,7 @@ _EFFECTOR = "effector."
 
 def equipment_topics(bag: Bag) -> list[str]:
     """Return the topics that the functions below read, of those that are in ``bag``."""
-    return [topic for topic in (STATE, MEASUREMENT, ACTUATOR, FORCES) if topic in bag.roles]
+    return [topic for topic in (STATE, MEASUREMENT, COMMAND, ACTUATOR, FORCES) if topic in bag.roles]
 
 
 def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
@@ -33,6 +33,25 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
         return {}
     errors = state_columns(topics[MEASUREMENT], "state.") - state_columns(topics[STATE])
     return {name: error for name, error in zip(STATE_NAMES, errors.T, strict=True) if error.any()}
+
+
+def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
+    """Return the steps (n) in which a link kept all of what it had in the step before although more was there.
+
+    Of measurement and command, where there are any; arguments as of :func:`measurement_errors`.
+    """
+    ends = {}
+    if MEASUREMENT in topics:
+        ends["measurement"] = state_columns(topics[STATE]), state_columns(topics[MEASUREMENT], "state.")
+    if COMMAND in topics and ACTUATOR in topics:
+        ends["command"] = input_columns(topics[COMMAND]), input_columns(topics[ACTUATOR])
+    kept = {name: _repeats(taken) & ~_repeats(sent) for name, (sent, taken) in ends.items()}
+    return {name: steps for name, steps in kept.items() if steps.any()}
+
+
+def _repeats(rows: np.ndarray) -> np.ndarray:
+    """Return which of the ``rows`` (n, m) are those before."""
+    return np.append(False, (rows[1:] == rows[:-1]).all(axis=1))[: len(rows)]
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:

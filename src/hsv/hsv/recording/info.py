@@ -12,7 +12,7 @@ from hsv.errors import HsvError, ParameterError, RecordingError
 from hsv.faults.table import fault_parameters as parameters_of
 from hsv.graph.description import ACTUATOR, STATE, TUBE_STATUS
 from hsv.recording.bag_warnings import bag_warnings
-from hsv.recording.equipment import effectors, equipment_topics, measurement_errors, moving_air
+from hsv.recording.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
 from hsv.recording.flight import flight_fingerprint, input_columns
 from hsv.recording.former import fault_parameters, fault_topic, saturation_topic
 from hsv.recording.reader import Bag
@@ -31,7 +31,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
-        entry per interval of a channel), ``equipment`` (what of sensors, effectors and air is not ideal, SI),
+        entry per interval of a channel), ``equipment`` (what of sensors, links, effectors and air is not ideal, SI),
         ``saturation`` and ``tube``; the last five are None without the topic that tells. Times are simulated, in
         seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
@@ -132,7 +132,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
 
 
 def _equipment(bag: Bag) -> dict[str, Any] | None:
-    """Return what is not ideal: errors of measurement, the way between effectors and what they were told, the air."""
+    """Return what is not ideal: errors of measurement, what links held, effectors less what they were told, the air."""
     try:
         topics = joined(bag, equipment_topics(bag))
     except RecordingError:
@@ -141,6 +141,7 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
     away = {name: were - told[:, INPUT_NAMES.index(name)] for name, were in effectors(topics).items()}
     return {
         "measurement_error_rms": {n: float(np.sqrt(np.mean(e**2))) for n, e in measurement_errors(topics).items()},
+        "held_steps": {name: int(steps.sum()) for name, steps in held(topics).items()},
         "effector_largest_difference": {name: float(np.nanmax(np.abs(way))) for name, way in away.items()},
         "air_range": {name: [float(np.nanmin(air)), float(np.nanmax(air))] for name, air in moving_air(topics).items()},
     }
