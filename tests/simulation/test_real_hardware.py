@@ -55,6 +55,17 @@ def test_time_of_computation_has_no_jump_at_a_whole_period():
     assert np.abs(elevator("20.001 ms") - whole).max() < 1e-3 * np.abs(elevator("25 ms") - whole).max()
 
 
+def test_the_loop_bears_the_delay_that_the_linear_one_does():
+    # docs/study/hardware.md: 116 ms with ideal actuators.
+    def elevator_rms(delay):
+        changes = {"fault": [], "duration": "160 s", "link": {"computational_delay": delay}}
+        history = fly(assemble_flight(load_scenario("case1", changes))).history
+        return np.degrees(history.command[-1000:, 1].std())
+
+    assert elevator_rms("100 ms") < 1e-3
+    assert elevator_rms("130 ms") > 1.0
+
+
 def test_what_the_controller_hears_is_the_state_of_steps_before():
     history = flown_with({"measurement": {"delay": 2}}).history
     assert np.array_equal(history.estimate[2:], history.state[:-2])

@@ -14,9 +14,9 @@ SENSORS = {"sensors": {"set": "fine"}}
 ESTIMATOR = {"sensors": {"set": "ghv"}, "estimator": {"enabled": True}}
 LINKS = {
     "link": {
-        "computational_delay": "27 ms",
-        "measurement": {"delay": 1, "loss": 0.05, "burst": 2, "corruption": 0.01},
-        "command": {"jitter": 1, "loss": 0.05, "corruption": 0.02, "checksum": True},
+        "computational_delay": "7 ms",
+        "measurement": {"loss": 0.05, "burst": 2, "corruption": 0.02, "checksum": True},
+        "command": {"jitter": 1, "loss": 0.05, "corruption": 0.02},
     }
 }
 AIR = {
@@ -37,7 +37,8 @@ HARDWARE: dict[str, dict[str, Any]] = {
     "estimator": ESTIMATOR,
     "air": AIR,
     "links": LINKS,
-    "computation": {"link": {"computational_delay": "7 ms"}},
+    "computation": {"link": {"computational_delay": "27 ms"}},
+    "corruption": {"link": {"measurement": {"delay": 1, "corruption": 0.02}}},
     "oscillation": faults({"channel": ELEVATOR, "type": "oscillation", "amplitude": "0.2 deg", "frequency": "1 Hz"}),
     "bandwidth": ACTUATORS | faults({"channel": ELEVATOR, "type": "bandwidth", "natural_frequency": "20 rad/s"}),
     "engine": faults(
@@ -55,7 +56,17 @@ HARDWARE: dict[str, dict[str, Any]] = {
         | {"random_off": "0.3 s"}
     ),
 }
-RANDOM = ("sensors", "estimator", "air", "links", "sensor faults", "random loss", "everything", "everything estimated")
+RANDOM = (
+    "sensors",
+    "estimator",
+    "air",
+    "links",
+    "corruption",
+    "sensor faults",
+    "random loss",
+    "everything",
+    "everything estimated",
+)
 _FAULTS = {"fault": [row for hardware in HARDWARE.values() for row in hardware.get("fault", ())]}
 HARDWARE["everything"] = ACTUATORS | SENSORS | AIR | LINKS | _FAULTS
 HARDWARE["everything estimated"] = ACTUATORS | ESTIMATOR | AIR | LINKS | _FAULTS
