@@ -216,7 +216,7 @@ class Limits:
             f"delay borne with {name} {_milliseconds(nominal)} (nominal vehicle), {_milliseconds(worst)} (worst)"
             for name, (nominal, worst) in self.delays.items()
         )
-        return f"elevator {'; '.join(spans)}; largest real part {growths} 1/s; {delays}; {self._said_noise()}"
+        return f"elevator {'; '.join(spans)}; largest real part (1/s) {growths}; {delays}; {self._said_noise()}"
 
     def _said_noise(self) -> str:
         if any(np.isnan(value) for value in self.noise.values()):
