@@ -27,7 +27,7 @@ from hsv.cli.include import include
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.montecarlo import montecarlo
-from hsv.cli.output import report_error
+from hsv.cli.output import Interrupted, report_error
 from hsv.cli.play import play
 from hsv.cli.plot import plot
 from hsv.cli.prepare import prepare
@@ -116,6 +116,8 @@ def main() -> None:
         _fail(error, 1)
     except HsvError as error:
         _fail(error, 2)
+    except Interrupted as interrupted:
+        _fail(interrupted, _INTERRUPTED)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
     except BrokenPipeError:

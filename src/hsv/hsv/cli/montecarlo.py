@@ -10,7 +10,7 @@ import typer
 from typer.core import TyperGroup
 
 from hsv.cli.options import JsonOption, ScenarioArgument, SchedulerOption, TrustOption, UnitsOption, WorkersOption
-from hsv.cli.output import Units, console, errors, print_json, to_json
+from hsv.cli.output import Units, console, errors, print_json, resumable, to_json
 from hsv.cli.targets import check_target
 
 
@@ -92,15 +92,12 @@ def fly(
         raise CampaignError(f"out = {str(out)!r}: expected a file that ends in .parquet")
     check_target(out, "out")
     store = ResultStore(out, campaign)
-    try:
-        with (
-            make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
-            flights_bar(campaign.scenario_name, campaign.samples) as progress,
-        ):
-            flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
-    except KeyboardInterrupt:
-        errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
-        raise
+    with (
+        resumable(store.folder),
+        make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
+        flights_bar(campaign.scenario_name, campaign.samples) as progress,
+    ):
+        flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
     # The campaign in the file is the one that was asked for: its code is that of the user's own scenario.
     results = Results(out, trust=True)
     show(results, units, json, page, flown)

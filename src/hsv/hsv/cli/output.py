@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,25 @@ from hsv.units import to_paper
 # Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
 console = Console(highlight=False, markup=False, emoji=False)
 errors = Console(stderr=True, highlight=False, markup=False, emoji=False)
+
+
+class Interrupted(Exception):  # noqa: N818 - what the user did is no error
+    """Ctrl-C in long work; the message says how it goes on."""
+
+
+@contextmanager
+def resumable(folder: Path) -> Iterator[None]:
+    """Say after Ctrl-C, in one line, that what is finished is kept in ``folder``.
+
+    Raises:
+        Interrupted: After Ctrl-C.
+    """
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Interrupted(
+            f"interrupted; what is finished is in {folder}, the same command goes on from there"
+        ) from None
 
 
 class Units(StrEnum):
