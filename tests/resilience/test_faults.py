@@ -5,6 +5,7 @@ import pytest
 from hsv.errors import CampaignError
 from hsv.resilience.campaign import ResilienceCampaign, plan
 from hsv.resilience.faults import RESOLUTION, SEVERITIES, TRIED, Moment
+from hsv.resilience.flights import SubjectRunner
 from hsv.simulation.scenario import parse_scenario
 
 
@@ -35,7 +36,25 @@ def test_values_and_severities_are_the_two_sides_of_a_range():
     loss, delay = TRIED["elevator_loss"], TRIED["elevator_delay"]
     assert loss.value(0.0) == 1.0 and loss.value(1.0) == 0.0 and loss.value(loss.severity(0.55)) == pytest.approx(0.55)
     assert loss.resolution == RESOLUTION
-    assert delay.value(0.49) == 10.0 and delay.resolution == pytest.approx(1.0 / 19.0)
+    assert delay.value(0.49) == 25.0 and delay.resolution == pytest.approx(1.0 / 49.0)
+    slow = TRIED["elevator_rate_limit"]
+    assert (slow.value(0.0), slow.value(1.0)) == (100.0, 0.01)
+    assert slow.value(0.5) ** 2 == pytest.approx(slow.harmless * slow.worst)  # equal steps are equal ratios
+    assert slow.severity(slow.value(0.3)) == pytest.approx(0.3)
+
+
+def test_a_fault_that_ends_by_itself_stops_after_its_severity(campaign):
+    [subject], fault = campaign.subjects, TRIED["elevator_hard_over"]
+    [row] = parse_scenario(subject.file(Moment.after, 0, fault, 0.3), "flown").fault
+    assert (row.type, row.start, row.stop) == ("hard_over", 100.0, 100.3)
+
+
+def test_ranges_begin_where_the_baseline_is_not_lost_and_end_where_it_is(campaign):
+    # Without any fuel or thrust the airframe still glides for as long as it is watched.
+    bearable = {"fuel_loss", "fuel_bandwidth", "thrust_loss"}
+    runner = SubjectRunner(campaign.subjects[0], Moment.during)
+    assert all(runner.survives(fault, 0.0) for fault in TRIED.values())
+    assert {name for name, fault in TRIED.items() if runner.survives(fault, 1.0)} == bearable
 
 
 def test_corners_are_mirror_images_and_what_solves_in_flight_has_none(campaign):
