@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from typing import Any
@@ -22,6 +24,9 @@ from hsv.vehicle.plant import FlightStatus
 
 ATTITUDE_BAND, ALTITUDE_BAND = np.deg2rad(0.5), 30.0 * 0.3048
 """Distances (rad, m) from the flight without the fault within which a flight counts as recovered."""
+
+_RUNNERS = 16
+"""Runners that a worker keeps: those of eight controllers, so that what is built to time a flight is there later."""
 
 _ALTITUDE, _ATTITUDE = 0, slice(2, 4)
 """Columns of the state: altitude; angle of attack and pitch angle."""
@@ -86,17 +91,25 @@ class SubjectRunner:
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
+    def without(self, vehicle: int) -> FlightData:
+        """Return the flight without a fault, with which the others are compared.
+
+        Raises:
+            ControllerError: The controller ended the flight.
+        """
+        if vehicle not in self._without:
+            self._without[vehicle] = self.fly(vehicle).data()
+        return self._without[vehicle]
+
     def outcome(self, severity: str, vehicle: int, fault: TriedFault, value: float) -> FlownFault:
         """Fly with a fault and return what became of the flight."""
         try:
-            flight = self.fly(vehicle, fault, value)
-            if vehicle not in self._without:
-                self._without[vehicle] = self.fly(vehicle).data()
+            flight, without = self.fly(vehicle, fault, value), self.without(vehicle)
         except ControllerError as error:
             return FlownFault(severity, value, vehicle, False, None, None, None, None, str(error))
         survived = flight.status is FlightStatus.FINISHED
         data, start = flight.data(), self._subject.start(self._moment)
-        attitude, altitude, recovery = distances(data, self._without[vehicle], start)
+        attitude, altitude, recovery = distances(data, without, start)
         loss = None if survived else float(data.time[-1]) - start
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
 
@@ -166,7 +179,7 @@ def _campaign(text: str) -> ResilienceCampaign:
     return ResilienceCampaign.from_text(text)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=_RUNNERS)
 def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
     return SubjectRunner(_campaign(text).subjects[subject], moment)
 
@@ -175,6 +188,23 @@ def runner_of(text: str, case: Case) -> SubjectRunner:
     """Return the runner of a case of the campaign written in ``text``; a worker process keeps the last ones."""
     names = [subject.name for subject in _campaign(text).subjects]
     return _runner(text, names.index(case.subject.name), case.moment)
+
+
+def time_flight(text: str, number: int) -> bytes:
+    """Fly one fault on the nominal vehicle as :func:`fly_case` does; return how long it took (s), as a text.
+
+    Args:
+        text: Of the campaign.
+        number: Of the case, times the number of severities, plus that of the severity.
+    """
+    number, chosen = divmod(number, len(SEVERITIES))
+    case = _campaign(text).cases[number]
+    runner, fault = runner_of(text, case), TRIED[case.fault]
+    with suppress(ControllerError):
+        runner.without(0)  # what is built once is there then
+    started = time.perf_counter()
+    runner.outcome(SEVERITIES[chosen], 0, fault, fault.values[chosen])
+    return repr(time.perf_counter() - started).encode()
 
 
 def fly_case(text: str, number: int) -> bytes:

@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from hsv.campaign.executors import Executor
@@ -14,18 +15,27 @@ from hsv.campaign.run import Capacity
 from hsv.campaign.store import write_whole
 from hsv.errors import CampaignError, reason
 from hsv.resilience.campaign import Case, ResilienceCampaign
-from hsv.resilience.faults import TRIED
-from hsv.resilience.flights import Boundary, FlownFault, fly_case, runner_of
+from hsv.resilience.faults import SEVERITIES, Moment
+from hsv.resilience.flights import Boundary, FlownFault, fly_case, time_flight
 from hsv.study.sources import DIGITS, code_digest, digest_of, drop_older, measuring_code
 
-_TIMED = 3
-"""Cases of each controller of which a flight is timed before the start."""
+_TIMED = 6
+"""Flights that are timed before the start, of each controller and for each of its vehicles."""
 
 _BYTES = 8000
 """On the disk, of a case: its numbers and the scenarios of its worst flights."""
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
 """Flights of a case, and between which severities it is lost."""
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What a run flew: number of cases, and how long that took (s), beside how long it was expected to."""
+
+    cases: int
+    wall_time: float
+    expected: float
 
 
 class CaseStore:
@@ -80,14 +90,14 @@ def run_resilience(
     *,
     expect: Callable[[Capacity], None] = lambda capacity: None,
     progress: Callable[[int], None] = lambda flights: None,
-) -> int:
-    """Fly the missing cases of ``campaign``; return how many were flown.
+) -> Flown:
+    """Fly the missing cases of ``campaign``.
 
     Args:
         campaign: The campaign.
         store: Where cases are kept.
         executor: The back end that flies them.
-        expect: Called once, before the first flight, with the capacity that the run needs.
+        expect: Called once, after flights that are timed, with the capacity that the run needs.
         progress: Called with the number of finished flights, those found at the start included.
 
     Raises:
@@ -97,30 +107,53 @@ def run_resilience(
     with store.opened():
         missing = [number for number, case in enumerate(cases) if store.read(case) is None]
         done = sum(case.flights for case in cases) - sum(cases[number].flights for number in missing)
+        expected = 0.0
         if missing:
-            expect(capacity(campaign, [cases[number] for number in missing], executor.cores))
+            needed = capacity(campaign, missing, executor)
+            expect(needed)
+            expected = needed.wall_time
         progress(done)
+        started = time.perf_counter()
         for number, content in executor.fly(fly_case, campaign.text, missing):
             store.keep(cases[number], content)
             done += cases[number].flights
             progress(done)
-    return len(missing)
+    return Flown(len(missing), time.perf_counter() - started, expected)
 
 
-def capacity(campaign: ResilienceCampaign, cases: Sequence[Case], cores: int) -> Capacity:
-    """Return what flying ``cases`` takes on so many cores as fast as this one, by some flights of each controller."""
+def capacity(campaign: ResilienceCampaign, missing: Sequence[int], executor: Executor) -> Capacity:
+    """Return what flying the ``missing`` cases takes, by flights that the executor flies as it is going to fly them.
+
+    All of its cores fly at the same time: what they take from each other, and other work from them, is in it.
+    """
+    cores = max(executor.cores, 1)
+    cases = {number: campaign.cases[number] for number in missing}
+    own: dict[str, list[int]] = {}
+    for number, case in cases.items():
+        own.setdefault(case.subject.name, []).append(number)
+    timed = {
+        flight: name
+        for name, numbers in own.items()
+        for flight in _sample(numbers, max(_TIMED * len(cases[numbers[0]].subject.vehicles), -(-cores // len(own))))
+    }
+    spent: dict[str, list[float]] = {name: [] for name in own}
+    for flight, content in executor.fly(time_flight, campaign.text, list(timed)):
+        spent[timed[flight]].append(float(content))
     seconds = 0.0
-    for subject in campaign.subjects:
-        own = [case for case in cases if case.subject.name == subject.name]
-        timed = own[:: -(-len(own) // _TIMED) or 1]
-        spent = 0.0
-        for case in timed:
-            runner, fault = runner_of(campaign.text, case), TRIED[case.fault]
-            if len(subject.vehicles) > 1:
-                runner.survives(fault, 0.0)  # compiled code is loaded
-            started = time.perf_counter()
-            runner.survives(fault, fault.severity(fault.values[1]))
-            spent += time.perf_counter() - started
-        seconds += sum(case.flights for case in own) * spent / max(len(timed), 1)
-    flights = sum(case.flights for case in cases)
-    return Capacity(flights, cores, seconds / max(min(cores, len(cases)), 1), _BYTES * len(cases))
+    for name, numbers in own.items():
+        # Without a fault each core flies each vehicle but the nominal one, which it flew.
+        others = len(cases[numbers[0]].subject.vehicles) - 1
+        flown = sum(cases[number].flights for number in numbers) + len(Moment) * others * min(cores, len(numbers))
+        seconds += flown * sum(spent[name]) / len(spent[name])
+    flights = sum(case.flights for case in cases.values())
+    return Capacity(flights, cores, seconds / min(cores, len(cases)), _BYTES * len(cases))
+
+
+def _sample(cases: Sequence[int], count: int) -> list[int]:
+    """Return at most ``count`` flights, numbered as :func:`time_flight` has them, of cases from all over ``cases``.
+
+    The severities come in turn: a flight that is lost early is soon over.
+    """
+    kinds = len(SEVERITIES)
+    count = min(count, kinds * len(cases))
+    return [kinds * cases[index * len(cases) // count] + index % kinds for index in range(count)]
