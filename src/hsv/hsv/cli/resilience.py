@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from hsv.cli.options import JsonOption, SchedulerOption, WorkersOption
-from hsv.cli.output import console, errors, print_json
+from hsv.cli.output import console, errors, print_json, resumable
 from hsv.cli.targets import check_folder
 
 if TYPE_CHECKING:
@@ -52,25 +53,31 @@ def resilience(
     campaign = plan(_names(controllers) or CONTROLLERS, _names(faults) or tuple(TRIED))
     check_folder(out, "out")
     store = CaseStore(out)
-    try:
-        with (
-            make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
-            flights_bar("resilience", sum(case.flights for case in campaign.cases)) as progress,
-        ):
-            flown = run_resilience(campaign, store, flying, expect=announce, progress=progress)
-    except KeyboardInterrupt:
-        errors.print(f"what is finished is in {store.folder}; the same command goes on from there", soft_wrap=True)
-        raise
+    with (
+        resumable(store.folder),
+        make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
+        flights_bar("resilience", sum(case.flights for case in campaign.cases)) as progress,
+    ):
+        flown = run_resilience(campaign, store, flying, expect=announce, progress=progress)
     results = ResilienceResults.read(campaign, store)
-    written = write_results(results, out)
+    written = write_results(results, out, _command(controllers, faults))
     if json:
-        print_json({"written": list(map(str, written)), "cases_flown_now": flown, "cells": _cells(results)})
+        values = {"cases_flown_now": flown.cases, "flown_in_s": flown.wall_time, "expected_s": flown.expected}
+        print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})
     else:
         _show(results)
+        if flown.cases:
+            console.print(f"flown in {flown.wall_time:.0f} s, expected: {flown.expected:.0f} s")
         console.print(f"written {', '.join(map(str, written))}", soft_wrap=True)
     crashes = [flight.crashed for flight in results.flights]
     if all(crashes):
         raise RunError(f"all {len(crashes)} flights crashed, the first: {crashes[0]}")
+
+
+def _command(controllers: str, faults: str) -> str:
+    """Return the command that makes the same campaign, as a shell takes it."""
+    options = (("--controllers", controllers), ("--faults", faults))
+    return shlex.join(["hsv", "resilience", *(word for option in options if option[1] for word in option)])
 
 
 def _names(text: str) -> tuple[str, ...]:

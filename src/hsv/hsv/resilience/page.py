@@ -14,15 +14,21 @@ from hsv.recording.report import text
 from hsv.recording.report.templates import environment_of
 from hsv.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
-from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundary
+from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundaries
 from hsv.simulation.scenario import scenario_table
+from hsv.units import to_paper
 
 FLIGHTS = "flights"
 """Folder beside the page with the scenarios of the worst flights."""
 
 
-def write_results(results: ResilienceResults, out: Path) -> list[Path]:
+def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
     """Write page, Markdown and the scenario of the worst flight of every cell into ``out``; return page and Markdown.
+
+    Args:
+        results: Of a campaign.
+        out: A folder.
+        command: That makes them, which they name.
 
     Raises:
         CampaignError: A file cannot be written.
@@ -36,7 +42,7 @@ def write_results(results: ResilienceResults, out: Path) -> list[Path]:
         write_whole(out / flight_file(cell), flight_text(cell).encode())
     written = [out / "index.html", out / "result.md"]
     for path in written:
-        write_whole(path, render(results, path.name).encode())
+        write_whole(path, render(results, path.name, command).encode())
     return written
 
 
@@ -60,12 +66,18 @@ def vehicle_words(vehicle: int) -> str:
     return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 
-def render(results: ResilienceResults, name: str) -> str:
-    """Return the page (``index.html``) or the Markdown (``result.md``)."""
+def decimals(value: float | None, unit: str, digits: int) -> str:
+    """Return a ``value``, given in the SI ``unit``, in the paper's with so many decimals; a dash for none."""
+    return "–" if value is None else f"{to_paper(value, unit)[0]:.{digits}f}"
+
+
+def render(results: ResilienceResults, name: str, command: str) -> str:
+    """Return the page (``index.html``) or the Markdown (``result.md``), which name the ``command`` that makes them."""
     html = name.endswith(".html")
     environment = environment_of("hsv.resilience", escaped=html)
     style = files("hsv.recording.report").joinpath("template", "style.css").read_text(encoding="utf-8")
     return environment.get_template(f"{name}.j2").render(
+        command=command,
         campaign=results.campaign,
         squares=results.squares,
         moments=tuple(Moment),
@@ -75,7 +87,9 @@ def render(results: ResilienceResults, name: str) -> str:
         attitude_band=ATTITUDE_BAND,
         altitude_band=ALTITUDE_BAND,
         quantity=text.quantity,
-        said_boundary=said_boundary,
+        decimals=decimals,
+        said_boundaries=said_boundaries,
+        corners=max(len(subject.vehicles) for subject in results.campaign.subjects) - 1,
         parameter_words=parameter_words,
         flight_file=flight_file,
         vehicle_words=vehicle_words,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hsv.errors import CampaignError
@@ -140,14 +140,18 @@ def said_boundary(fault: TriedFault, boundary: Boundary) -> str:
     if boundary.survived is None:
         return f"lost at {fault.said(fault.harmless)}"
     if boundary.lost is None:
-        return f"not lost at {fault.said(fault.worst)}"
-    survived, lost = (fault.said(fault.value(end)) for end in (boundary.survived, boundary.lost))
-    return f"{survived}, lost at {lost}"
+        return f"all, to {fault.said(fault.worst)}"
+    return f"to {fault.said(fault.value(boundary.survived))}"
+
+
+def said_boundaries(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
+    """Return in words how far the nominal vehicle survives at each time; once, where that is the same."""
+    return list(dict.fromkeys(said_boundary(fault, boundaries[moment]) for moment in Moment))
 
 
 def parameter_words(name: str) -> str:
-    """Return what the severity of a fault is, with its mild, medium and severe values."""
+    """Return what the severity of a fault is: mild, medium and severe values, range, and what is fixed."""
     fault = TRIED[name]
-    values = ", ".join(fault.said(value) for value in fault.values)
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
-    return f"{fault.parameter.replace('_', ' ')} {values}{fixed}"
+    tried = f"{fault.said(*fault.values)} ({fault.harmless:g} to {fault.said(fault.worst)}){fixed}"
+    return f"{fault.parameter.replace('_', ' ')} {tried}"
