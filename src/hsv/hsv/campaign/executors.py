@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from itertools import islice
+from multiprocessing import resource_tracker
 from typing import Any, Protocol
 
 from hsv.campaign.scheduler import connected
@@ -125,16 +127,32 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
     import dask
     from distributed import Client, LocalCluster
 
-    with (
-        dask.config.set(_LOCAL),
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            preload=["hsv.campaign.worker"],
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
+    with dask.config.set(_LOCAL), ExitStack() as stack:
+        with _ctrl_c_held_back():
+            cluster = stack.enter_context(
+                LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                    # Without it every scheduler asks for the same port, and a second campaign would be told so.
+                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
+                    silence_logs=logging.CRITICAL,
+                )
+            )
+            client = stack.enter_context(Client(cluster, set_as_default=False))
         yield DaskExecutor(client)
+
+
+@contextmanager
+def _ctrl_c_held_back() -> Iterator[None]:
+    """Let Ctrl-C take effect at the end only; threads and processes that begin meanwhile never receive it.
+
+    A cluster that is interrupted half started does not close. Its workers are ended by the command.
+    """
+    resource_tracker.ensure_running()  # where it is started, it lets Ctrl-C in
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
