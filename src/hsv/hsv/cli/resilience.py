@@ -90,7 +90,7 @@ def _show(results: ResilienceResults) -> None:
     table = Table(title="flights survived", title_justify="left", box=None, pad_edge=False, header_style="bold")
     table.add_column("fault")
     for subject in results.campaign.subjects:
-        table.add_column(subject.name, justify="right")
+        table.add_column(subject.name, justify="right", overflow="fold")
     for fault in results.campaign.faults:
         counts = [results.squares[fault, subject.name].survived for subject in results.campaign.subjects]
         table.add_row(fault.replace("_", " "), *(f"{survived} of {flights}" for survived, flights in counts))
