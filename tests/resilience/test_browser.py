@@ -33,7 +33,7 @@ def test_the_page_is_as_wide_as_the_screen_and_prints_its_numbers(tmp_path, page
         height = "return document.querySelector('details').getBoundingClientRect().height"
         closed = browser.run(height)
         browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-        assert browser.run(height) > 4.0 * closed
+        assert browser.run(height) > 1.5 * closed
         links = browser.run("return [...document.querySelectorAll('a')].map((a) => a.getAttribute('href'))")
         assert all((page.parent / link).is_file() for link in links if not link.startswith("#"))
     finally:
