@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from hsv.control.design_file import find_design, read_design
-from hsv.study.linear_loop import COUPLING_SCALES
-from hsv.study.sensitivity import hardware
+from hsv.study.linear_loop import COUPLING_SCALES, TARGET
+from hsv.study.sensitivity import gusts, hardware
 from hsv.study.sensitivity.catalogue import STUDIES, page
 from hsv.study.sensitivity.controllers import (
     ALL,
@@ -193,6 +193,24 @@ def test_hardware_limits_of_the_baseline_and_of_the_loop_without_notch():
     assert len(limits.bandwidths[0]) == 3
     assert limits.bandwidths[0][1] < 150.0 < limits.bandwidths[0][2]
     assert "stable from 7.25 to 83.5 rad/s and from 628 rad/s on (nominal vehicle)" in limits.said("no corner")
+
+
+@pytest.mark.long
+def test_gusts_that_stay_and_those_that_fall():
+    """Half a degree of angle of attack is 71 ft/s of wind from below; what falls at once the vehicle hardly answers."""
+    falls, stays = (gusts.gust_limits(WITH_NOTCH, "paper_like", shape) for shape in gusts.SHAPES)
+    assert 0.5 < stays.attitude / (gusts.HALF_DEGREE * TARGET[1]) < 1.0
+    assert stays.elevator > stays.attitude and stays.lost is None
+    assert (falls.attitude, falls.elevator, falls.lost) == (None, None, None)
+    at = gusts.worse(WITH_NOTCH, "paper_like", gusts.SHAPES[1], stays.elevator)
+    assert at.elevator == pytest.approx(gusts.STOP, rel=1e-3)
+
+
+def test_a_gust_moves_the_elevator_more_the_faster_it_is():
+    shape = gusts.SHAPES[1]
+    slow, fast = (gusts.worse(WITH_NOTCH, "paper_like", shape, velocity) for velocity in (10.0, 20.0))
+    assert slow.attitude < fast.attitude and slow.elevator < fast.elevator and not fast.lost
+    assert fast.attitude == pytest.approx(2.0 * slow.attitude, rel=0.05)
 
 
 def test_a_loop_that_is_unstable_has_no_noise_to_speak_of():

@@ -158,21 +158,24 @@ def worst_growth(
     )
 
 
-def stability_limit(growth: Callable[[float], float], along: Sequence[float]) -> float | None:
+def stability_limit(growth: Callable[[float], float], along: Sequence[float], tolerance: float = 1e-6) -> float | None:
     """Return where ``growth`` first reaches zero going ``along`` its argument, by root finding between the points.
 
     Args:
         growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
         along: Values of the scalar, increasing or decreasing, so dense that no loss is over between two of them.
+        tolerance: Of the limit, as a share of the interval it lies in.
 
     Returns:
-        The limit to 1e-6 of the interval it lies in; the first value if the loop is not stable there; ``None`` if it
+        The limit; the first value if the loop is not stable there; ``None`` if it
         is stable at all values.
     """
     before = None
     for value in map(float, along):
         if growth(value) >= 0.0:
-            return value if before is None else float(brentq(growth, before, value, xtol=1e-6 * abs(value - before)))
+            if before is None:
+                return value
+            return float(brentq(growth, before, value, xtol=tolerance * abs(value - before)))
         before = value
     return None
 
@@ -197,6 +200,7 @@ def critical_coupling(
     notch: Sequence[NotchSection],
     period: float,
     over: Sequence[Mapping[str, float]] = ({},),
+    hardware: Hardware = IDEAL,
 ) -> float | None:
     """Return the scale kappa of the derived coupling at which the loop stops being stable, of the first vehicle to.
 
@@ -205,6 +209,7 @@ def critical_coupling(
         notch: Sections of the filter.
         period: Control period (s).
         over: Relative changes of the vehicle's parameters; the nominal vehicle alone unless given.
+        hardware: Between command and vehicle.
 
     Returns:
         ``None`` if every loop is stable up to the last of :data:`COUPLING_SCALES`.
@@ -212,7 +217,7 @@ def critical_coupling(
 
     def growth(kappa: float) -> float:
         vehicle = load_vehicle().coupled(kappa)
-        return max(worst_growth(vehicle.perturbed(corner), feedback, notch, period) for corner in over)
+        return max(worst_growth(vehicle.perturbed(corner), feedback, notch, period, hardware) for corner in over)
 
     return stability_limit(growth, COUPLING_SCALES)
 

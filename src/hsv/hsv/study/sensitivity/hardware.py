@@ -1,4 +1,4 @@
-"""Which actuators, delay and sensor noise the linear loop of each controller bears."""
+"""Which actuators, delay and sensor noise the linear loop of each controller bears, and which gust its flight."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from hsv.study.sensitivity.controllers import (
     feedback,
     said_corners,
 )
+from hsv.study.sensitivity.gusts import HALF_DEGREE, SHAPES, STOP, VELOCITIES, gust_limits, worse
 from hsv.study.sensitivity.study import Outcome, Progress, Study
 from hsv.units import to_paper
 from hsv.vehicle.actuators import ACTUATOR_SETS
@@ -77,6 +78,8 @@ DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
 
 _SHOWN_DELAY = 0.16
 
+_SHOWN_GUST = SHAPES[-1]
+
 _ONE_DEGREE = np.pi / 180.0
 
 
@@ -117,8 +120,9 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     over = corners_of(1.0, coarseness)
     bandwidths = np.geomspace(5.0, 500.0, max(4, round(31 / coarseness)))
     delays = np.linspace(0.0, _SHOWN_DELAY, max(3, round(33 / coarseness)))
-    figure = new_figure(6.4)
-    panels = figure.subplots(2, 2).ravel()
+    velocities = VELOCITIES[:: max(1, round(coarseness))]
+    figure = new_figure(9.0)
+    panels = figure.subplots(3, 2).ravel()
     findings, numbers = [], {}
     for done, case in enumerate(CASES):
         progress("linear loops", done, len(CASES))
@@ -131,10 +135,18 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         panels[1].plot(1e3 * delays, late, style, color=case.color)
         panels[2].semilogx(bandwidths, [np.nan if d is None else 1e3 * d for d in borne], style, color=case.color)
         panels[3].semilogx(bandwidths, [to_paper(n, "rad")[0] for n in noise], style, color=case.color)
+        in_gusts = [worse(case.controller, case.coupling, _SHOWN_GUST, velocity) for velocity in velocities]
+        for panel, answers in zip(panels[4:], list(zip(*in_gusts, strict=True))[:2], strict=True):
+            degrees = [to_paper(one, "rad")[0] for one in answers]
+            panel.plot([to_paper(v, "m/s")[0] for v in velocities], degrees, style, color=case.color)
         limits = Limits.of(case, over)
-        findings.append(f"{case.label}: {limits.said(said_corners(over))}")
+        gusts = [gust_limits(case.controller, case.coupling, shape) for shape in SHAPES]
+        borne_gusts = "; ".join(f"gust {s.said}: {one.said}" for s, one in zip(SHAPES, gusts, strict=True))
+        findings.append(f"{case.label}: {limits.said(said_corners(over))}; {borne_gusts}")
         numbers[case.label] = {
             **limits.report(),
+            "gust_limits_m_per_s": {s.said: vars(one) for s, one in zip(SHAPES, gusts, strict=True)},
+            "in_gusts": [one._asdict() for one in in_gusts],
             "growth_per_s": growths,
             "growth_behind_delay_per_s": late,
             "delay_borne_s": borne,
@@ -143,7 +155,14 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     progress("linear loops", len(CASES), len(CASES))
     for panel, label in zip(
         panels,
-        ("largest real part (1/s)", "largest real part (1/s)", "delay borne (ms)", "elevator rms, fine sensors (deg)"),
+        (
+            "largest real part (1/s)",
+            "largest real part (1/s)",
+            "delay borne (ms)",
+            "elevator rms, fine sensors (deg)",
+            "largest change of attitude (deg)",
+            "largest elevator command (deg)",
+        ),
         strict=True,
     ):
         panel.set_ylabel(label)
@@ -154,6 +173,10 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         panel.set_ylim(-0.6, 1.0)
     panels[2].set_ylim(bottom=0.0)
     panels[3].set_ylim(0.0, 1.0)
+    for panel, limit, shown in zip(panels[4:], (HALF_DEGREE, STOP), ((0.0, 5.0), (10.0, 30.0)), strict=True):
+        panel.set_xlabel("velocity of the gust (ft/s)")
+        panel.axhline(to_paper(limit, "rad")[0], color="black", linewidth=0.6)
+        panel.set_ylim(*shown)
     letter(panels)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return Outcome(
@@ -163,9 +186,19 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         f"delivery of {FUEL.natural_frequency:g} rad/s; nominal vehicle. (a) Over the bandwidth of the elevator. (b) "
         "Over a delay of the command. (c) The delay at which the loop stops being stable, by root finding. (d) Rms of "
         "the elevator command from the noise of the fine sensor set, without a fault; no line where the loop is "
-        f"unstable. {SAID_RMPC}. Limits of the actuators are left out.",
+        "unstable. Limits of the actuators are left out of (a) to (d). (e), (f) Flight through a gust from "
+        f"below or from above, whichever is worse, {_SHOWN_GUST.said}, behind an elevator of "
+        f"{ELEVATOR.natural_frequency:g} rad/s with its limits, at the end of the step and after the fault: largest "
+        f"change of an attitude angle, the line half a degree, and largest command of the elevator, the line its stop. "
+        "The velocity of a gust at which an attitude angle changes by half a degree, the elevator is told "
+        f"to go beyond its stop, or the flight is lost is found by root finding over such flights. {SAID_RMPC}.",
         tuple(findings),
-        {"bandwidth_rad_per_s": bandwidths.tolist(), "delay_s": delays.tolist(), "cases": numbers},
+        {
+            "bandwidth_rad_per_s": bandwidths.tolist(),
+            "delay_s": delays.tolist(),
+            "gust_m_per_s": list(velocities),
+            "cases": numbers,
+        },
     )
 
 
@@ -255,4 +288,4 @@ def _milliseconds(delay: float | None) -> str:
     return f"{1e3 * delay:.0f} ms" if delay > 0.0 else "none"
 
 
-STUDY = Study("hardware", "Actuators, delay and noise", run)
+STUDY = Study("hardware", "Actuators, delay, noise and gusts", run)
