@@ -84,7 +84,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
     result = claim.measure(evidence)
     assert 1 <= result.leading <= len(result.readings)
     assert len(result.why) > 20
-    assert len({(reading.what, reading.threshold) for reading in result.readings}) == len(result.readings)
+    assert len({(r.what, r.threshold, r.actuators) for r in result.readings}) == len(result.readings)
     for reading in result.readings:
         # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
         assert not math.isnan(reading.value), reading.what

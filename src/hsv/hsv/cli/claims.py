@@ -84,7 +84,8 @@ def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
                 console.print(Padding(f'"{entry.claim.quote}"', (0, 0, 0, 4)))
                 for number, reading in enumerate(entry.finding.readings):
                     mark = "*" if number < entry.finding.leading else " "
-                    said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}: {reading.measured}"
+                    behind = f", actuators {reading.actuators}" if reading.actuators else ""
+                    said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}{behind}: {reading.measured}"
                     console.print(Padding(f"{said} ({reading.threshold})", (0, 0, 0, 4)))
                 console.print(Padding(entry.finding.why, (0, 0, 1, 4)))
             continue

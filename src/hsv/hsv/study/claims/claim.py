@@ -13,8 +13,13 @@ from pydantic import BaseModel
 from hsv.study.claims import thresholds
 from hsv.study.claims.evidence import Evidence
 from hsv.study.claims.finding import Finding, Reading, shown
+from hsv.vehicle.actuators import IDEAL
 
 Vehicle = Literal["uncertain", "nominal", "worst"]
+Actuators = Literal["none", "ideal", "elevator_150", "elevator_50", "elevator_20"]
+
+_AS_PAPER = ("", "none", IDEAL)
+"""What is read with the paper's actuators: none named, none that have to do with it, and those."""
 
 _VEHICLES = {"uncertain": "uncertain parameters", "nominal": "nominal vehicle", "worst": "worst corner"}
 
@@ -36,6 +41,7 @@ class Row(BaseModel, frozen=True, extra="forbid"):
     at_most: float | str | None = None
     at_least: float | str | None = None
     lead: int = 0
+    actuators: tuple[Actuators, ...] | None = None
 
 
 class Claim(BaseModel, frozen=True, extra="forbid"):
@@ -48,20 +54,40 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
     readings: tuple[Row, ...]
     facts: dict[str, Row] = {}
     numbers: str = ""
+    actuators: tuple[Actuators, ...] = ()
 
     def measure(self, evidence: Evidence) -> Finding:
         """Return the readings, those that lead first, and the reasons with their numbers."""
-        module, _, name = self.numbers.partition(".")
-        found = getattr(import_module(f"hsv.study.claims.{module}"), name)(evidence) if name else {}
-        measured = _Measured(evidence, {"vehicles": evidence.vehicles, "corners": evidence.vehicles - 1, **found})
+        measured = self._measured(evidence)
         words = measured.numbers | {name: measured.fact(row) for name, row in self.facts.items()} | vars(thresholds)
-        rows = [measured.readings(row, row.what.format_map(words)) for row in self.readings]
+        behind = {
+            name: measured if name in _AS_PAPER else self._measured(evidence.behind(name)) for name in self._named()
+        }
+        rows = [
+            [
+                reading
+                for name in self._of(row)
+                for reading in behind[name].readings(row, row.what.format_map(words | behind[name].numbers), name)
+            ]
+            for row in self.readings
+        ]
         leads = [row.lead for row in self.readings]
         if not any(leads):
             leads[0] = 1
         first = [reading for row, lead in zip(rows, leads, strict=True) for reading in row[:lead]]
         further = [reading for row, lead in zip(rows, leads, strict=True) for reading in row[lead:]]
         return Finding((*first, *further), self.why.format_map(words), sum(leads))
+
+    def _of(self, row: Row) -> tuple[str, ...]:
+        return (self.actuators or ("",)) if row.actuators is None else row.actuators
+
+    def _named(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for row in self.readings for name in self._of(row)))
+
+    def _measured(self, evidence: Evidence) -> _Measured:
+        module, _, name = self.numbers.partition(".")
+        found = getattr(import_module(f"hsv.study.claims.{module}"), name)(evidence) if name else {}
+        return _Measured(evidence, {"vehicles": evidence.vehicles, "corners": evidence.vehicles - 1, **found})
 
 
 @dataclass(frozen=True)
@@ -71,14 +97,16 @@ class _Measured:
     evidence: Evidence
     numbers: dict[str, Any]
 
-    def readings(self, row: Row, what: str) -> list[Reading]:
+    def readings(self, row: Row, what: str, actuators: str = "") -> list[Reading]:
         """Return the readings of a row: one, or one a vehicle."""
-        limits = [None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least)]
+        at_most, at_least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
         if row.vehicle or not row.flight or row.beyond is not None:
-            return [Reading(what, self.value(row, row.vehicle or "nominal"), row.unit, *limits)]
+            asked = {what: row.vehicle or "nominal"}
+        else:
+            asked = {f"{what}, {_VEHICLES[vehicle]}": vehicle for vehicle in row.vehicles}
         return [
-            Reading(f"{what}, {_VEHICLES[vehicle]}", self.value(row, vehicle), row.unit, *limits)
-            for vehicle in row.vehicles
+            Reading(text, self.value(row, vehicle), row.unit, at_most, at_least, actuators)
+            for text, vehicle in asked.items()
         ]
 
     def fact(self, row: Row) -> _Fact:

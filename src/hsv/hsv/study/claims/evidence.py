@@ -11,16 +11,23 @@ import numpy as np
 
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
-from hsv.design.region import Corner, corners
+from hsv.design.region import Corner, corners, screening_corners
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import Table, corner_table, fly_over
 from hsv.study.figures.figure import Design
 from hsv.study.flights import Flights
-from hsv.study.linear_loop import worst_growth
+from hsv.study.linear_loop import Hardware, worst_growth
+from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
 from hsv.vehicle.vehicle import load_vehicle
 
 Progress = Callable[[str, int, int], None]
+
+FUEL = ACTUATOR_SETS["fuel_10"]
+"""The fuel delivery that goes with every elevator which is not ideal."""
+
+ELEVATORS = {IDEAL: ()} | {name: (FUEL, ACTUATOR_SETS[name]) for name in ("elevator_150", "elevator_50", "elevator_20")}
+"""Actuators that readings may name, as the linear loop has them; those of the paper are ideal."""
 
 
 class Evidence:
@@ -31,16 +38,34 @@ class Evidence:
         folder: Path,
         progress: Progress = lambda what, done, total: None,
         over: Sequence[Corner] | None = None,
+        actuators: str = IDEAL,
+        loops: Sequence[Corner] | None = None,
     ) -> None:
-        """Keep tables in ``folder``; ``over``: the vehicles, the nominal one first, all corners unless given."""
+        """Keep tables in ``folder``.
+
+        Args:
+            folder: Of tables and flights.
+            progress: Told of what is measured.
+            over: The vehicles, the nominal one first, all corners unless given.
+            actuators: What loops and flights have between command and vehicle, of :data:`ELEVATORS`.
+            loops: The vehicles of loops, those of flights unless given.
+        """
         self._folder = folder
         self._progress = progress
+        self.hardware = Hardware(ELEVATORS[actuators])
+        self._equipment = tuple(
+            (f"actuator.{ACTUATOR_SETS[name].channel}.set", name)
+            for name, entry in ACTUATOR_SETS.items()
+            if entry in ELEVATORS[actuators]
+        )
         self.over = corners(load_vehicle().uncertainty) if over is None else over
+        self._loops = self.over if loops is None else loops
         self.flights = Flights(folder, graph=False, progress=progress)
         self.design = cache(Design)
         self.corners = cache(self._corners)
         self.changed = cache(self._changed)
         self.growth = cache(self._growth)
+        self.behind = cache(self._behind)
 
     @property
     def vehicles(self) -> int:
@@ -54,13 +79,21 @@ class Evidence:
         assert tube is not None
         return tube.half_width[:5]
 
+    def _behind(self, actuators: str) -> Evidence:
+        """Return the evidence behind these actuators: itself if they are ideal, else flights of at most 32 corners."""
+        if actuators == IDEAL:
+            return self
+        over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
+        return Evidence(self._folder, self._progress, over, actuators, self._loops)
+
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
         """Return what was measured on a scenario with the nominal vehicle (first) and at all corners."""
+        changes = (*self._equipment, *changes)
         return corner_table(scenario, self.over, self._folder, self.half_width, self._progress, changes)
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
         """Return what was measured on the nominal flight of a scenario with other parameters."""
-        values = {**flight_parameters(load_scenario(scenario)), **dict(changes)}
+        values = {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
         return self._flown(values)
 
     def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
@@ -101,12 +134,12 @@ class Evidence:
         """
         flown, found = self.design(design).flown, []
         what = f"poles, {coupling} coupling, {'with' if notch else 'without'} notch"
-        for number, corner in enumerate(self.over):
+        for number, corner in enumerate(self._loops):
             if number % 50 == 0:
-                self._progress(what, number, len(self.over))
+                self._progress(what, number, len(self._loops))
             vehicle = load_vehicle().coupled(coupling).perturbed(corner)
-            found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period))
-        self._progress(what, len(self.over), len(self.over))
+            found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period, self.hardware))
+        self._progress(what, len(self._loops), len(self._loops))
         return np.array(found)
 
 

@@ -34,6 +34,8 @@ class Reading:
     unit: str
     at_most: float | None = None
     at_least: float | None = None
+    actuators: str = ""
+    """Those between command and vehicle, by name; empty where the claim names none: the paper's"""
 
     @property
     def measured(self) -> str:

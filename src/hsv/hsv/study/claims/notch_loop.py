@@ -23,7 +23,7 @@ WITH, WITHOUT = "case1", "case1_no_notch"
 def critical(evidence: Evidence) -> float | None:
     """Return the share of the derived coupling at which the baseline's loop without notch stops being stable."""
     flown = evidence.design("baseline").flown
-    return critical_coupling(flown.feedback_gain, (), flown.period)
+    return critical_coupling(flown.feedback_gain, (), flown.period, hardware=evidence.hardware)
 
 
 def without_notch(evidence: Evidence) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def without_notch(evidence: Evidence) -> dict[str, Any]:
     return {
         "paper_like": growth,
         "derived": evidence.growth("derived", ()),
-        "uncertain": worst_growth(uncertain, flown.feedback_gain, (), flown.period),
+        "uncertain": worst_growth(uncertain, flown.feedback_gain, (), flown.period, evidence.hardware),
         "margin": margin,
         "share": share,
         "limit": share * margin,
@@ -75,7 +75,12 @@ def margins(
     top = 0.95 * np.pi / flown.period
     frequencies = np.unique(np.concatenate((np.geomspace(0.1, top, 3000), np.linspace(12.0, 22.0, 5001))))
     loop = sampled_loop(
-        vehicle or load_vehicle().coupled("paper_like"), flown.feedback_gain, notch, flown.period, point=TARGET
+        vehicle or load_vehicle().coupled("paper_like"),
+        flown.feedback_gain,
+        notch,
+        flown.period,
+        point=TARGET,
+        hardware=evidence.hardware,
     )
     sign = 1.0 if loop.growth < 0.0 else -1.0
     found = phase_margins(frequencies, loop.elevator_loop(frequencies))

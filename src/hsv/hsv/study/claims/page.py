@@ -3,14 +3,28 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
+from hsv.design.region import screening_corners
 from hsv.study.claims.claim import Judged
-from hsv.study.claims.finding import Verdict, shown
+from hsv.study.claims.evidence import ELEVATORS, FUEL
+from hsv.study.claims.finding import Reading, Verdict, shown
 from hsv.study.claims.ranking import METRICS, Rank
 from hsv.study.claims.thresholds import REASONS
 from hsv.vehicle.vehicle import load_vehicle
 
+_SCREENED = screening_corners(load_vehicle().uncertainty)
+
 _CORNERS = 2 ** len(load_vehicle().uncertainty)
+
+
+def _elevator(name: str) -> str:
+    """Return what is said of the actuators of a reading."""
+    actuators = ELEVATORS.get(name)
+    return f"{actuators[1].natural_frequency:g} rad/s" if actuators else name
+
+
+_BANDWIDTHS = ", ".join(_elevator(name) for name, actuators in ELEVATORS.items() if actuators)
 
 _HEADER = f"""# The paper's claims
 Made by `hsv claims --out docs/claims.md`, every number measured. A claim is quoted word for word and read in one or
@@ -25,6 +39,13 @@ not, and **does not hold** if one in bold does not, whatever the others say.
 the nominal vehicle; the *worst corner* is the vehicle least in favour of the claim. The *paper-like* coupling is meant
 where none is named ([assumptions](assumptions.md)). What the paper says of flights without the notch filter rests, with
 that coupling, on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).
+
+*Actuators* are the paper's, ideal, where none is named. What the notch filter is good for depends on them: without it a
+slow elevator stabilises the elastic modes. So claims on the filter name theirs, reading by reading: none (it is of the
+filter or the vehicle alone), ideal, or an elevator of the second order with this bandwidth ({_BANDWIDTHS})
+beside a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary says with which of them all readings hold,
+*yes*, and with which not. In flights behind an elevator the *worst corner* is that of {len(_SCREENED) - 1}, in loops
+that of all.
 
 {REASONS}"""
 
@@ -48,18 +69,36 @@ _PLURAL = {Verdict.HOLDS: "hold", Verdict.CONDITIONS: "hold under conditions", V
 
 
 def _summary(judged: dict[str, list[Judged]]) -> str:
-    rows = ["| claim | location | verdict |", "| --- | --- | --- |"]
+    rows = ["| claim | location | verdict | actuators |", "| --- | --- | --- | --- |"]
     for entries in judged.values():
-        rows += [f"| {e.claim.name} | {e.claim.location} | {e.finding.verdict} |" for e in entries]
+        rows += [
+            f"| {e.claim.name} | {e.claim.location} | {e.finding.verdict} | {_conditions(e.finding.readings)} |"
+            for e in entries
+        ]
     return "\n".join(rows) + "\n"
+
+
+def _conditions(readings: Sequence[Reading]) -> str:
+    """Return behind which actuators all readings of a claim hold and behind which not, empty where it names none."""
+    kept: dict[str, bool] = {}
+    for reading in readings:
+        if reading.actuators:
+            kept[reading.actuators] = kept.get(reading.actuators, True) and reading.holds
+    sides = (("yes", True), ("not", False))
+    words = [f"{said}: {', '.join(_elevator(n) for n in kept if kept[n] is side)}" for said, side in sides]
+    return "; ".join(text for text, (_, side) in zip(words, sides, strict=True) if side in kept.values())
 
 
 def _claim(entry: Judged) -> str:
     claim, finding = entry.claim, entry.finding
+    named = any(r.actuators for r in finding.readings)
     rows = ["| reading | measured | threshold | |", "| --- | ---: | --- | --- |"]
+    if named:
+        rows = ["| reading | actuators | measured | threshold | |", "| --- | --- | ---: | --- | --- |"]
     for number, r in enumerate(finding.readings):
         what = f"**{_cell(r.what)}**" if number < finding.leading else _cell(r.what)
-        rows.append(f"| {what} | {r.measured} | {r.threshold} | {'yes' if r.holds else 'no'} |")
+        behind = f"{_elevator(r.actuators)} | " if named else ""
+        rows.append(f"| {what} | {behind}{r.measured} | {r.threshold} | {'yes' if r.holds else 'no'} |")
     table = "\n".join(rows)
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
