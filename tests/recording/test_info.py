@@ -71,7 +71,9 @@ def test_description(described: dict[str, object]) -> None:
         "largest_level": 1.5,
         "excursions": [{"start_s": 0.7, "end_s": 0.75}],
         "uncertified_steps": 0,
+        "uncertified_hardware_steps": 0,
     }
+    assert described["not_covered"] is None  # without parameters there is nothing to compare
 
 
 def test_what_the_bag_cannot_tell_is_none(kit: SimpleNamespace, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from hsv.control.adjustable import TAU
+from hsv.control.coverage import uncovered_hardware
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
@@ -37,6 +38,8 @@ class TubeMpcNode(TubeNode):
             self.get_logger().warning(
                 "vehicle.digest: not that of the design, the tube is certified for another vehicle"
             )
+        for thing in uncovered_hardware(values, design) if design.tube else ():
+            self.get_logger().warning(f"not covered by the certificate: {thing}")
         self.component = self._law = TubeLaw.from_parameters(values, design)
         self._changed = ""
         """Which change is being made, and from which step on it acts."""

@@ -46,8 +46,8 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     """
     from hsv.cli.summary import report_flight
     from hsv.errors import RecordingError
-    from hsv.recording.flight import flight_data, flight_fingerprint
-    from hsv.recording.info import ending
+    from hsv.recording.flight import flight_data
+    from hsv.recording.info import describe
     from hsv.recording.reader import Bag
     from hsv.recording.report.page import write_report
     from hsv.simulation.metrics import flight_metrics
@@ -68,16 +68,18 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
             extra["report"] = str(page)
         except RecordingError as error:
             unwritten = error  # the flight itself is whole, and told first
+    description = describe(recorded)
     report_flight(
         parse_scenario(recorded.text("scenario.toml"), recorded.custom_data.get("scenario", "")),
         flight_metrics(data),
-        fingerprint=flight_fingerprint(recorded),
+        fingerprint=description["fingerprint"],
         design_hash=recorded.custom_data.get("design_hash", ""),
-        ending=ending(recorded),
+        ending=description["ending"],
         wall_time=wall_time,
         simulated_time=float(data.time[-1]),
         units=units,
         json=json,
+        not_covered=description["not_covered"],
         extra=extra,
     )
     if unwritten:

@@ -73,6 +73,8 @@ def _print(description: dict[str, Any], units: Units) -> None:
     }
     for key, value in heading.items():
         console.print(f"{key:12} {value}", soft_wrap=True)
+    for thing in description["not_covered"] or ():
+        console.print(f"{'not covered':12} {thing}", soft_wrap=True)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for column in ("topic", "type", "messages", "rate Hz"):
         table.add_column(column, justify="right" if column in ("messages", "rate Hz") else "left")
@@ -149,6 +151,8 @@ def _tube(tube: dict[str, Any] | None) -> str:
     )
     if tube["uncertified_steps"]:
         text += ", vehicle outside the set that it is certified for"
+    if tube["uncertified_hardware_steps"]:
+        text += ", hardware or air that it is not certified for"
     excursions = tube["excursions"]
     shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
     more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""

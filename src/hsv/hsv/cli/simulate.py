@@ -31,6 +31,7 @@ def simulate(
     from hsv.control.design_parameters import digest
     from hsv.simulation.assembly import assemble_flight, blamed_on
     from hsv.simulation.closed_loop import fly
+    from hsv.simulation.coverage import uncovered_of
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import load_scenario
     from hsv.vehicle.plant import FlightStatus
@@ -57,4 +58,5 @@ def simulate(
         simulated_time=float(flight.time[-1]),
         units=units,
         json=json,
+        not_covered=uncovered_of(loaded, design),
     )

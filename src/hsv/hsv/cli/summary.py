@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
@@ -23,6 +24,7 @@ def report_flight(
     simulated_time: float,
     units: Units,
     json: bool,
+    not_covered: Sequence[str] | None,
     extra: dict[str, Any] | None = None,
 ) -> None:
     """Print the summary of a flight.
@@ -37,6 +39,7 @@ def report_flight(
         simulated_time: Simulated time (s) of the last step.
         units: Units of what is printed.
         json: Whether to print JSON.
+        not_covered: What of the flight the certificate of its design does not cover; ``None``: not known.
         extra: More to print, by name.
 
     Raises:
@@ -58,6 +61,7 @@ def report_flight(
                 "as_published": same,
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
+                "not_covered": not_covered,
                 **(extra or {}),
             }
         )
@@ -66,6 +70,8 @@ def report_flight(
         console.print(f"fingerprint {in_words(fingerprint, same)}", soft_wrap=True)
         pace = f" in {wall_time:.3g} s: {factor:.3g} x real time" if wall_time and factor else ""
         console.print(f"flown {simulated_time:.6g} s{pace}")
+        for thing in not_covered or ():
+            console.print(f"not covered by the certificate: {thing}", soft_wrap=True)
         for name, value in (extra or {}).items():
             console.print(f"{name:5} {value}", soft_wrap=True)
     if ending == "diverged":

@@ -18,6 +18,7 @@ from numba import njit
 
 from hsv.control.adjustable import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
+from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
@@ -41,6 +42,7 @@ class TubeStatusCode(IntEnum):
     OUTSIDE = 2
     INVALID_INPUT = 3
     UNCERTIFIED_VEHICLE = 4
+    UNCERTIFIED_HARDWARE = 5
 
 
 TUBE_PARAMETERS = (
@@ -50,8 +52,9 @@ TUBE_PARAMETERS = (
     COUPLING_PARAMETER,
     Parameter("vehicle.digest", "", "digest of the vehicle flown; empty: the default one"),
     *FLOWN_NOTCH_PARAMETERS,
+    *HARDWARE_PARAMETERS,
 )
-"""Of the tube law, beside those of the design."""
+"""Of the tube law, beside those of the design; declared hardware is for the status alone."""
 
 _N_INTEGRATED = 2
 """Altitude and velocity, the first two states."""
@@ -207,15 +210,18 @@ class TubeLaw(Controller):
         changes: Sequence[tuple[int, np.ndarray]] = (),
         integral_rate: float = 0.0,
         vehicle: str | None = None,
+        hardware_covered: bool = True,
     ) -> None:
         """Fly ``design`` on a ``vehicle``, by its digest, with this set of inertial coupling.
 
-        ``None``: those that it is certified for. The tube's set is one of the error with the design's notch filter:
-        with another ``notch`` there is none. ``changes`` of tau: first step and factors (5), in order.
+        ``None``: those that it is certified for. ``hardware_covered``: whether it is for the hardware flown, too. The
+        tube's set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes``
+        of tau: first step and factors (5), in order.
         ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
         """
         self.design = design
         self._certified = coupling in (None, design.coupling) and vehicle in (None, design.vehicle)
+        self._hardware_covered = hardware_covered
         flown = notch or design.notch
         self._tube = design.tube if flown == design.notch else None
         self._notch = discretise(flown, design.period)
@@ -238,7 +244,8 @@ class TubeLaw(Controller):
         design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
         vehicle = v["vehicle.digest"]
-        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"], vehicle)
+        covered = not uncovered_hardware(values, design)
+        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"], vehicle, covered)
 
     @property
     def gain(self) -> np.ndarray:
@@ -298,8 +305,10 @@ class TubeLaw(Controller):
             status = TubeStatusCode.NO_SET
         elif not inside:
             status = TubeStatusCode.OUTSIDE
+        elif not self._certified:
+            status = TubeStatusCode.UNCERTIFIED_VEHICLE
         else:
-            status = TubeStatusCode.OK if self._certified else TubeStatusCode.UNCERTIFIED_VEHICLE
+            status = TubeStatusCode.OK if self._hardware_covered else TubeStatusCode.UNCERTIFIED_HARDWARE
         return TubeResult(
             input=u,
             u_unsaturated=total,

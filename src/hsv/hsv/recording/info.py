@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hsv.control.coverage import uncovered
+from hsv.control.design import design_of
 from hsv.errors import HsvError, ParameterError, RecordingError
 from hsv.faults.table import fault_parameters as parameters_of
-from hsv.graph.description import ACTUATOR, STATE, TUBE_STATUS
+from hsv.graph.description import ACTUATOR, STATE, TUBE_MPC, TUBE_STATUS
+from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
 from hsv.recording.flight import flight_fingerprint, input_columns
@@ -31,13 +35,15 @@ def describe(bag: Bag) -> dict[str, Any]:
         ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
-        entry per interval of a channel), ``equipment`` (what of sensors, links, effectors and air is not ideal, SI),
-        ``saturation`` and ``tube``; the last five are None without the topic that tells. Times are simulated, in
-        seconds; ``end_s`` of what lasts until the end of the bag is None.
+        entry per interval of a channel), ``equipment`` (what of sensors, effectors and air is not ideal, SI),
+        ``saturation``, ``tube`` and ``not_covered`` (what of the flight the certificate of its design does not cover,
+        in words); the last six are None without the topic that tells, and the last without parameters. Times are
+        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
     """
     start, end = bag.span
     fingerprint = _fingerprint(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
+    faults = _faults(bag) if fault_topic(bag) in bag.roles else None
     return {
         "path": str(bag.path),
         "folder": str(bag.folder),
@@ -55,10 +61,11 @@ def describe(bag: Bag) -> dict[str, Any]:
             for name, data in sorted(bag.attachments.items())
         ],
         "ending": ending(bag) if STATE in bag.roles else None,
-        "faults": _faults(bag) if fault_topic(bag) in bag.roles else None,
+        "faults": faults,
         "equipment": _equipment(bag) if STATE in bag.roles else None,
         "saturation": _saturation(bag) if saturation_topic(bag) in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
+        "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
     }
 
 
@@ -147,6 +154,18 @@ def _equipment(bag: Bag) -> dict[str, Any] | None:
     }
 
 
+def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
+    """Return what no certificate covers, by the parameters and the certificate in the bag, its faults as recorded."""
+    try:
+        sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
+        values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
+        report = bag.attachments.get("certificate.json")
+        flown = [(fault["channel"], fault["type"], fault["parameters"]) for fault in faults or ()]
+        return uncovered(values, design_of(values), json.loads(report) if report else None, flown)
+    except (HsvError, ValueError, LookupError):
+        return None  # what is attached is not of this version, or not whole
+
+
 def _saturation(bag: Bag) -> dict[str, Any]:
     saturated = bag.columns(saturation_topic(bag))["saturated"]
     return {
@@ -167,6 +186,7 @@ def _tube(bag: Bag) -> dict[str, Any]:
         "largest_level": float(levels.max()) if len(levels) else None,
         "excursions": _intervals(columns["header.stamp"], outside),
         "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
+        "uncertified_hardware_steps": int((columns["status"] == constants.get("UNCERTIFIED_HARDWARE", -1)).sum()),
     }
 
 

@@ -79,10 +79,14 @@ def _excursions(description: dict[str, Any]) -> list[Event]:
 
 
 def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
-    # A property of the vehicle, not of a moment: told once.
-    if description["tube"] and description["tube"]["uncertified_steps"]:
-        start = description["start_s"]
-        yield Event(start, start, "warning", "vehicle outside the set that the tube is certified for", "tube_mpc")
+    # Properties of vehicle and hardware, not of a moment: told once.
+    start, tube = description["start_s"], description["tube"] or {}
+    for steps, text in (
+        ("uncertified_steps", "vehicle outside the set that the tube is certified for"),
+        ("uncertified_hardware_steps", "hardware or air that the tube is not certified for"),
+    ):
+        if tube.get(steps):
+            yield Event(start, start, "warning", text, "tube_mpc")
 
 
 def _saturation(bag: Bag) -> Iterator[Event]:

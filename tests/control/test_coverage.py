@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+
+from hsv.control.coverage import commanded, uncovered_faults, uncovered_hardware
+from hsv.control.design_file import find_design, read_design
+from hsv.control.tube_law import TubeStatusCode
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.blocks import steps
+from hsv.simulation.coverage import uncovered_of
+from hsv.simulation.scenario import load_scenario
+
+BASELINE, REALISTIC = (read_design(find_design(name)) for name in ("baseline", "realistic"))
+LOSS = ("elevator_deflection", "loss_of_effectiveness", {"effectiveness": 0.9})
+
+
+def of(changes, design=BASELINE, scenario="case1"):
+    return uncovered_of(load_scenario(scenario, changes), design)
+
+
+def test_the_flight_of_the_certificate_is_covered():
+    assert of({}) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"sensors.pitch_rate.noise": "0.01 deg/s"}, ["sensors.pitch_rate: noise 0.01 deg/s; "]),
+        ({"sensors.altitude.latency": 2}, ["sensors.altitude: latency 2; "]),
+        ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude: random walk; "]),
+        ({"wind.up": "3 ft/s"}, ["wind.up: 3 ft/s; the certificate is for still air"]),
+        ({"density.offset": "-2 %"}, ["density.offset: -0.02; the certificate is for the model's density"]),
+        ({"estimator.enabled": True}, ["estimator: "]),
+        ({"vehicle.coupling": "derived"}, ["vehicle.coupling: derived; the certificate is for paper_like"]),
+        ({"vehicle.perturbation.mass": "12 %"}, ["vehicle.perturbation.mass: 12 %; the certificate is for 10 % at"]),
+        ({"vehicle.perturbation.mass": "10 %"}, []),
+        ({"notch.enabled": False}, ["notch: none"]),
+        (
+            {"fault[0].effectiveness": 0.8},
+            ["fault: loss_of_effectiveness of elevator_deflection (effectiveness 0.8)"],
+        ),
+        ({"fault[0].effectiveness": 0.95}, []),
+        ({"actuator.elevator_deflection.stop": "29 deg"}, []),
+        ({"actuator.elevator_deflection.stop": "28 deg"}, ["actuator.elevator_deflection.stop: 28 deg; "]),
+        (
+            {
+                "actuator.elevator_deflection.set": "elevator_150",
+                "actuator.elevator_deflection.natural_frequency": "90 rad/s",
+            },
+            ["actuator.elevator_deflection: elevator_150, natural frequency 90 rad/s; the certificate is for an ideal"],
+        ),
+    ],
+)
+def test_what_is_not_covered_is_named(changes, named):
+    found = of(changes)
+    assert len(found) == len(named), found
+    for text, beginning in zip(found, named, strict=True):
+        assert text.startswith(beginning)
+
+
+def test_a_design_covers_the_actuators_that_it_knows_and_no_others():
+    known = {"actuator.elevator_deflection.set": "elevator_50", "actuator.fuel_equivalence_ratio.set": "fuel_10"}
+    assert of(known | {"actuator.elevator_deflection.stop": "30 deg"}, REALISTIC) == []
+    assert [text.partition(":")[0] for text in of(known, REALISTIC)] == ["actuator.elevator_deflection.stop"]
+    assert [text.partition(";")[0] for text in of({}, REALISTIC)] == [
+        "actuator.fuel_equivalence_ratio: ideal",
+        "actuator.elevator_deflection: ideal",
+    ]
+
+
+def test_other_faults_are_not_covered_and_each_is_named_once():
+    found = uncovered_faults([LOSS, ("elevator_deflection", "lock_in_place", {}), LOSS], 0.9)
+    assert found == [
+        "fault: lock_in_place of elevator_deflection; the certificate is for a loss of elevator effectiveness alone"
+    ]
+    assert len(uncovered_faults([LOSS, LOSS], None)) == 1
+
+
+def test_where_no_tube_is_certified_nothing_is_covered():
+    assert of({}, None, "case1_rmpc") == ["all of it: controller robust_mpc has no certified tube"]
+
+
+def test_commands_stay_within_the_limits_that_the_tube_was_tightened_for():
+    for design in (BASELINE, REALISTIC):
+        most = np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))
+        assert commanded(design)[1] < most[1]
+
+
+def test_the_status_tells_of_declared_hardware_alone():
+    """In step 0 every flight is inside the set; a fault is not known to the controller."""
+    lock = [{"channel": "elevator_deflection", "type": "lock_in_place", "start": "0 s"}]
+    for changes, status in (
+        ({"fault": lock}, TubeStatusCode.OK),
+        ({"turbulence.sigma_up": "1 ft/s"}, TubeStatusCode.UNCERTIFIED_HARDWARE),
+        ({"turbulence.sigma_up": "1 ft/s", "vehicle.coupling": "derived"}, TubeStatusCode.UNCERTIFIED_VEHICLE),
+    ):
+        parts = assemble_flight(load_scenario("case1", changes))
+        assert next(steps(parts)).diagnostics.status is status
+        assert bool(uncovered_hardware({}, BASELINE)) is False
