@@ -20,6 +20,22 @@ def test_a_design_is_certified_as_it_was_and_with_a_small_gust(hsv):
     assert min(min(row) for row in gust["room"]) < min(min(row) for row in alone["room"])
 
 
+@pytest.mark.long
+def test_the_sensors_of_a_scenario_are_added_and_what_is_not_covered_is_named(hsv, tmp_path):
+    mine = tmp_path / "mine.toml"
+    mine.write_text(
+        'extends = "case1"\ntitle = "x"\n[sensors.altitude]\nquantum = "1 ft"\n[sensors.velocity]\ndrop_out = 0.01\n'
+    )
+    ran = hsv("certify", str(BASELINE), "--scenario", str(mine), "--json")
+    assert ran.code == 1
+    assert ran.json["not_covered"] == [
+        "sensors.altitude: quantum 1 ft; the certificate is for an ideal one",
+        "sensors.velocity: drop out 0.01; the certificate is for an ideal one",
+    ]
+    verdicts = {verdict["name"]: verdict["certified"] for verdict in ran.json["verdicts"]}
+    assert verdicts["sensor quantisation"] and verdicts["all"] and not verdicts["drop-out of a sensor"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -28,6 +44,8 @@ def test_a_design_is_certified_as_it_was_and_with_a_small_gust(hsv):
         (("--bias", "velocity=1 deg"), "bias velocity = '1 deg': wrong unit"),
         (("--gust", "2"), "gust = '2': the unit is missing"),
         (("--gust=-2 ft/s",), "gust = -0.6096: expected zero or more"),
+        (("--reach", "9"), "reach = 9: expected more than 0, up to 8.572, beyond which no noise is"),
+        (("--scenario", "nowhere"), "scenario 'nowhere': expected a path or one of case1, "),
         (("--density", "2 ft"), "density = '2 ft': wrong unit"),
         (("--actuators", "servo"), "actuators = 'servo': expected names from elevator_50, "),
         (("--actuators", "elevator_50,elevator_20"), "actuators = 'elevator_50,elevator_20': expected at most one a"),

@@ -3,9 +3,27 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.design.disturbance import DisturbanceSet
-from hsv.design.tube_problem import tube_problem
-from hsv.design.verification.effects import REACH, air, described, measured, with_models
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.design.error_system import error_system, tube_errors
+from hsv.design.region import record
+from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.verification.effects import (
+    REACH,
+    Measured,
+    air,
+    declared,
+    delayed,
+    described,
+    sensors,
+    with_models,
+)
+from hsv.design.verification.plan import Plan
+from hsv.lpv.polytope import schedule
+from hsv.noise import LARGEST
+from hsv.sensors import sensor_data
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.trim import trim
 
@@ -19,7 +37,7 @@ def problem(subject):
 def test_an_error_that_the_sensor_hides_moves_neither_feedback_nor_filter(problem, subject, state):
     bias = np.zeros(N_RIGID)
     bias[state] = 0.01
-    effect = measured(np.zeros(N_RIGID), bias)(problem.system)
+    effect = Measured(np.abs(bias))(problem.system)
     hidden = np.zeros(7)
     hidden[state] = -0.01
     system = problem.system
@@ -56,9 +74,14 @@ def test_what_is_bounded_by_zero_adds_no_channel(problem, subject):
 
 
 def test_noise_counts_with_its_reach_and_bias_once(problem, subject):
-    models = described(subject, sensors="fine", bias=["pitch_angle = -0.1 deg"], turbulence="2 ft/s", density="1 %")
+    models, unbounded = described(
+        subject, sensor_set="fine", bias=["pitch_angle = -0.1 deg"], turbulence="2 ft/s", density="1 %"
+    )
+    assert not unbounded
+    unexplained = models.pop("model errors under sensors")(problem.system)
+    assert unexplained.half_width.size == 0 and unexplained.widening.min() >= 0.0 < unexplained.widening[6]
     assert list(models) == [
-        "sensors fine",
+        "fine sensors: noise",
         "bias of pitch_angle = -0.1 deg",
         "turbulence 2 ft/s",
         "density 1 %",
@@ -68,3 +91,127 @@ def test_noise_counts_with_its_reach_and_bias_once(problem, subject):
     assert_allclose(bias, [0.0, 0.0, 0.0, np.radians(0.1), 0.0])
     assert_allclose(turbulence, [REACH * 0.6096, REACH * 0.6096, 0.0])
     assert_allclose(density, [0.0, 0.0, 0.01])
+
+
+def test_an_inertial_angle_of_attack_has_the_error_of_the_pitch_angle(problem, subject):
+    """Equal errors of both angles are one of the path angle less: the feedback on one takes from that on the other."""
+    noise = sensors(sensor_data({"sensors.set": "inertial"}, subject.design.period), Plan.of(subject))["sensor noise"]
+    seen, F = noise(problem.system).feedthrough, problem.system.F
+    assert_allclose(seen[:, 3], F[:, 3] + F[:, 2])
+    assert abs(seen[1, 3]) < 0.2 * abs(F[1, 3])
+
+
+@pytest.fixture(scope="module")
+def plan(subject):
+    return Plan.of(subject)
+
+
+DECLARED = {
+    "fine": {"sensors": {"set": "fine"}, "seed": 3},
+    "coarse": {
+        "sensors": {
+            "pitch_angle": {"bias": "0.02 deg", "quantum": "0.01 deg"},
+            "pitch_rate": {"quantum": "0.02 deg/s", "bias_sigma": "0.01 deg/s"},
+            "velocity": {"scale": 1e-4},
+        }
+    },
+    "late": {"sensors": {"pitch_angle": {"latency": 1}, "pitch_rate": {"latency": 2}, "altitude": {"latency": 3}}},
+    "all": {
+        "sensors": {"set": "fine", "altitude": {"bias": "-3 ft", "quantum": "2 ft"}, "angle_of_attack": {"latency": 1}}
+    },
+}
+
+
+@pytest.mark.parametrize("name", ["all", *(pytest.param(n, marks=pytest.mark.long) for n in DECLARED if n != "all")])
+def test_the_errors_of_an_equipped_flight_evolve_as_the_enlarged_system_says(subject, plan, name):
+    """Each step of e in a flight with sensors is A e + G d + the sensors' channels, and every channel is in its bound.
+
+    What the scheduling with a measurement adds is what remains, and in the bounds widened for it.
+    """
+    scenario = load_scenario("case1", DECLARED[name])
+    design, vehicle = subject.design, subject.vehicle
+    models, unbounded = declared(subject, scenario, LARGEST)
+    assert models and not unbounded
+    flight = fly(assemble_flight(scenario, design))
+    rows, model = record(flight), channel_model(design, vehicle)
+    channels = model.signals(rows).channels
+    more = models.pop("model errors under sensors")(problem_at(design, model, 0.0, 0.0)).widening
+    certified = DisturbanceSet.from_report(subject.certificate["tube"]["disturbance"]["channels"])
+    assert DisturbanceSet(certified.lower - more, certified.upper + more).membership(channels).inside
+    late = sum(one.late for one in models.values())
+    x, planned = rows.state[:, :N_RIGID], (rows.reference + rows.deviation)[:, :N_RIGID]
+    seen_plan = queued(planned, late) - planned
+    e = x - planned
+    seen_error = flight.history.estimate[:, :N_RIGID] - planned
+    # Beyond the samples that are late, of plan and error: what sensors add to them.
+    added = seen_error - queued(e, late) - seen_plan
+    settled = slice(int(late.max()) + 1, None)
+    bound = sum(one.error for one in models.values())
+    assert np.all(np.abs(added) <= bound + 1e-12 * np.abs(x).max(axis=0))
+    assert np.all(np.abs(seen_plan)[settled] <= plan.change(late) + 1e-12)
+    observed = tube_errors(rows.state + pad(seen_error - e), rows.deviation, rows.reference, model.notch)[:, N_RIGID:]
+    widened = sum(one(problem_at(design, model, 0.0, 0.0)).widening for one in models.values())
+    inverse = np.linalg.inv(model.columns[[1, 2, 4]])
+    for k in range(settled.start, len(x) - 1, 97):
+        system = problem_at(design, model, *rows.state[k, :2])
+        effect = Measured(np.ones(N_RIGID))(system)
+        whole = delayed(system, late) if late.any() else system
+        queue = [e[k - 1 - j, i] for i, n in enumerate(late) for j in range(n)]
+        state = np.r_[e[k], observed[k], queue]
+        moved = whole.A[0] @ state
+        n = len(system.names)
+        moved[:n] += system.G[0] @ channels[k] + effect.columns[0] @ (added + seen_plan)[k]
+        after = np.r_[e[k + 1], observed[k + 1], [e[k - j, i] for i, n_late in enumerate(late) for j in range(n_late)]]
+        off = after - moved
+        assert_allclose(off[N_RIGID:], 0.0, atol=1e-12)
+        accelerations = inverse @ off[[1, 2, 4]]
+        remains = off[[0, 3]] - model.columns[[0, 3]] @ accelerations
+        assert np.all(np.abs(np.r_[accelerations, remains]) <= widened[[0, 1, 2, 5, 6]] + 1e-9)
+
+
+def queued(columns, late):
+    """Each column so many steps late, a queue at first full of its first sample."""
+    rows = [np.concatenate((np.repeat(c[:1], n), c[: len(c) - n])) for c, n in zip(columns.T, late, strict=True)]
+    return np.column_stack(rows)
+
+
+def pad(rigid):
+    """The error of the pitch rate alone, which the filter sees."""
+    whole = np.zeros((len(rigid), N_STATES))
+    whole[:, PITCH_RATE] = rigid[:, PITCH_RATE]
+    return whole
+
+
+def problem_at(design, model, altitude, velocity):
+    S = np.empty(N_STATES * (N_STATES + 2))
+    schedule(design.polytope.data(), altitude, velocity, S)
+    A, B = np.split(S.reshape(N_STATES, -1), [N_STATES], axis=1)
+    return error_system(A[None], B[None], design.feedback_gain, model.notch, model.columns)
+
+
+def test_less_than_the_largest_noise_is_passed_now_and_then(subject, plan):
+    scenario = load_scenario("case1", DECLARED["fine"])
+    history = fly(assemble_flight(scenario, subject.design)).history
+    bound = sensors(sensor_data(scenario.parameters(), subject.design.period), plan)["sensor noise"].error
+    beyond = np.abs(history.estimate - history.state)[:, :N_RIGID] > bound
+    assert 0.5 / 370 < beyond.mean() < 2.0 / 370
+
+
+def test_what_has_no_bound_is_said(subject):
+    scenario = load_scenario("case1", {"sensors.altitude.drop_out": "1 %", "estimator.enabled": True})
+    assert declared(subject, scenario) == ({}, ["drop-out of a sensor", "estimator"])
+
+
+def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
+    changes = {
+        "wind": {"up": "-3 ft/s"},
+        "turbulence": {"sigma_up": "1 ft/s"},
+        "gust": {"starts": ["10 s", "20 s"], "up": ["5 ft/s", "-2 ft/s"], "lengths": ["700 ft", "700 ft"]},
+        "density": {"offset": "-2 %", "sigma": "1 %"},
+    }
+    models, _ = declared(subject, load_scenario("case1", changes))
+    found = {name: model(problem.system).half_width.tolist() for name, model in models.items()}
+    assert found["wind"] == pytest.approx([0.0, 3 * 0.3048, 0.0])
+    assert found["gusts"] == pytest.approx([0.0, 7 * 0.3048, 0.0])
+    assert found["turbulence"] == pytest.approx([0.0, REACH * 0.3048, 0.0])
+    assert found["density"] == pytest.approx([0.0, 0.0, 0.05])

@@ -27,32 +27,54 @@ def certify(
     gust: Annotated[str, typer.Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
     turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
     density: Annotated[str, typer.Option(help="Largest difference of the density from the model's.")] = "0 %",
+    scenario: Annotated[
+        str, typer.Option(help="Also the actuators, sensors and air of this scenario, by name or path.")
+    ] = "",
+    reach: Annotated[
+        float, typer.Option(help="Standard deviations that bound noise and turbulence; 8.572 is beyond all of ours.")
+    ] = 3.0,
     json: JsonOption = False,
 ) -> None:
     """Say whether a design stays certified with hardware and air, and by how much; fails where it does not.
 
     Each model is added to the disturbances of the certificate alone, and then all of them. The tube's invariant set is
-    sought anew, and the nominal plan has to fit into what it leaves of the inputs.
+    sought anew, and the nominal plan has to fit into what it leaves of the inputs. Of actuators the last line says
+    whether their limits act in that set. Of a scenario it is also said what the certificate as it is does not cover.
 
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
     from hsv.cli.progress import stages
-    from hsv.design.verification.effects import certified_with, described
+    from hsv.design.verification.effects import certified_with, declared, declared_actuators, described
     from hsv.design.verification.verifier import load_subject
+    from hsv.simulation.coverage import uncovered_of
+    from hsv.simulation.scenario import load_scenario
 
     subject = load_subject(file)
-    models = described(subject, sensors=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density)
+    models, unbounded = described(
+        subject, sensor_set=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density, reach=reach
+    )
+    uncovered: list[str] = []
+    if scenario:
+        loaded = load_scenario(scenario)
+        uncovered = uncovered_of(loaded, subject.design, subject.certificate)
+        own, further = declared(subject, loaded, reach)
+        models, unbounded = models | own, unbounded + further
+        actuators = actuators or declared_actuators(loaded)
     with stages() as progress:
-        verdicts = certified_with(subject, models, actuators, progress)
+        verdicts = certified_with(subject, models, actuators, progress, unbounded)
     if json:
-        print_json({"design": subject.design.name, "verdicts": [verdict.as_dict() for verdict in verdicts]})
+        found = {"verdicts": [verdict.as_dict() for verdict in verdicts], "not_covered": uncovered}
+        print_json({"design": subject.design.name, **found})
     else:
+        for thing in uncovered:
+            console.print(f"not covered as it is: {thing}", soft_wrap=True)
         console.print(_table(verdicts))
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"
             console.print(f"{verdict.name}: {state}, {verdict.said}", soft_wrap=True)
-    if not verdicts[-1].certified:
-        report_error(f"{subject.design.name}: not certified with {verdicts[-1].name}: {verdicts[-1].said}")
+    last = next((verdict for verdict in reversed(verdicts) if not verdict.certified), None)
+    if last:
+        report_error(f"{subject.design.name}: not certified with {last.name}: {last.said}")
         raise typer.Exit(1)
 
 

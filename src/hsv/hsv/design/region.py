@@ -115,16 +115,25 @@ def actuator_parameters(inputs: DesignInputs) -> dict[str, Any]:
 
 
 class Region:
-    """The flights of a design over ``share`` of its declared region: of fault and parameter bounds (paper eq. 47)."""
+    """The flights of a design over ``share`` of its declared region: of fault and parameter bounds (paper eq. 47).
 
-    def __init__(self, design: ControlDesign, inputs: DesignInputs, share: float) -> None:
-        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share)})
+    ``equipment``: flat parameters of what else is not ideal.
+    """
+
+    def __init__(
+        self, design: ControlDesign, inputs: DesignInputs, share: float, equipment: Mapping[str, Any] | None = None
+    ) -> None:
+        self._parts = assemble({**design.to_parameters(), **region_parameters(inputs, share), **(equipment or {})})
         self.share = share
         self._bounds = inputs.flown_vehicle.uncertainty
 
     def corners(self) -> list[dict[str, float]]:
         """Return the nominal vehicle and every corner of the region."""
         return corners(self._bounds, self.share)
+
+    def screening(self) -> list[Corner]:
+        """Return the nominal vehicle and 32 corners."""
+        return screening_corners(self._bounds, self.share)
 
     def fraction(self) -> list[dict[str, float]]:
         """Return the nominal vehicle and a quarter of the corners."""

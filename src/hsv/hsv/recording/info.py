@@ -35,7 +35,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
-        entry per interval of a channel), ``equipment`` (what of sensors, effectors and air is not ideal, SI),
+        entry per interval of a channel), ``equipment`` (what of sensors, links, effectors and air is not ideal, SI),
         ``saturation``, ``tube`` and ``not_covered`` (what of the flight the certificate of its design does not cover,
         in words); the last six are None without the topic that tells, and the last without parameters. Times are
         simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
