@@ -18,6 +18,7 @@ from hsv.graph.description import (
     LATCHED_TOPICS,
     NOMINAL_TRAJECTORY,
     OTHER_TOPICS,
+    PLANT,
     RECORDER,
     RECORDER_PROGRESS,
     STATE,
@@ -27,6 +28,7 @@ from hsv.graph.description import (
     step_topics,
 )
 from hsv.graph.infrastructure_parameters import RECORDER_PARAMETERS
+from hsv.noise import SEED_PARAMETER
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
@@ -143,8 +145,9 @@ class RecorderNode(PeerNode):
         design = values[(NOMINAL_TRAJECTORY if flown.foreign else flown).name]
         for name, text in recorded_files(values, design).items():
             self._attach(name, text.encode())
+        seed = values[PLANT.name][SEED_PARAMETER.name]
         self.bag.add_custom_data(
-            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), digest(design))}
+            {"run_id": run.run_id, **provenance(self.controller, design.get("design.name", ""), digest(design), seed)}
         )
 
     def _attach(self, name: str, data: bytes) -> None:

@@ -14,6 +14,7 @@ from hsv.campaign.sample_runner import Outcome
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
 from hsv.control.design_file import find_design, read_parameters
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.errors import CampaignError, ControllerError
 from hsv.graph.description import TUBE_STATUS
 from hsv.simulation.trust import require_path_inside
@@ -68,8 +69,10 @@ def replay_over_dds(
     """
     from hsv.graph.flight import fly_graph
     from hsv.graph.preparation import prepare
+    from hsv.recording.equipment import equipment_topics, measurement_errors
     from hsv.recording.flight import flight_data, flight_fingerprint
     from hsv.recording.reader import Bag
+    from hsv.recording.steps import joined
 
     row, runner = results.row(flight), results.sample_runner
     require_design(results)
@@ -80,8 +83,13 @@ def replay_over_dds(
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
     repeated = runner.outcome(data, flight_fingerprint(recorded))
-    if repeated["tube_level"] is not None:
-        # What the controller itself published, not what is computed from its messages.
+    told = not (
+        measurement_errors(joined(recorded, equipment_topics(recorded)))
+        or prepared.scenario.equipment.get(ESTIMATOR_ENABLED.name)
+    )
+    if repeated["tube_level"] is not None and told:
+        # What the controller itself published, not what is computed from its messages. It is that of the state it is
+        # given: of the true one, which a campaign keeps, only where it is told the truth.
         repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
     return ReplayedFlight(flight, _outcome(row), repeated, bag)
 

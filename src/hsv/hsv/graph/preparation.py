@@ -136,7 +136,9 @@ def prepare(
                 "run_id": run_id,
                 "scenario": scenario.name,
                 "title": scenario.title,
-                **provenance(scenario.controller, scenario.design, design.digest if design else digest({})),
+                **provenance(
+                    scenario.controller, scenario.design, design.digest if design else digest({}), scenario.seed
+                ),
             }.items()
         ],
     }
@@ -161,8 +163,8 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
     return tuple(node for node in nodes if node.executable)
 
 
-def provenance(controller: str, name: str, design_hash: str) -> dict[str, str]:
-    """Return what a bag says of where its flight comes from: controller, design with its ``name``, and when: now."""
+def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[str, str]:
+    """Return what a bag says of where its flight comes from: controller, design with its ``name``, seed, and when."""
     library = library_digest(controller)
     return {
         "commit": commit(),
@@ -170,7 +172,7 @@ def provenance(controller: str, name: str, design_hash: str) -> dict[str, str]:
         **({"controller_sha256": library} if library else {}),
         "design": name,
         "design_hash": design_hash,
-        "seed": "none",
+        "seed": str(seed),
         "started": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
     }
 
