@@ -29,6 +29,8 @@ def test_the_flight_of_the_certificate_is_covered():
         ({"sensors.altitude.random_walk": "1 ft/s^0.5"}, ["sensors.altitude: random walk; "]),
         ({"wind.up": "3 ft/s"}, ["wind.up: 3 ft/s; the certificate is for still air"]),
         ({"density.offset": "-2 %"}, ["density.offset: -0.02; the certificate is for the model's density"]),
+        ({"link.command.loss": "2 %", "link.command.burst": 3}, ["link.command: loss 0.02; the certificate is for an"]),
+        ({"link.computational_delay": "7 ms"}, ["link: computational delay 0.007 s; "]),
         ({"estimator.enabled": True}, ["estimator: "]),
         ({"vehicle.coupling": "derived"}, ["vehicle.coupling: derived; the certificate is for paper_like"]),
         ({"vehicle.perturbation.mass": "12 %"}, ["vehicle.perturbation.mass: 12 %; the certificate is for 10 % at"]),

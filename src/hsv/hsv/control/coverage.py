@@ -1,8 +1,8 @@
 """What a flight has that the certificate of its design does not cover, named: vehicle, hardware, air, law, faults.
 
-A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors, still
-air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What else a flight
-declares may be survived, and may even be certified with (``hsv certify``), but this certificate does not say so.
+A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors and links,
+still air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What else a
+flight declares may be survived, and may even be certified with (``hsv certify``), but this certificate does not say so.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import flown_sections
+from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.parameters import Parameter, check_all
 from hsv.sensors import FIELDS, SENSOR_PARAMETERS, sensor_data
 from hsv.units import to_paper
@@ -24,7 +25,15 @@ from hsv.vehicle.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 from hsv.vehicle.vehicle import Vehicle
 
-HARDWARE_PARAMETERS = (*ACTUATOR_PARAMETERS, *ATMOSPHERE_PARAMETERS, *SENSOR_PARAMETERS, ESTIMATOR_ENABLED)
+_LINK_PARAMETERS = (*MEASUREMENT_LINK_PARAMETERS, *COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER)
+
+HARDWARE_PARAMETERS = (
+    *ACTUATOR_PARAMETERS,
+    *ATMOSPHERE_PARAMETERS,
+    *SENSOR_PARAMETERS,
+    *_LINK_PARAMETERS,
+    ESTIMATOR_ENABLED,
+)
 """The hardware that a flight declares."""
 
 _LAW = "tube_mpc"
@@ -36,18 +45,21 @@ _SENSOR_DATA = {"random_walk": "walk", "lag": "lag_decay"}
 _SENSOR_TIMES = ("drift_time",)
 """Fields that are nothing by themselves."""
 
+_LINK_DETAILS = ("burst", "checksum")
+"""Of links: what is nothing without a loss or a corruption."""
+
 _SHAPING = ("shear_altitude", "length", "length_forward", "length_up", "lengths", "stays", "starts")
 """Of air: what is nothing without a velocity or a density."""
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return what of actuators, sensors, air and estimator in flat parameters the certificate of ``design`` has not.
+    """Return what of actuators, sensors, links, air and estimator in flat parameters the certificate of ``design`` has not.
 
     Raises:
         ParameterError: A wrong value, named.
     """
     v = check_all(HARDWARE_PARAMETERS, values)
-    found = [*_actuators(v, design), *_sensors(v, design.period), *_air(v, design.period)]
+    found = [*_actuators(v, design), *_sensors(v, design.period), *_links(v), *_air(v, design.period)]
     if v[ESTIMATOR_ENABLED.name]:
         found.append("estimator: the certificate has none in the loop")
     return found
@@ -185,6 +197,15 @@ def _sensors(v: Mapping[str, Any], period: float) -> Iterator[str]:
             said.append("the error of the pitch angle")
         if said:
             yield f"sensors.{channel}: {', '.join(said)}{of}; the certificate is for an ideal one"
+
+
+def _links(v: Mapping[str, Any]) -> Iterator[str]:
+    for parameter in _LINK_PARAMETERS:
+        where, _, name = parameter.name.rpartition(".")
+        value = v[parameter.name]
+        if value and name not in _LINK_DETAILS:
+            unit = f" {parameter.unit}" if parameter.unit else ""
+            yield f"{where}: {name.replace('_', ' ')} {value:g}{unit}; the certificate is for an ideal one"
 
 
 def _air(v: Mapping[str, Any], period: float) -> Iterator[str]:
