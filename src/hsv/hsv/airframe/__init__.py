@@ -1,0 +1,1 @@
+"""The airframe as it is drawn: published geometry, bent by its two modes, with elevator and flame."""
