@@ -78,6 +78,7 @@ def _input(title: str, unit: str, field: str) -> Panel:
     curves = (
         Curve(Kind.actual, "command", COMMAND, (field,)),
         Curve(Kind.actuator, "actuator", ACTUATOR, (field,)),
+        Curve(Kind.nominal, "nominal", NOMINAL, (f"reference_input.{field}", f"input.{field}")),
         Curve(Kind.reference, "reference", NOMINAL, (f"reference_input.{field}",)),
     )
     return Panel(field, title, unit, "inputs", curves, shading=field)

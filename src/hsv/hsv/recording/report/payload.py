@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from hsv.airframe import side_view
 from hsv.recording.report.curves import DrawnCurve
 from hsv.recording.report.events import Event
 from hsv.recording.report.panels import Kind, Panel
 from hsv.recording.report.run import ReportedRun
-from hsv.recording.report.text import unit_html
+from hsv.recording.report.text import unit_html, words
 from hsv.units import to_paper
 
 _COMMON = (Kind.reference, Kind.bound)
@@ -53,11 +54,25 @@ def payload(runs: Sequence[ReportedRun]) -> tuple[dict[str, Any], str]:
     numbers = Numbers()
     panels = [_panel(panel, runs, numbers) for panel in all_panels(runs)]
     described = {
-        "runs": [{"label": run.label, "end": run.duration} for run in runs],
+        "runs": [{"label": run.label, "end": run.duration, "faults": _faults(run)} for run in runs],
+        "airframe": side_view.geometry(),
         "panels": panels,
         "lengths": numbers.lengths,
     }
     return described, numbers.packed()
+
+
+def _faults(run: ReportedRun) -> list[dict[str, Any]]:
+    """Return what failed when, in words that name no number: the list of events has those."""
+    return [
+        {
+            "channel": fault["channel"],
+            "text": f"{words(fault['channel'])}: {words(fault['type'])}",
+            "from": fault["start_s"],
+            "to": run.duration if fault["end_s"] is None else fault["end_s"],
+        }
+        for fault in run.description["faults"] or ()
+    ]
 
 
 def all_panels(runs: Sequence[ReportedRun]) -> list[Panel]:

@@ -55,7 +55,9 @@ async function start() {
     const script = document.createElement("script");
     script.textContent = new TextDecoder().decode(library);
     document.head.append(script);
-    const charts = new Charts(JSON.parse(document.getElementById("plots").textContent), numbers);
+    const plots = JSON.parse(document.getElementById("plots").textContent);
+    const charts = new Charts(plots, numbers);
+    charts.player = new Player(charts, plots);
     connect(charts);
     preparePrinting(charts);
     window.report = charts;

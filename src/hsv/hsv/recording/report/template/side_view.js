@@ -5,7 +5,8 @@
    `geometry` is that of hsv.airframe.side_view. A sample holds SI and radians: {time, altitude, velocity,
    angle_of_attack, pitch_angle, elastic: [eta_1, eta_2], fuel_equivalence_ratio, elevator_deflection,
    faults: [{channel, text}], nominal: the same keys, or nothing}. Angles are drawn as they are, only the bending is
-   exaggerated. The colours are those of the page: --ink, --muted, --paper, --panel, --line, --good, --bad, --run0, --run1. */
+   exaggerated. The colours are those of the page: --ink, --muted, --paper, --panel, --line, --good, --bad, --run0, --run1; that of
+   the vehicle is --own, where the element has it. */
 
 function createSideView(element, geometry) {
   const SIZE = { width: 640, height: 300 };
@@ -56,7 +57,7 @@ function createSideView(element, geometry) {
   const ghostBody = node("path", {}, ghost), ghostEngine = node("path", {}, ghost), ghostElevator = node("path", {}, ghost);
   const flame = node("path", { style: `fill:url(#hot-${identity})` }, svg);
   const engine = node("path", { style: "fill:var(--muted);stroke:var(--ink);stroke-width:1" }, svg);
-  const body = node("path", { style: "fill:var(--run0);fill-opacity:.28;stroke:var(--ink);stroke-width:1.5;stroke-linejoin:round" }, svg);
+  const body = node("path", { style: "fill:var(--own, var(--run0));fill-opacity:.28;stroke:var(--ink);stroke-width:1.5;stroke-linejoin:round" }, svg);
   const axis = node("path", { style: "fill:none;stroke:var(--run0);stroke-width:1;stroke-dasharray:9 3 2 3" }, svg);
   const elevator = node("path", { style: "stroke-width:1.3;stroke-linejoin:round" }, svg);
   const path = node("line", { style: `stroke:var(--good);stroke-width:2;${arrow}` }, svg);
@@ -74,7 +75,7 @@ function createSideView(element, geometry) {
 
   const list = document.createElement("dl");
   list.className = "readout";
-  list.style.cssText = "display:grid;grid-template-columns:repeat(auto-fit,minmax(8rem,1fr));gap:.35rem 1rem;margin:.5rem 0;font-variant-numeric:tabular-nums";
+  list.style.cssText = "display:grid;grid-template-columns:repeat(auto-fit,minmax(7rem,1fr));gap:.35rem 1rem;margin:.5rem 0;font-variant-numeric:tabular-nums";
   element.append(list);
   const readout = {};
   for (const [key, name] of [["altitude", "altitude h"], ["velocity", "velocity V"], ["angle", "angle of attack α"],
