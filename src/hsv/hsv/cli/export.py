@@ -17,13 +17,17 @@ def export(
     csv: Annotated[bool, typer.Option("--csv", help="A folder of CSV files, one per topic.")] = False,
     parquet: Annotated[bool, typer.Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
     npz: Annotated[bool, typer.Option("--npz", help="One .npz file.")] = False,
+    scene: Annotated[
+        bool,
+        typer.Option("--scene", help="One MCAP file: the bag, with the vehicle in 3-D for Foxglove and Lichtblick."),
+    ] = False,
     topic: Annotated[
         list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
     ] = None,
     out: Annotated[Path | None, typer.Option(help="What to write; default: beside the bag, named after it.")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write the topics of a bag as tables with field names and units in the header (SI).
+    """Write the topics of a bag as tables with field names and units in the header (SI), or the bag with pictures.
 
     Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
     """
@@ -33,9 +37,19 @@ def export(
     from hsv.recording.reader import Bag
 
     chosen = [form for form, wanted in zip(tables.Format, (csv, parquet, npz), strict=True) if wanted]
-    if len(chosen) != 1:
-        raise ParameterError("format: expected one of --csv, --parquet and --npz")
+    if len(chosen) + scene != 1:
+        raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene")
     opened = Bag(bag)
+    if scene:
+        if topic:
+            raise ParameterError("topic: expected with a table, --scene holds every topic")
+        from hsv.recording.scene import scene_path, write_scene
+
+        out = out or scene_path(opened)
+        write_scene(opened, out)
+        print_written([out], json)
+        print_bag_warnings(opened)
+        return
     if out is None:
         home = opened.folder.absolute()
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")

@@ -30,12 +30,15 @@ def view(
 ) -> None:
     """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
 
+    Foxglove and Lichtblick show the vehicle in 3-D: they open a copy with pictures, in the folder scene of the bag.
+
     Example: hsv view bags/case1_20260101T000000Z --with plotjuggler
     """
     import subprocess
 
     from hsv.errors import RecordingError
     from hsv.recording.reader import Bag
+    from hsv.recording.scene import scene_of
     from hsv.recording.viewers import VIEWERS, layout_for
 
     opened = Bag(bag)
@@ -49,6 +52,8 @@ def view(
         found = viewer.program()
         if found:
             made = layout_for(opened, viewer.layout) if viewer.layout else None
+            if viewer.scene:
+                mcap = scene_of(opened).absolute()
             command = [found, *viewer.arguments(mcap, made)]
             subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
             layout = str(made) if viewer.imports else None

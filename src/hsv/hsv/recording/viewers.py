@@ -32,6 +32,8 @@ class Viewer:
     """Whether the layout has to be imported in the program by hand."""
     source: str
     """Where to get it."""
+    scene: bool = False
+    """Whether it draws the vehicle in 3-D, from a file that the bag is copied to."""
 
     def program(self) -> str | None:
         """Return the path of the program, None if it is not installed."""
@@ -78,6 +80,7 @@ VIEWERS = {
         "foxglove.json",
         True,
         "https://foxglove.dev/download",
+        scene=True,
     ),
     "lichtblick": Viewer(
         "Lichtblick",
@@ -86,6 +89,7 @@ VIEWERS = {
         "foxglove.json",
         True,
         "https://github.com/lichtblick-suite/lichtblick/releases",
+        scene=True,
     ),
     "plotjuggler": Viewer(
         "PlotJuggler",
