@@ -4,12 +4,16 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 
+import numpy as np
 import pytest
 from recorded_flight import message_types
 from rosbags.typesys.store import Typestore
 
-from hsv.graph.description import TOPICS, resolved
+from hsv.airframe.pose import Sample, transforms
+from hsv.airframe.scene import SCENE_TOPIC
+from hsv.graph.description import MARKERS, TOPICS, resolved
 from hsv.recording.fields import fields_of
+from hsv.recording.overview import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, PARTS, STATES, overview_message
 from hsv.recording.viewers import LAYOUTS
 
 RECORDED = {resolved(role): kind for role, kind in TOPICS.items()} | {
@@ -18,7 +22,7 @@ RECORDED = {resolved(role): kind for role, kind in TOPICS.items()} | {
 }
 PATH = re.compile(r"(/[A-Za-z_]\w*)+(\.[A-Za-z_]\w*(\[\d+\])?)+")
 """Message paths of Foxglove without quotes, filters and slices."""
-PANELS = {"Plot", "Tab", "RosOut", "DiagnosticSummary", "RawMessages"}
+PANELS = {"3D", "Plot", "StateTransitions", "Tab", "RosOut", "DiagnosticSummary", "RawMessages"}
 """Types of panels in Foxglove and in Lichtblick."""
 PLOTJUGGLER_TYPE = re.compile(r"[a-zA-Z]\w*(/[a-zA-Z]\w*)?(\[\d*\])?")
 """Types that PlotJuggler's parser reads: it takes a bounded sequence for one number, and what follows for garbage."""
@@ -34,11 +38,21 @@ def foxglove():
     return json.loads((LAYOUTS / "foxglove.json").read_text())
 
 
-def curves_of_foxglove():
-    for panel in foxglove()["configById"].values():
-        for path in panel.get("paths", ()):
+def panels_of_foxglove(kind):
+    return [panel for name, panel in foxglove()["configById"].items() if name.startswith(f"{kind}!")]
+
+
+def paths_of_foxglove(kind):
+    for panel in panels_of_foxglove(kind):
+        for path in panel["paths"]:
             topic, _, field = path["value"].partition(".")
-            yield topic, field.split("."), panel["title"]
+            yield topic, field.split("."), panel.get("title")
+
+
+def curves_of_foxglove():
+    """Yield the curves of plots that draw recorded topics alone: the others need what a scene adds."""
+    beside = {title for topic, _, title in paths_of_foxglove("Plot") if topic == OVERVIEW_TOPIC}
+    return (curve for curve in paths_of_foxglove("Plot") if curve[2] not in beside)
 
 
 def curves_of_plotjuggler():
@@ -86,6 +100,42 @@ def test_names_of_plotjuggler_are_those_that_its_parser_makes(types):
     made = {name for topic, kind in TOPICS.items() for name in series(kind, resolved(topic))}
     root = ElementTree.parse(LAYOUTS / "plotjuggler.xml").getroot()
     assert {curve.attrib["name"] for curve in root.iter("curve")} <= made
+
+
+def test_what_a_scene_adds_is_drawn_and_has_the_fields_that_are(types):
+    drawn = [curve for curve in paths_of_foxglove("Plot") if curve not in list(curves_of_foxglove())]
+    assert {topic for topic, *_ in drawn} == {"/hsv/state", OVERVIEW_TOPIC}
+    message = json.loads(overview_message(np.arange(5.0), [0.0] * 5, [1.0] * 5, []))
+    for topic, path, title in drawn:
+        assert UNIT.search(title), title
+        if topic == OVERVIEW_TOPIC:
+            part, field = path
+            assert isinstance(message[part][field], float)
+            assert OVERVIEW_SCHEMA["properties"][part]["properties"][field] == {"type": "number"}
+        else:
+            assert path[0] in {field.name for field in fields_of(types.fielddefs, RECORDED[topic])}
+    assert {tuple(path) for topic, path, _ in drawn if topic == OVERVIEW_TOPIC} == {
+        (part, field) for part in PARTS for field in STATES
+    }
+
+
+def test_states_that_change_are_texts_and_booleans_of_messages(types):
+    for topic, path, _ in paths_of_foxglove("StateTransitions"):
+        if topic == OVERVIEW_TOPIC:
+            assert OVERVIEW_SCHEMA["properties"][path[0]] == {"type": "string"}
+        else:
+            name, _, index = path[0].partition("[")
+            [field] = [field for field in fields_of(types.fielddefs, RECORDED[topic]) if field.name == name]
+            assert field.format == "?" and bool(index) == (field.count != "one")
+
+
+def test_the_vehicle_is_drawn_in_the_frames_and_on_the_topics_that_there_are():
+    [panel] = panels_of_foxglove("3D")
+    frames = {end for transform in transforms(Sample(*[0.0] * 6)) for end in (transform.parent, transform.child)}
+    assert {name.removeprefix("frame:") for name in panel["transforms"]} == frames
+    assert panel["followTf"] in frames and panel["followMode"] in ("follow-pose", "follow-position", "follow-none")
+    assert all(layer["frameId"] in frames for layer in panel["layers"].values())
+    assert set(panel["topics"]) == {SCENE_TOPIC, resolved(MARKERS)}
 
 
 def test_paths_and_panels_of_foxglove_are_in_its_grammar():

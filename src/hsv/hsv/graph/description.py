@@ -34,6 +34,8 @@ RECORDER_PROGRESS = "hsv/recorder_progress"
 DIAGNOSTICS = "diagnostics"
 ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
+MARKERS = "hsv/airframe"
+"""What the airframe node publishes for RViz2; no node of the graph knows of it, and no bag holds it."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 

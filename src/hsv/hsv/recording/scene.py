@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from heapq import merge
 from pathlib import Path
 
@@ -16,9 +17,9 @@ from hsv.recording.columns import Columns
 from hsv.recording.equipment import effectors, equipment_topics
 from hsv.recording.flight import input_columns, state_columns
 from hsv.recording.metadata import CUSTOM_DATA
+from hsv.recording.overview import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, OVERVIEW_TYPE, overview_message
 from hsv.recording.reader import Bag
 from hsv.recording.steps import joined
-from hsv.recording.tube_band import TUBE_SCHEMA, TUBE_TOPIC, TUBE_TYPE, tube_message
 from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
 
 Message = tuple[int, str, bytes]
@@ -87,8 +88,8 @@ def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
         schema = message.get_schema()
         number = writer.register_schema(schema.name, schema.encoding, schema.data)
         channels[name] = writer.register_channel(name, "protobuf", number)
-    number = writer.register_schema(TUBE_TYPE, "jsonschema", TUBE_SCHEMA)
-    channels[TUBE_TOPIC] = writer.register_channel(TUBE_TOPIC, "json", number)
+    number = writer.register_schema(OVERVIEW_TYPE, "jsonschema", json.dumps(OVERVIEW_SCHEMA).encode())
+    channels[OVERVIEW_TOPIC] = writer.register_channel(OVERVIEW_TOPIC, "json", number)
     return channels
 
 
@@ -108,10 +109,13 @@ def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
     tube = columns.get(TUBE_STATUS, Columns())
     centre, half = (tube.get(name, [()] * len(stamps)) for name in ("tube_centre", "tube_half_width"))
 
+    active = columns[ACTUATOR]["active"]
+
     found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0]).encode())]
     due = stamps[0]
     for row, stamp in enumerate(stamps):
-        found.append((stamp, TUBE_TOPIC, tube_message(nominal[row], centre[row], half[row])))
+        faults = [(fault["channel"], fault["type"]) for fault in active[row]]
+        found.append((stamp, OVERVIEW_TOPIC, overview_message(nominal[row], centre[row], half[row], faults)))
         if stamp >= due and np.isfinite(drawn[row]).all():
             message = frame_transforms(Sample(*drawn[row].tolist()), stamp, exaggeration)
             found.append((stamp, TRANSFORMS_TOPIC, message.encode()))
