@@ -28,6 +28,7 @@ setup(
         "cvxpy",
         "dask",
         "distributed",
+        "foxglove-sdk",
         "jinja2",
         "lz4",
         "markupsafe",

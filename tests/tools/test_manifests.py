@@ -16,8 +16,8 @@ KEYS = {name: f"python3-{name}" for name in ("jinja2", "matplotlib", "numba", "n
 KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 """By imported module: its key in rosdep."""
 
-WITHOUT_KEY = {"cvxpy", "dask", "distributed", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow", "rosbags"}
-WITHOUT_KEY |= {"llvmlite", "tomli_w", "zstandard"}
+WITHOUT_KEY = {"cvxpy", "dask", "distributed", "foxglove", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow"}
+WITHOUT_KEY |= {"llvmlite", "rosbags", "tomli_w", "zstandard"}
 """Modules for which rosdep has no key of a Debian package; docs/installation.md names them, pip installs them."""
 
 

@@ -8,6 +8,7 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/hsv_bringup"]),
         ("share/hsv_bringup", ["package.xml"]),
         ("share/hsv_bringup/launch", ["launch/sil.launch.py"]),
+        ("share/hsv_bringup/urdf", ["urdf/airframe.urdf"]),
     ],
     zip_safe=False,
     maintainer="HSV bench maintainers",
@@ -16,6 +17,7 @@ setup(
     license="Apache-2.0",
     entry_points={
         "console_scripts": [
+            "airframe = hsv_bringup.airframe:main",
             "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
             "fault = hsv_bringup.fault:main",

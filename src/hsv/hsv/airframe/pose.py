@@ -82,10 +82,8 @@ def transforms(sample: Sample, exaggeration: float | None = None) -> list[Transf
     ]
     for mode, (name, stations) in enumerate(segments(frame).items()):
         found += _chain(frame, name, stations, elastic[mode])
-    known = composed(found, BODY)
-    inlet = _fixed(frame, frame.inlet, frame.engine_roof, known)
-    nozzle = _fixed(frame, frame.nozzle, frame.engine_roof, known)
-    found.append(Transform(BODY, ENGINE, inlet.x, inlet.z, math.atan2(inlet.z - nozzle.z, inlet.x - nozzle.x)))
+    # At the clamp of both beams.
+    found.append(Transform(BODY, ENGINE, frame.inlet, frame.engine_roof))
     hinge_x, hinge_z = frame.elevator_hinge
     name, origin = segment_at(frame, hinge_x)
     # Positive: trailing edge down, which is nose up for the elevator itself.
@@ -129,9 +127,3 @@ def _chain(frame: Airframe, name: str, stations: np.ndarray, coordinate: float) 
         found.append(Transform(parent, child, at, 0.0, float(turn) - before))
         parent, at, before = child, float(length), float(turn)
     return found
-
-
-def _fixed(frame: Airframe, x: float, z: float, known: Mapping[str, Transform]) -> Transform:
-    """Return a point of the unbent body, in the axes of the body, where it is on the bent one."""
-    name, origin = segment_at(frame, x)
-    return Transform(name, "", x - origin, z).after(known[name])

@@ -21,7 +21,7 @@ FLAME_COLOURS: tuple[Colour, ...] = ((1.0, 0.93, 0.6, 0.95), (1.0, 0.66, 0.15, 0
 
 _FLAME_HEIGHTS = (0.85, 0.6, 0.3)
 """Of the flame's pieces, in heights of the engine."""
-_SUNK = 0.25
+_SUNK = 0.8
 """Metres by which the engine reaches into the body, so that no gap opens when the body bends."""
 
 

@@ -62,7 +62,7 @@ def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> No
             writer = Writer(stream, compression=CompressionType.ZSTD)
             writer.start(profile="ros2")
             channels = _channels(writer, bag)
-            recorded = [((time, topic, data) for time, data in bag.messages(topic)) for topic in bag.topics]
+            recorded = [[(time, topic, data) for time, data in bag.messages(topic)] for topic in bag.topics]
             for time, topic, data in merge(pictures, *recorded, key=lambda message: message[0]):
                 writer.add_message(channels[topic], time, data, time)
             for name, data in bag.attachments.items():

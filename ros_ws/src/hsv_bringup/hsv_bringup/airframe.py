@@ -1,0 +1,124 @@
+"""Draws the vehicle beside a running graph, for RViz2: ``ros2 run hsv_bringup airframe``.
+
+It publishes the bent airframe as markers, and its frames on /tf where tf2_msgs is installed. Nobody waits for it: it
+listens best-effort, and is of no graph.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Vector3
+from hsv_msgs.msg import Actuator, VehicleState
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from hsv.airframe.geometry import airframe
+from hsv.airframe.pose import LEVEL, Sample, Transform, composed, transforms
+from hsv.airframe.solids import solids
+from hsv.graph.description import ACTUATOR, MARKERS, STATE
+from hsv.parameters import Parameter
+from hsv_node.main import run_node
+from hsv_node.parameters import declare
+from hsv_node.process import ProcessNode
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # ROS 2 as wheels has no such package
+    TFMessage = None
+
+PARAMETERS = (
+    Parameter("rate", 25.0, "pictures a second of wall time, at most", "1/s", 0.1, 1e3),
+    Parameter(
+        "exaggeration",
+        airframe().exaggeration,
+        "of the bending",
+        "",
+        0.0,
+        airframe().largest_exaggeration,
+        read_only=False,
+    ),
+)
+
+LATEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""What is missed is not drawn."""
+
+
+class AirframeNode(ProcessNode):
+    """Turns the state of a step and what the actuators do into poses of the pieces of the airframe."""
+
+    def __init__(self) -> None:
+        super().__init__("airframe")
+        self._rate = declare(self, PARAMETERS)["rate"]
+        self._drawn_at = float("-inf")
+        self._actuator = Actuator()
+        self._markers = self.create_publisher(MarkerArray, MARKERS, 1)
+        self._tf = TFMessage and self.create_publisher(TFMessage, "/tf", 100)
+        self.create_subscription(Actuator, ACTUATOR, self._on_actuator, LATEST)
+        self.create_subscription(VehicleState, STATE, self._on_state, LATEST)
+        self._solids = [
+            (solid, [Point(x=x, y=y, z=z) for x, y, z in solid.triangles.reshape(-1, 3).tolist()]) for solid in solids()
+        ]
+
+    def _on_actuator(self, actuator: Actuator) -> None:
+        self._actuator = actuator
+
+    def _on_state(self, state: VehicleState) -> None:
+        now = time.monotonic()
+        if now - self._drawn_at < 1.0 / self._rate or state.status == VehicleState.DIVERGED:
+            return
+        self._drawn_at = now
+        sample = Sample(
+            state.angle_of_attack,
+            state.pitch_angle,
+            float(state.elastic_coordinate[0]),
+            float(state.elastic_coordinate[1]),
+            self._actuator.fuel_equivalence_ratio,
+            self._actuator.elevator_deflection,
+        )
+        chain = transforms(sample, self.get_parameter("exaggeration").value)
+        self._markers.publish(self._marker_array(state.header.stamp, chain))
+        if self._tf:
+            self._tf.publish(TFMessage(transforms=[_stamped(state.header.stamp, transform) for transform in chain]))
+
+    def _marker_array(self, stamp: object, chain: Sequence[Transform]) -> MarkerArray:
+        # All in one frame, so that they are drawn where there is no /tf.
+        frames = composed(chain)
+        header = Header(stamp=stamp, frame_id=LEVEL)
+        markers = []
+        for number, (solid, points) in enumerate(self._solids):
+            red, green, blue, alpha = solid.colour
+            at = frames[solid.frame]
+            markers.append(
+                Marker(
+                    header=header,
+                    ns=solid.name,
+                    id=number,
+                    type=Marker.TRIANGLE_LIST,
+                    action=Marker.ADD,
+                    pose=Pose(position=Point(x=at.x, z=at.z), orientation=_quaternion(at)),
+                    scale=Vector3(x=1.0, y=1.0, z=1.0),
+                    color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+                    points=points,
+                )
+            )
+        return MarkerArray(markers=markers)
+
+
+def _stamped(stamp: object, transform: Transform) -> TransformStamped:
+    message = TransformStamped(header=Header(stamp=stamp, frame_id=transform.parent), child_frame_id=transform.child)
+    message.transform.translation = Vector3(x=transform.x, z=transform.z)
+    message.transform.rotation = _quaternion(transform)
+    return message
+
+
+def _quaternion(transform: Transform) -> Quaternion:
+    x, y, z, w = transform.quaternion
+    return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the node."""
+    return run_node(AirframeNode, "airframe", args)
