@@ -1,0 +1,57 @@
+"""The vehicle drawn beside a running graph: markers where the state says, and a flight that knows nothing of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from node_processes import Processes, short_scenario
+from waiting import wait_until
+
+from hsv.airframe.pose import LEVEL, Sample, composed, transforms
+from hsv.airframe.solids import solids
+from hsv.recording.flight import flight_fingerprint
+from hsv.recording.reader import Bag
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+SEGMENTS = [solid.name for solid in solids() if "body" in solid.name]
+
+
+def messages(path: Path) -> list[dict[str, str]]:
+    """Return what the command has printed, without what it says while it waits and a line that is not whole."""
+    lines = path.read_text().splitlines(keepends=True)
+    return [json.loads(line) for line in lines if line.startswith("{") and line.endswith("\n")]
+
+
+def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Processes) -> None:
+    scenario = short_scenario(processes.folder, duration=2, fault=1)
+    node = processes.start("ros2", "run", "hsv_bringup", "airframe", "--ros-args", "-p", "rate:=5.0")
+    received = processes.folder / "markers"
+    with received.open("w") as output:
+        reader = processes.start("hsv", "topic", "/hsv/airframe", "--json", output=output)
+        ran = processes.run("hsv", "run", scenario, "--bag", "flown", "--real-time-factor", "1", "--no-report")
+        assert ran.returncode in (0, 1), ran.stdout  # so short a flight may settle late
+        wait_until(lambda: len(messages(received)) > 5, [node.pid, reader.pid])
+        processes.stop()
+
+    bag = Bag(processes.folder / "flown")
+    assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
+    state = bag.columns("hsv/state")
+    for message in messages(received):
+        markers = json.loads(message["markers"])
+        assert {marker["header"]["frame_id"] for marker in markers} == {LEVEL}
+        assert [marker["ns"] for marker in markers] == [solid.name for solid in solids()]
+        [row] = np.flatnonzero(state["header.stamp"] == markers[0]["header"]["stamp"])
+        angles = (float(state[name][row]) for name in ("angle_of_attack", "pitch_angle"))
+        frames = composed(transforms(Sample(*angles, *state["elastic_coordinate"][row].tolist(), 0.0, 0.0)))
+        for marker in markers:
+            if marker["ns"] in SEGMENTS:
+                frame, pose = frames[marker["ns"]], marker["pose"]
+                at = [pose["position"][axis] for axis in "xyz"] + [pose["orientation"][axis] for axis in "xyzw"]
+                assert at == pytest.approx([frame.x, 0.0, frame.z, *frame.quaternion], abs=1e-12)
