@@ -4,15 +4,18 @@ import json
 
 import numpy as np
 import pytest
+from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.airframe.pose import Sample, transforms
+from hsv.airframe.pose import BODY, Sample, transforms
 from hsv.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms
 from hsv.airframe.solids import solids
 from hsv.errors import RecordingError
 from hsv.recording.overview import OVERVIEW_TOPIC, overview_message
 from hsv.recording.scene import scene_path, write_scene
+
+ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC, OVERVIEW_TOPIC}
 
 
 @pytest.fixture(scope="module")
@@ -109,3 +112,25 @@ def test_a_file_is_not_written_over(case1_bag, written):
         write_scene(case1_bag, written)
     assert written.read_bytes() == before
     assert scene_path(case1_bag).parent.parent == case1_bag.folder
+
+
+@pytest.mark.viewer
+def test_the_readers_of_foxglove_and_lichtblick_decode_it(case1_bag, written):
+    by_topic = {}
+    for topic, time, message in by_foxglove(written.parent):
+        by_topic.setdefault(topic, []).append((time, message))
+    assert set(by_topic) == {topic for topic in case1_bag.topics if case1_bag.messages(topic)} | ADDED
+    [(_, scene)] = by_topic[SCENE_TOPIC]
+    entities = {entity["id"]: entity for entity in scene["entities"]}
+    frames = {transform.child for transform in transforms(Sample(*[0.0] * 6))}
+    assert {entity["frame_id"] for entity in entities.values()} <= frames
+    for solid in solids():
+        [triangles] = entities[solid.name]["triangles"]
+        points = [[point[axis] for axis in "xyz"] for point in triangles["points"]]
+        np.testing.assert_array_equal(points, solid.triangles.reshape(-1, 3))
+    time, moved = by_topic[TRANSFORMS_TOPIC][-1]
+    state = case1_bag.columns("hsv/state")
+    row = int(np.flatnonzero(state["header.stamp"] == time)[0])
+    [body] = [each for each in moved["transforms"] if each["child_frame_id"] == BODY]
+    assert body["timestamp"] == str(time)
+    assert -2.0 * np.arcsin(body["rotation"]["y"]) == pytest.approx(state["pitch_angle"][row], rel=1e-12)
