@@ -4,6 +4,8 @@ import pytest
 from recorded_flight import record_flight
 from waiting import wait_until
 
+from hsv.recording.scene import scene_path
+
 
 @pytest.fixture(scope="module")
 def bag(tmp_path_factory):
@@ -38,12 +40,55 @@ def test_view_says_how_to_get_a_viewer_where_there_is_none(hsv, bag, monkeypatch
     assert "Rerun" not in hsv("view", str(bag.path), "--with", "plotjuggler").error
 
 
-def test_view_opens_the_viewer_that_is_installed(hsv, bag, monkeypatch, tmp_path):
-    program = tmp_path / "plotjuggler"
-    program.write_text('#!/bin/sh\necho "$@" > "$0.asked"\n')
-    program.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}/bin")
+@pytest.fixture
+def asked(monkeypatch, tmp_path):
+    """Return what installs a program that writes down its arguments, and reads them once it was started."""
+
+    def install(name):
+        program = tmp_path / name
+        program.write_text('#!/bin/sh\necho "$@" > "$0.asked"\n')
+        program.chmod(0o755)
+        monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}/bin")
+
+        def arguments():
+            written = tmp_path / f"{name}.asked"
+            wait_until(lambda: written.exists() and written.read_text())
+            return written.read_text()
+
+        return arguments
+
+    return install
+
+
+def test_view_opens_the_viewer_that_is_installed(hsv, bag, asked):
+    arguments = asked("plotjuggler")
     assert hsv("view", str(bag.path.parent)).code == 0
-    asked = tmp_path / "plotjuggler.asked"
-    wait_until(lambda: asked.exists() and asked.read_text())
-    assert f"--datafile {bag.path}" in asked.read_text() and "plotjuggler.xml" in asked.read_text()
+    assert f"--datafile {bag.path}" in arguments() and "plotjuggler.xml" in arguments()
+
+
+@pytest.mark.parametrize("program", ["foxglove-studio", "lichtblick"])
+def test_view_with_3d_opens_a_copy_with_pictures_that_is_made_once(hsv, bag, asked, program):
+    arguments = asked(program)
+    ran = hsv("view", str(bag.path.parent))
+    scene = scene_path(bag)
+    assert ran.code == 0 and arguments() == f"{scene}\n" and "foxglove.json" in ran.out
+    made = scene.stat().st_mtime_ns
+    assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns == made
+    os.utime(bag.path)
+    assert hsv("view", str(bag.path.parent)).code == 0 and scene.stat().st_mtime_ns > made
+    # It is no bag, and in nobody's way.
+    assert hsv("info", str(bag.path.parent)).code == 0
+
+
+def test_export_of_a_scene_is_of_every_topic(hsv, bag, tmp_path):
+    assert hsv("export", str(bag.path), "--scene", "--out", "scene.mcap").code == 0
+    assert (tmp_path / "scene.mcap").stat().st_size > bag.path.stat().st_size
+    again = hsv("export", str(bag.path), "--scene", "--out", "scene.mcap")
+    assert again.code == 2 and "scene.mcap': exists already, expected a new file" in again.error
+    refused = hsv("export", str(bag.path), "--scene", "--topic", "/hsv/state")
+    assert refused.code == 2 and "topic: expected with a table" in refused.error
+    for wrong, said in (("--csv", "--csv, --parquet, --npz and --scene"), ("--exaggeration=-1", "from 0 to 150")):
+        refused = hsv("export", str(bag.path), "--scene", wrong)
+        assert refused.code == 2 and said in refused.error
+    refused = hsv("export", str(bag.path), "--csv", "--exaggeration", "10")
+    assert refused.code == 2 and "exaggeration: expected with --scene" in refused.error

@@ -46,7 +46,8 @@ def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Pro
     for message in messages(received):
         markers = json.loads(message["markers"])
         assert {marker["header"]["frame_id"] for marker in markers} == {LEVEL}
-        assert [marker["ns"] for marker in markers] == [solid.name for solid in solids()]
+        assert [marker["ns"] for marker in markers] == [*(solid.name for solid in solids()), "label"]
+        assert markers[-1]["text"] == "bending x 40"
         [row] = np.flatnonzero(state["header.stamp"] == markers[0]["header"]["stamp"])
         angles = (float(state[name][row]) for name in ("angle_of_attack", "pitch_angle"))
         frames = composed(transforms(Sample(*angles, *state["elastic_coordinate"][row].tolist(), 0.0, 0.0)))

@@ -8,7 +8,7 @@ from bag_readers import by_foxglove
 from mcap.reader import make_reader
 from recorded_flight import record_flight
 
-from hsv.airframe.pose import BODY, Sample, transforms
+from hsv.airframe.pose import BODY, LEVEL, Sample, transforms
 from hsv.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms
 from hsv.airframe.solids import solids
 from hsv.errors import RecordingError
@@ -123,7 +123,8 @@ def test_the_readers_of_foxglove_and_lichtblick_decode_it(case1_bag, written):
     [(_, scene)] = by_topic[SCENE_TOPIC]
     entities = {entity["id"]: entity for entity in scene["entities"]}
     frames = {transform.child for transform in transforms(Sample(*[0.0] * 6))}
-    assert {entity["frame_id"] for entity in entities.values()} <= frames
+    assert {entity["frame_id"] for entity in entities.values()} <= {LEVEL, *frames}
+    assert [text["text"] for text in entities["label"]["texts"]] == ["bending x 40"]
     for solid in solids():
         [triangles] = entities[solid.name]["triangles"]
         points = [[point[axis] for axis in "xyz"] for point in triangles["points"]]

@@ -17,7 +17,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from hsv.airframe.geometry import airframe
 from hsv.airframe.pose import LEVEL, Sample, Transform, composed, transforms
-from hsv.airframe.solids import solids
+from hsv.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, label, solids
 from hsv.graph.description import ACTUATOR, MARKERS, STATE
 from hsv.parameters import Parameter
 from hsv_node.main import run_node
@@ -70,6 +70,7 @@ class AirframeNode(ProcessNode):
         if now - self._drawn_at < 1.0 / self._rate or state.status == VehicleState.DIVERGED:
             return
         self._drawn_at = now
+        exaggeration = self.get_parameter("exaggeration").value
         sample = Sample(
             state.angle_of_attack,
             state.pitch_angle,
@@ -78,18 +79,17 @@ class AirframeNode(ProcessNode):
             self._actuator.fuel_equivalence_ratio,
             self._actuator.elevator_deflection,
         )
-        chain = transforms(sample, self.get_parameter("exaggeration").value)
-        self._markers.publish(self._marker_array(state.header.stamp, chain))
+        chain = transforms(sample, exaggeration)
+        self._markers.publish(self._marker_array(state.header.stamp, chain, label(exaggeration)))
         if self._tf:
             self._tf.publish(TFMessage(transforms=[_stamped(state.header.stamp, transform) for transform in chain]))
 
-    def _marker_array(self, stamp: object, chain: Sequence[Transform]) -> MarkerArray:
+    def _marker_array(self, stamp: object, chain: Sequence[Transform], text: str) -> MarkerArray:
         # All in one frame, so that they are drawn where there is no /tf.
         frames = composed(chain)
         header = Header(stamp=stamp, frame_id=LEVEL)
         markers = []
         for number, (solid, points) in enumerate(self._solids):
-            red, green, blue, alpha = solid.colour
             at = frames[solid.frame]
             markers.append(
                 Marker(
@@ -100,10 +100,22 @@ class AirframeNode(ProcessNode):
                     action=Marker.ADD,
                     pose=Pose(position=Point(x=at.x, z=at.z), orientation=_quaternion(at)),
                     scale=Vector3(x=1.0, y=1.0, z=1.0),
-                    color=ColorRGBA(r=red, g=green, b=blue, a=alpha),
+                    color=_colour(solid.colour),
                     points=points,
                 )
             )
+        markers.append(
+            Marker(
+                header=header,
+                ns="label",
+                type=Marker.TEXT_VIEW_FACING,
+                action=Marker.ADD,
+                pose=Pose(position=Point(z=LABEL_HEIGHT)),
+                scale=Vector3(z=LABEL_SIZE),
+                color=_colour(LABEL_COLOUR),
+                text=text,
+            )
+        )
         return MarkerArray(markers=markers)
 
 
@@ -117,6 +129,11 @@ def _stamped(stamp: object, transform: Transform) -> TransformStamped:
 def _quaternion(transform: Transform) -> Quaternion:
     x, y, z, w = transform.quaternion
     return Quaternion(x=x, y=y, z=z, w=w)
+
+
+def _colour(colour: Colour) -> ColorRGBA:
+    red, green, blue, alpha = colour
+    return ColorRGBA(r=red, g=green, b=blue, a=alpha)
 
 
 def main(args: Sequence[str] | None = None) -> int:

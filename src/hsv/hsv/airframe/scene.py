@@ -12,14 +12,15 @@ from foxglove.messages import (
     Quaternion,
     SceneEntity,
     SceneUpdate,
+    TextPrimitive,
     Timestamp,
     TriangleListPrimitive,
     Vector3,
 )
 
 from hsv.airframe.geometry import airframe
-from hsv.airframe.pose import BODY, FLIGHT_PATH, Sample, transforms
-from hsv.airframe.solids import Colour, Solid, solids
+from hsv.airframe.pose import BODY, FLIGHT_PATH, LEVEL, Sample, transforms
+from hsv.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, Solid, label, solids
 
 SCENE_TOPIC = "/hsv/airframe/scene"
 TRANSFORMS_TOPIC = "/hsv/airframe/transforms"
@@ -31,8 +32,8 @@ _ARROWS: dict[str, Colour] = {FLIGHT_PATH: (0.1, 0.5, 0.25, 1.0), BODY: (0.0, 0.
 """Arrows along the x axis of these frames."""
 
 
-def scene(time_ns: int) -> SceneUpdate:
-    """Return the vehicle, to be sent once, and again to who comes later."""
+def scene(time_ns: int, exaggeration: float | None = None) -> SceneUpdate:
+    """Return the vehicle, to be sent once, and again to who comes later or when the exaggeration changes."""
     stamp = _stamp(time_ns)
     entities = [_entity(solid, stamp) for solid in solids()]
     length = 0.7 * airframe().length
@@ -46,6 +47,14 @@ def scene(time_ns: int) -> SceneUpdate:
             color=_colour(colour),
         )
         entities.append(SceneEntity(timestamp=stamp, frame_id=frame, id=frame, frame_locked=True, arrows=[arrow]))
+    text = TextPrimitive(
+        pose=Pose(position=Vector3(z=LABEL_HEIGHT), orientation=Quaternion(w=1.0)),
+        billboard=True,
+        font_size=LABEL_SIZE,
+        color=_colour(LABEL_COLOUR),
+        text=label(exaggeration),
+    )
+    entities.append(SceneEntity(timestamp=stamp, frame_id=LEVEL, id="label", frame_locked=True, texts=[text]))
     return SceneUpdate(entities=entities)
 
 

@@ -19,6 +19,10 @@ ENGINE_COLOUR: Colour = (0.28, 0.30, 0.34, 1.0)
 ELEVATOR_COLOUR: Colour = (0.84, 0.37, 0.0, 1.0)
 FLAME_COLOURS: tuple[Colour, ...] = ((1.0, 0.93, 0.6, 0.95), (1.0, 0.66, 0.15, 0.8), (0.9, 0.3, 0.25, 0.5))
 
+LABEL_COLOUR: Colour = (0.5, 0.55, 0.6, 1.0)
+LABEL_HEIGHT, LABEL_SIZE = 5.0, 1.0
+"""Metres: above the centre of gravity, and of a letter."""
+
 _FLAME_HEIGHTS = (0.85, 0.6, 0.3)
 """Of the flame's pieces, in heights of the engine."""
 _SUNK = 0.8
@@ -33,6 +37,11 @@ class Solid:
     name: str
     triangles: np.ndarray
     colour: Colour
+
+
+def label(exaggeration: float | None = None) -> str:
+    """Return what is written over the vehicle; ``exaggeration`` as of :func:`hsv.airframe.pose.transforms`."""
+    return f"bending x {airframe().exaggeration if exaggeration is None else exaggeration:g}"
 
 
 @cache

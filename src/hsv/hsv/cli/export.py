@@ -21,6 +21,9 @@ def export(
         bool,
         typer.Option("--scene", help="One MCAP file: the bag, with the vehicle in 3-D for Foxglove and Lichtblick."),
     ] = False,
+    exaggeration: Annotated[
+        float | None, typer.Option(help="Factor on the bending in the scene; default: that of docs/airframe.md.")
+    ] = None,
     topic: Annotated[
         list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
     ] = None,
@@ -43,13 +46,19 @@ def export(
     if scene:
         if topic:
             raise ParameterError("topic: expected with a table, --scene holds every topic")
+        from hsv.airframe.geometry import airframe
         from hsv.recording.scene import scene_path, write_scene
 
+        most = airframe().largest_exaggeration
+        if exaggeration is not None and not 0.0 <= exaggeration <= most:
+            raise ParameterError(f"exaggeration = {exaggeration:g}: expected a number from 0 to {most:g}")
         out = out or scene_path(opened)
-        write_scene(opened, out)
+        write_scene(opened, out, exaggeration)
         print_written([out], json)
         print_bag_warnings(opened)
         return
+    if exaggeration is not None:
+        raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")
     if out is None:
         home = opened.folder.absolute()
         out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")

@@ -111,7 +111,7 @@ def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
 
     active = columns[ACTUATOR]["active"]
 
-    found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0]).encode())]
+    found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0], exaggeration).encode())]
     due = stamps[0]
     for row, stamp in enumerate(stamps):
         faults = [(fault["channel"], fault["type"]) for fault in active[row]]
