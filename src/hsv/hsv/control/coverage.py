@@ -1,8 +1,9 @@
 """What a flight has that the certificate of its design does not cover, named: vehicle, hardware, air, law, faults.
 
-A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors and links,
-still air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What else a
-flight declares may be survived, and may even be certified with (``hsv certify``), but this certificate does not say so.
+A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors and
+links, still air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What
+else a flight declares may be survived, and may even be certified with (``hsv certify``), but this certificate does not
+say so.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ _SHAPING = ("shear_altitude", "length", "length_forward", "length_up", "lengths"
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
-    """Return what of actuators, sensors, links, air and estimator in flat parameters the certificate of ``design`` has not.
+    """Return what of the hardware in flat parameters, estimator included, the certificate of ``design`` has not.
 
     Raises:
         ParameterError: A wrong value, named.
