@@ -20,6 +20,7 @@ setup(
             "airframe = hsv_bringup.airframe:main",
             "composed = hsv_bringup.composed:main",
             "recorder = hsv_bringup.recorder:main",
+            "live = hsv_bringup.live:main",
             "fault = hsv_bringup.fault:main",
             "player = hsv_bringup.player:main",
             "set_parameter = hsv_bringup.set_parameter:main",

@@ -34,10 +34,14 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Sweep while messages come, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
+        super().spin_once(timeout_sec=0.0 if self.sweep() else timeout_sec)
+
+    def sweep(self) -> bool:
+        """Sweep while messages come, at most ``SWEEPS`` times; return whether any came."""
         sweeps = 0
         while sweeps < SWEEPS and self._sweep():
             sweeps += 1
-        super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
+        return sweeps > 0
 
     def _sweep(self) -> bool:
         came = False

@@ -41,17 +41,7 @@ class TubeMpcNode(TubeNode):
         for thing in uncovered_hardware(values, design) if design.tube else ():
             self.get_logger().warning(f"not covered by the certificate: {thing}")
         self.component = self._law = TubeLaw.from_parameters(values, design)
-        self._changed = ""
-        """Which change is being made, and from which step on it acts."""
         self.add_on_set_parameters_callback(self._on_change)
-
-    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Say in the result from which step on the change acts, for whoever has asked for it."""
-        self._changed = ""
-        result = super().set_parameters_atomically(parameter_list)
-        if result.successful:
-            result.reason = self._changed
-        return result
 
     def _on_change(self, parameters: list[Parameter]) -> SetParametersResult:
         """Fly with another ``feedback.tau``, the one parameter that is not read-only, from the next step on."""
@@ -62,8 +52,7 @@ class TubeMpcNode(TubeNode):
                     step = self._law.change_tau(values)
                 except ParameterError as error:
                     return SetParametersResult(successful=False, reason=str(error))
-                self._changed = f"{TAU.name} = {values} from step {step} on"
-                self.get_logger().info(self._changed)
+                self.say_change(f"{TAU.name} = {values} from step {step} on")
         return SetParametersResult(successful=True)
 
 

@@ -8,7 +8,9 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from hsv_msgs.msg import Ready, Run, VehicleState
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
+from rclpy.parameter import Parameter as RosParameter
 
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
@@ -71,6 +73,8 @@ class LockstepNode(ProcessNode):
         self._diagnosed_second = -1
         self._made = time.monotonic()
         self._says_next = self._made + FIRST_SAID_AFTER
+        self._changed = ""
+        """Which parameter is being changed, and from which step on that acts."""
         self._foreign = 0
         self._foreign_said = -SAID_EVERY
         self._links: dict[str, list[NodeDescription]] = {}
@@ -167,6 +171,19 @@ class LockstepNode(ProcessNode):
             f"{self._inputs[topic].topic_name} of step {step}: expected {expected}, ignored ({self._foreign} so far; "
             f"published by {', '.join(publishers) or 'a node that is gone'})"
         )
+
+    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Say in the result from which step on a change in flight acts, for whoever has asked for it."""
+        self._changed = ""
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful:
+            result.reason = self._changed
+        return result
+
+    def say_change(self, words: str) -> None:
+        """Log what a change in flight is and from which step on it acts, and answer so to who has asked for it."""
+        self._changed = words
+        self.get_logger().info(words)
 
     def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""

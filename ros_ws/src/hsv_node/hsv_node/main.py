@@ -21,14 +21,19 @@ from hsv_node.process import ProcessNode
 
 
 def run_node(
-    build: Callable[[], ProcessNode], name: str, args: Sequence[str] | None = None, *, own_arguments: bool = False
+    build: Callable[[], ProcessNode],
+    name: str,
+    args: Sequence[str] | None = None,
+    executor_class: Callable[[], Executor] = EventsExecutor,
+    *,
+    own_arguments: bool = False,
 ) -> int:
     """Spin the node that ``build`` makes until it finishes or is interrupted; return the exit code of the process.
 
     Bad parameters end it before it joins the graph, with one line on standard error and exit code 2. So do arguments
     that are not for ROS, unless the process has ``own_arguments``, which it has checked itself.
     """
-    return run_nodes(lambda: iter([build()]), name, args, own_arguments=own_arguments, several=False)
+    return run_nodes(lambda: iter([build()]), name, args, executor_class, own_arguments=own_arguments, several=False)
 
 
 def run_nodes(

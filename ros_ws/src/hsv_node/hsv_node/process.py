@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import socket
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rclpy.node import Node
 
@@ -17,8 +17,9 @@ class ProcessNode(Node):
     of_others: ClassVar[frozenset[str]] = frozenset()
     """Names of the parameters that this process was given for several nodes; set before any is made."""
 
-    def __init__(self, name: str, namespace: str | None = None) -> None:
-        super().__init__(name, namespace=namespace)
+    def __init__(self, name: str, namespace: str | None = None, **options: Any) -> None:
+        """Make the node, with further ``options`` of rclpy's own."""
+        super().__init__(name, namespace=namespace, **options)
         self.exit_code: int | None = None
         """Set when the node wants to end, to the exit code of the process."""
         self.beside: list[ProcessNode] = [self]

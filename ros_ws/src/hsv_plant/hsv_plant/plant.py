@@ -10,7 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from hsv_msgs.msg import Actuator, Ready, RecorderProgress, Run, VehicleState
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
+from rclpy.parameter import Parameter as RosParameter
 
 from hsv.graph.description import (
     ACTUATOR,
@@ -46,6 +48,9 @@ MAX_AHEAD = 100
 
 LAST_WORDS = 1.0
 """Seconds for which a plant that ends waits for those whom it has told so; on a run that ends in order, a fraction."""
+
+
+_IN_FLIGHT = tuple(parameter.name for parameter in PACE_PARAMETERS if not parameter.read_only)
 
 
 class PlantNode(LockstepNode):
@@ -89,6 +94,9 @@ class PlantNode(LockstepNode):
         """Whether the actuators' input of this step has come."""
         self._flown = False
         self._begun = time.monotonic()
+        self._paced_from = self._begun, 0
+        """Wall time (s) and step from which the pace is counted."""
+        self.add_on_set_parameters_callback(self._on_change)
         self._messages = 0
         """Answers of the nodes so far: what must not stand still."""
         self._standstill = Standstill()
@@ -96,6 +104,16 @@ class PlantNode(LockstepNode):
     def _on_ready(self, ready: Ready) -> None:
         if ready.run_id == self._run.run_id:
             self._ready.add(ready.node)
+
+    def _on_change(self, parameters: list[RosParameter]) -> SetParametersResult:
+        """Take another pace, or pause: between this step, which is published, and the next."""
+        step = self._signals.step
+        for parameter in parameters:
+            if parameter.name in _IN_FLIGHT:
+                self.values[parameter.name] = parameter.value
+                self._paced_from = time.monotonic(), step
+                self.say_change(f"{parameter.name} = {parameter.value} from step {step + 1} on")
+        return SetParametersResult(successful=True)
 
     def _on_progress(self, progress: RecorderProgress) -> None:
         self._recorded_step = progress.step
@@ -130,7 +148,7 @@ class PlantNode(LockstepNode):
         """Take the next step, unless its input, the recorder or the wall clock has to be waited for."""
         if self._flown and (not self.recorded or self._recorded_step >= self._signals.step):
             self._land()
-        elif self._answered and self._delay() <= 0.0 and self._room():
+        elif self._answered and not self.values["paused"] and self._delay() <= 0.0 and self._room():
             self._answered = False
             self._advance()
             self._publish()
@@ -146,7 +164,8 @@ class PlantNode(LockstepNode):
         factor = self.values["real_time_factor"]
         if factor == 0.0:
             return 0.0
-        return self._begun + (self._signals.step + 1) * self.plant.period / factor - time.monotonic()
+        begun, first = self._paced_from
+        return begun + (self._signals.step + 1 - first) * self.plant.period / factor - time.monotonic()
 
     def _publish(self) -> None:
         signals = self._signals
@@ -164,7 +183,8 @@ class PlantNode(LockstepNode):
             self._try_start()
         else:
             self._continue()
-            waited = self._standstill.look(self._messages)
+            # Of who pauses nobody else is to blame.
+            waited = self._standstill.look(time.monotonic() if self.values["paused"] else self._messages)
             if waited > self.values["step_timeout"] + max(self._delay(), 0.0):
                 self._give_up(waited)
 
@@ -172,7 +192,8 @@ class PlantNode(LockstepNode):
         """Wake in time for the next state when paced."""
         if not self._started:
             return LINK_LOOK
-        return min(max(self._delay(), 0.0), 0.25) if self._answered and self._room() else 0.25
+        due = self._answered and self._room() and not self.values["paused"]
+        return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
     def stopped(self, signal_number: int) -> int:
         """Say that the flight is incomplete, unless whoever watches it has ended it by Ctrl-C."""
@@ -197,7 +218,7 @@ class PlantNode(LockstepNode):
             self._started = True
             controller = controller_node(self.controller)
             self._foreign_controller = (self.node_in_role(controller) or "") if controller.foreign else ""
-            self._begun = time.monotonic()
+            self._paced_from = time.monotonic(), 0
             self._standstill = Standstill()
             self.get_logger().info(f"starts {run_in_words(self._run)}")
             self._publish()

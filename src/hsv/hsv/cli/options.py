@@ -27,7 +27,16 @@ VehicleOption = Annotated[
     str, typer.Option(help="Name of a vehicle (hsv vehicles), or path of a TOML file; default: the paper's.")
 ]
 ScenarioArgument = Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a TOML file.")]
-RealTimeFactorOption = Annotated[float, typer.Option(help="Pace: 1 is real time, 0 as fast as possible.")]
+RealTimeFactorOption = Annotated[
+    float | None,
+    typer.Option(help="Pace: 1 is real time, 0 as fast as possible; default: 0, with --live 1.", show_default=False),
+]
+LiveOption = Annotated[
+    bool, typer.Option("--live", help="Show the flight while it is flown: a page for the browser, and Foxglove.")
+]
+LivePortOption = Annotated[
+    int, typer.Option(help="Port for Foxglove, with --live; the page has the next one. 0: any two that are free.")
+]
 StepTimeoutOption = Annotated[
     float | None,
     typer.Option(help="Wall time (s) after which a silent node ends the run; default: 10, beside a foreign node 2.5."),

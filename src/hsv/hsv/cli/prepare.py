@@ -11,6 +11,8 @@ from hsv.cli.options import (
     ComposedOption,
     ExternalOption,
     JsonOption,
+    LiveOption,
+    LivePortOption,
     NamespaceOption,
     NewBagOption,
     RealTimeFactorOption,
@@ -22,7 +24,9 @@ from hsv.cli.output import console, print_json
 
 def prepare(
     scenario: ScenarioArgument = "case1",
-    real_time_factor: RealTimeFactorOption = 0.0,
+    live: LiveOption = False,
+    live_port: LivePortOption = 8765,
+    real_time_factor: RealTimeFactorOption = None,
     composed: ComposedOption = False,
     external: ExternalOption = False,
     bag: NewBagOption = None,
@@ -63,6 +67,7 @@ def prepare(
             folder=target,
             composed=composed,
             external=external,
+            live_port=live_port if live else None,
         )
     except BaseException:
         if not folder:

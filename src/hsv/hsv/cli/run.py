@@ -10,6 +10,8 @@ from hsv.cli.options import (
     ComposedOption,
     ExternalOption,
     JsonOption,
+    LiveOption,
+    LivePortOption,
     NamespaceOption,
     NewBagOption,
     RealTimeFactorOption,
@@ -23,7 +25,9 @@ from hsv.cli.output import Units, report_line
 
 def run(
     scenario: ScenarioArgument = "case1",
-    real_time_factor: RealTimeFactorOption = 0.0,
+    live: LiveOption = False,
+    live_port: LivePortOption = 8765,
+    real_time_factor: RealTimeFactorOption = None,
     composed: ComposedOption = False,
     external: ExternalOption = False,
     bag: NewBagOption = None,
@@ -44,7 +48,7 @@ def run(
 
     from hsv.cli.conclude import conclude_flight
     from hsv.cli.progress import flight as flight_bar
-    from hsv.graph.description import checked_namespace
+    from hsv.graph.description import LIVE, checked_namespace
     from hsv.graph.flight import fly_graph
     from hsv.graph.launcher import WARNING
     from hsv.graph.preparation import prepare
@@ -57,12 +61,14 @@ def run(
         step_timeout=step_timeout,
         composed=composed,
         external=external,
+        live_port=live_port if live else None,
     )
     loaded = prepared.scenario
     clock: dict[str, float] = {}
 
     def line(node: str, text: str) -> None:
-        if verbose or WARNING in text:
+        # Where the live view is to be seen.
+        if verbose or WARNING in text or node == LIVE.label:
             report_line(node, text)
 
     with flight_bar(loaded.name, loaded.duration, prepared.steps) as show:

@@ -196,6 +196,9 @@ PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator",
 PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 """Not of the graph: republishes a bag."""
 
+LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
+"""Not of the graph: shows a flight while it is flown. Nobody waits for it, and it ends with the others."""
+
 FAULT, SET_PARAMETER, TOPIC = (
     NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic")
 )

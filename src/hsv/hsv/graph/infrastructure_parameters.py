@@ -18,7 +18,10 @@ LOCKSTEP_PARAMETERS = (
 """Parameters that every node declares."""
 
 PACE_PARAMETERS = (
-    Parameter("real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3),
+    Parameter(
+        "real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3, read_only=False
+    ),
+    Parameter("paused", False, "whether the flight stands still, until this is false", read_only=False),
     Parameter("start_timeout", 0.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
     Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
@@ -30,6 +33,14 @@ RECORDER_PARAMETERS = (
     Parameter("bag.attachments", [""], "files to attach"),
     Parameter("bag.custom_data", [""], "key=value pairs for the bag's metadata"),
 )
+
+LIVE_PARAMETERS = (
+    Parameter("live.port", 8765, "port of the Foxglove WebSocket server; 0: any free one", "", 0, 65535),
+    Parameter("live.page_port", 8766, "port of the live page; 0: any free one", "", 0, 65535),
+    Parameter("live.title", "", "what the live page calls the flight"),
+    Parameter("live.bag", "", "bag that is written of the flight, which the live page names in the end"),
+)
+"""Parameters of the live view."""
 
 PEER_EMULATOR_PARAMETERS = (
     Parameter("peer_emulator.bag", "", "bag to feed the node from"),

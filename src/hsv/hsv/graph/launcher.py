@@ -19,6 +19,7 @@ from hsv.errors import RunError
 from hsv.graph.description import (
     COMPOSED,
     LANDED,
+    LIVE,
     PLANT,
     ROOT,
     NodeDescription,
@@ -89,6 +90,8 @@ class _Process:
     reader: threading.Thread | None = None
     standstill: Standstill = field(default_factory=Standstill)
     hung: bool = False
+    lost: bool = False
+    """Whether it has ended before its time, and the flight goes on without it."""
 
     def idle(self) -> float:
         """Return for how long (s) it has used no processor time; 0 where that cannot be found out."""
@@ -150,16 +153,22 @@ class Launcher:
 
         Raises:
             RunError: It failed, or another ended before it (a plant that has landed may); with its last words. Or it
-                hung, or another before the flight had begun.
+                hung, or another before the flight had begun. Without who only watches the flight goes on.
         """
         *others, last = self._processes
         while True:
             for process in others:
                 code = process.popen.poll()
-                if code is not None and not _landed(process, code):
-                    raise self._failure(process, code)
-            for process in self._processes:
-                self._watch(process, process is last or not self._flying)
+                if code is None or _landed(process, code):
+                    continue
+                failure = self._failure(process, code)
+                if process.description is not LIVE:
+                    raise failure
+                process.lost = True
+            others = [process for process in others if not process.lost]
+            for process in (*others, last):
+                decides = process is last or not self._flying
+                self._watch(process, decides and process.description is not LIVE)
             code = last.popen.poll()
             if code is not None:
                 if code == 0 or _landed(last, code):

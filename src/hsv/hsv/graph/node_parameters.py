@@ -5,8 +5,8 @@ from __future__ import annotations
 from hsv.control.controllers import controller_class
 from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
-from hsv.graph.description import RECORDER, ROBUST_MPC, TUBE_MPC
-from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, RECORDER_PARAMETERS
+from hsv.graph.description import LIVE, RECORDER, ROBUST_MPC, TUBE_MPC
+from hsv.graph.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.parameters import Parameter
 from hsv.simulation.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
 
@@ -33,6 +33,7 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     ROBUST_MPC.name: own_parameters(ROBUST_MPC.name),
     FAULT_INJECTOR.name: FAULT_INJECTOR.parameters,
     RECORDER.name: RECORDER_PARAMETERS,
+    LIVE.name: LIVE_PARAMETERS,
 }
 """Parameter tables by node, without that of a controller of one's own. Every node also declares
 :data:`hsv.graph.infrastructure_parameters.LOCKSTEP_PARAMETERS`."""

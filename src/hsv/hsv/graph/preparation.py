@@ -17,9 +17,10 @@ from hsv.control.design_parameters import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.library import library_digest, library_record
 from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
-from hsv.graph.description import COMPOSED, CONTROLLER, NodeDescription, controller_node, graph
+from hsv.graph.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
 from hsv.graph.launcher import executable
 from hsv.graph.parameter_sections import ParameterSections
+from hsv.live.addresses import ports
 from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text, with_controller
 
@@ -52,11 +53,12 @@ def prepare(
     text: str = "",
     bags: Path = Path("bags"),
     bag: Path | None = None,
-    real_time_factor: float = 0.0,
+    real_time_factor: float | None = None,
     step_timeout: float | None = None,
     folder: Path | None = None,
     composed: bool = False,
     external: bool = False,
+    live_port: int | None = None,
 ) -> PreparedRun:
     """Check scenario and design, make the bag's directory, write the parameter files of a run.
 
@@ -67,22 +69,27 @@ def prepare(
         text: The scenario, as :func:`hsv.simulation.scenario.scenario_text` returns it; empty: that of this name.
         bags: Where the bag is made if ``bag`` is not given, named by scenario and time.
         bag: Bag to record to, a new directory.
-        real_time_factor: Simulated over wall time; 0: as fast as possible.
+        real_time_factor: Simulated over wall time; 0: as fast as possible; ``None``: 0, with a live view 1.
         step_timeout: Wall time (s) after which a silent node ends the run; ``None``: :data:`STEP_TIMEOUT`, or
             :data:`FOREIGN_STEP_TIMEOUT` where the controller is a node of its own.
         folder: Directory for the parameter files; if not given, a temporary one that goes with the result.
         composed: All nodes in one process.
         external: Whatever the scenario's controller is, one is flown that is started by hand.
+        live_port: Port of the live view, whose page has the next one, or 0 for any two; ``None``: no live view.
 
     Raises:
         QuantityError: ``real_time_factor`` or ``step_timeout`` is out of range.
+        ParameterError: ``live_port`` or the one behind it is in use.
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
         RecordingError: ``bag`` exists already or cannot be made.
     """
+    if real_time_factor is None:
+        real_time_factor = 0.0 if live_port is None else 1.0
     if not 0.0 <= real_time_factor <= 1000.0:
         raise QuantityError(f"real-time-factor = {real_time_factor}: expected 0 (as fast as possible) to 1000")
     if step_timeout is not None and not 0.1 <= step_timeout <= 1e6:
         raise QuantityError(f"step-timeout = {step_timeout}: expected at least 0.1 (seconds)")
+    live_ports = None if live_port is None else ports(live_port)
     text = text or scenario_text(scenario_name)
     name = Path(scenario_name).stem
     if external:
@@ -92,7 +99,7 @@ def prepare(
     with blamed_on(scenario):
         design_file = find_design(scenario.design) if scenario.design else None
         design = read_design(design_file) if design_file else None
-        nodes = _started(scenario.controller, composed)
+        nodes = ((LIVE,) if live_ports else ()) + _started(scenario.controller, composed)
         own = own_parameters(scenario)
         foreign = controller_node(scenario.controller).foreign
         library = library_record(scenario.controller)
@@ -142,6 +149,13 @@ def prepare(
             }.items()
         ],
     }
+    if live_ports:
+        run |= {
+            "live.port": live_ports[0],
+            "live.page_port": live_ports[1],
+            "live.title": scenario.title,
+            "live.bag": str(bag),
+        }
     (folder / "run.yaml").write_text(ParameterSections(run).to_yaml(), encoding="utf-8")
     parameter_files = tuple(folder / name for name in ("design.yaml", "scenario.yaml", "run.yaml"))
     return PreparedRun(scenario, run_id, bag, parameter_files, nodes, components.plant.steps, wait, temporary)

@@ -1,0 +1,307 @@
+"""The live node: shows a flight while it is flown, to Foxglove and on a page, and asks the nodes what the page asks."""
+
+from __future__ import annotations
+
+import struct
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from hsv_msgs.msg import Fault, Run, VehicleState
+from hsv_msgs.srv import ClearFault, InjectFault
+from rcl_interfaces.msg import ParameterEvent
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.client import Client
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.parameter import parameter_value_to_python
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from rclpy.task import Future
+
+from hsv.graph.description import (
+    CONTROLLER,
+    DIAGNOSTICS,
+    LAST_STATE,
+    LATCHED_TOPICS,
+    LIVE,
+    OTHER_TOPICS,
+    PARAMETER_EVENTS,
+    PLANT,
+    RUN,
+    STATE,
+    TOPICS,
+    NodeDescription,
+)
+from hsv.graph.infrastructure_parameters import LIVE_PARAMETERS
+from hsv.graph.progress import Standstill
+from hsv.graph.settable import SETTABLE, step_in
+from hsv.live.commands import Change, Command, Inject
+from hsv.live.foxglove_server import FoxgloveServer
+from hsv.live.hub import Hub
+from hsv.live.server import Answer, PageServer
+from hsv.recording.report.panels import INPUTS
+from hsv.recording.viewers import LAYOUTS, VIEWERS
+from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
+from hsv_bringup.flow_executor import FlowExecutor
+from hsv_node.main import run_node
+from hsv_node.messages import message_class, type_name
+from hsv_node.parameters import declare, refuse_unknown
+from hsv_node.process import ProcessNode
+from hsv_node.qos import LATCHED
+from hsv_node.roles import full_name, node_in_role, services
+
+RATE = 25.0
+"""Looks a second at what has come: rows of the page, and batches for Foxglove."""
+
+DEPTH = 1000
+"""Messages of a topic that wait between two looks: a flight that is faster than 25 times as many steps a second loses
+some here, and so does one whose viewer gets no processor time for 20 s at real-time pace."""
+
+WATCHING = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""No publisher waits for who watches."""
+
+_LOOK = 0.25
+"""Seconds between two looks at everything but topics, while nothing is asked."""
+
+_STAMP = struct.Struct("<iI")
+
+
+class LiveExecutor(FlowExecutor):
+    """Sleeps until a look is due, and not until a message comes: a hundred of them cost little more than one."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._looks = 0.0
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Sleep for so long, take all that has come, and now and then look at everything else."""
+        time.sleep(timeout_sec or 0.0)
+        self.sweep()
+        now = time.monotonic()
+        asked = any(True for node in self.get_nodes() for _ in node.clients)
+        if now >= self._looks or asked:
+            self._looks = now + _LOOK
+            SingleThreadedExecutor.spin_once(self, 0.0)
+
+
+@dataclass
+class _Request:
+    """Something that was asked of a node, until it is answered or given up."""
+
+    role: NodeDescription
+    kind: Any
+    request: Any
+    done: Callable[[Any], None]
+    """Takes the response."""
+    refused: Callable[[str], None]
+    """Takes why there is none."""
+    client: Client | None = None
+    future: Future | None = None
+    standstill: Standstill = field(default_factory=Standstill)
+
+
+class LiveNode(ProcessNode):
+    """Passes the messages on as they are, samples them for the page, and carries out what the page asks."""
+
+    def __init__(self) -> None:
+        # What it said and had for parameters would be recorded with the flight.
+        super().__init__(LIVE.name, enable_rosout=False, start_parameter_services=False)
+        refuse_unknown(self, LIVE.name, self.of_others)
+        values = declare(self, LIVE_PARAMETERS)
+        self._kinds = {topic: message_class(kind) for topic, kind in (TOPICS | OTHER_TOPICS).items()}
+        self._names = {topic: self.resolve_topic_name(topic) for topic in self._kinds}
+        self.hub = Hub(self._decode, {"title": values["live.title"], "bag": values["live.bag"]})
+        names = {self._names[topic]: kind for topic, kind in (TOPICS | OTHER_TOPICS).items()}
+        self.foxglove = FoxgloveServer(values["live.port"], names)
+        self.page = PageServer(values["live.page_port"], self.hub)
+        self._run: Run | None = None
+        self._plant = ""
+        """Full name of the plant's node, once it has answered."""
+        self._requests: list[_Request] = []
+        self._next_look = time.monotonic()
+        # In the order in which they are looked at: a run before its messages, its end behind them.
+        self.create_subscription(Run, RUN, self._on_run, LATCHED, raw=True)
+        for topic in TOPICS:
+            self._watch(topic, partial(self._on_step_message, topic, self._names[topic]))
+        for topic in OTHER_TOPICS:
+            if topic != RUN:
+                self._watch(topic, partial(self._on_other_message, topic))
+        self.create_subscription(VehicleState, LAST_STATE, self._on_last_state, WATCHING)
+        layout = LAYOUTS / VIEWERS["foxglove"].layout
+        print(f"live page: {self.page.url}", flush=True)
+        print(f"live data: ws://127.0.0.1:{self.foxglove.port} (Foxglove, Lichtblick; layout {layout})", flush=True)
+
+    def poll(self) -> None:
+        """Sample what has come, and go on with what is asked."""
+        self._next_look = max(self._next_look + 1.0 / RATE, time.monotonic())
+        self.hub.sample()
+        while not self.page.commands.empty():
+            self._carry_out(*self.page.commands.get())
+        for request in list(self._requests):
+            if self._settled(request):
+                self._requests.remove(request)
+                if request.client is not None:
+                    self.destroy_client(request.client)
+        self._look_for_plant()
+        self.page.publish()
+
+    def wait_timeout(self) -> float:
+        """Wait for the next look."""
+        return max(self._next_look - time.monotonic(), 0.0)
+
+    def close(self) -> None:
+        """Show the last of what has come, and leave the viewers."""
+        if isinstance(self.executor, LiveExecutor):
+            self.executor.sweep()
+        self.hub.sample()
+        self._look_for_plant()
+        self.page.close()
+        self.foxglove.close()
+
+    def _watch(self, topic: str, callback: Callable[[bytes], None]) -> None:
+        profile = LATCHED if topic in LATCHED_TOPICS else WATCHING
+        self.create_subscription(self._kinds[topic], topic, callback, profile, raw=True)
+
+    def _decode(self, topic: str, data: bytes) -> Any:
+        return deserialize_message(data, self._kinds[topic])
+
+    def _on_step_message(self, topic: str, name: str, data: bytes) -> None:
+        # Every step topic begins with the simulated time, right behind the four bytes of the CDR header.
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        stamp = seconds * 1_000_000_000 + nanoseconds
+        self.foxglove.send(name, stamp, data)
+        self.hub.offer(topic, stamp, data)
+
+    def _on_other_message(self, topic: str, data: bytes) -> None:
+        self.foxglove.send(self._names[topic], self.hub.time, data)
+        if topic == DIAGNOSTICS:
+            self._on_diagnostics(self._decode(topic, data))
+        elif topic == PARAMETER_EVENTS:
+            self._on_parameter_event(self._decode(topic, data))
+
+    def _on_run(self, data: bytes) -> None:
+        self._run = run = self._decode(RUN, data)
+        self.foxglove.start_run()
+        self.hub.start_run(run.run_id, run.period, run.last_step)
+        self.foxglove.send(self._names[RUN], 0, data)
+        self._ask_parameters(PLANT, [name for name, (node, _) in SETTABLE.items() if node is PLANT], self._on_settings)
+        self._ask_parameters(CONTROLLER, ["input.minimum", "input.maximum"], self._on_limits)
+
+    def _on_last_state(self, state: VehicleState) -> None:
+        self.hub.sample()
+        self.hub.end(state.status, state.step)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            node = status.name.partition(": ")[0]  # "node: task"
+            level = status.level[0] if isinstance(status.level, bytes) else status.level
+            self.hub.diagnose(node, level, status.message, {pair.key: pair.value for pair in status.values})
+            if level:
+                self.hub.note(f"{node}: {status.message}", warning=True)
+
+    def _on_parameter_event(self, event: ParameterEvent) -> None:
+        """Follow the plant's pace, whoever has changed it."""
+        if event.node == self._plant:
+            self._on_settings({p.name: parameter_value_to_python(p.value) for p in event.changed_parameters})
+
+    def _on_settings(self, values: dict[str, Any]) -> None:
+        settings = {name: value for name, value in values.items() if name in SETTABLE}
+        self.hub.say(settings=self.hub.status()["settings"] | settings)
+
+    def _on_limits(self, values: dict[str, Any]) -> None:
+        low, high = (list(values.get(f"input.{end}") or ()) for end in ("minimum", "maximum"))
+        self.hub.say(limits=dict(zip(INPUTS, zip(low, high, strict=False), strict=False)))
+
+    def _look_for_plant(self) -> None:
+        """Note the end of a run whose plant is gone without a word."""
+        if self._run is None or self.hub.status()["ending"] is not None:
+            return
+        # Known once it has published.
+        if self.hub.time and not self.count_publishers(STATE):
+            self.hub.end(VehicleState.RUNNING, round(self.hub.time * 1e-9 / self._run.period))
+
+    def _ask_parameters(
+        self, role: NodeDescription, names: Iterable[str], take: Callable[[dict[str, Any]], None]
+    ) -> None:
+        names = list(names)
+
+        def done(response: GetParameters.Response) -> None:
+            take(dict(zip(names, map(parameter_value_to_python, response.values), strict=False)))
+
+        # A controller that is a node of its own may have none of them: then they are not shown.
+        self._requests.append(
+            _Request(role, GetParameters, GetParameters.Request(names=names), done, lambda reason: None)
+        )
+
+    def _carry_out(self, command: Command, answer: Answer) -> None:
+        def refuse(why: str) -> None:
+            answer({"accepted": False, "message": why})
+
+        def acknowledge(words: str, step: int) -> None:
+            period = self._run.period if self._run else 0.0
+            self.hub.note(words, step=step)
+            answer({"accepted": True, "message": f"{words}, t = {step * period:.2f} s", "step": step})
+
+        def done(response: Any) -> None:
+            if isinstance(command, Change):
+                result = response.results[0]
+                if result.successful:
+                    acknowledge(result.reason, step_in(result.reason))
+                else:
+                    refuse(result.reason)
+            elif response.accepted:
+                acknowledge(response.message, response.step)
+            else:
+                refuse(response.message)
+
+        kind, request = _service_request(command)
+        self._requests.append(_Request(command.node, kind, request, done, refuse))
+
+    def _settled(self, request: _Request) -> bool:
+        """Go on with a request; return whether it is answered or given up."""
+        if request.future is not None and request.future.done():
+            request.done(request.future.result())
+            return True
+        if request.client is None:
+            node = node_in_role(self, request.role)
+            kinds = services(self, *node) if node else {}
+            name = next((name for name, types in kinds.items() if type_name(request.kind) in types), None)
+            if node and name:
+                request.client = self.create_client(request.kind, name)
+                if request.role is PLANT:
+                    self._plant = full_name(*node)
+        elif request.future is None and request.client.service_is_ready():
+            request.future = request.client.call_async(request.request)
+        still = request.standstill.look(sorted(self.get_node_names_and_namespaces()))
+        if request.client is None and still > ABSENT_AFTER:
+            request.refused(f"no {request.role.name}: expected a flight whose {request.role.name} is there")
+            return True
+        if still > SILENT_AFTER:
+            request.refused(f"no answer from the {request.role.name} for {SILENT_AFTER:g} s")
+            return True
+        return False
+
+
+def _service_request(command: Command) -> tuple[Any, Any]:
+    """Return the type of the service that carries a command out, and its request."""
+    if isinstance(command, Change):
+        parameter = RosParameter(command.parameter.name, value=command.value).to_parameter_msg()
+        return SetParameters, SetParameters.Request(parameters=[parameter])
+    if isinstance(command, Inject):
+        fault = Fault(
+            channel=command.fault.channel,
+            type=command.fault.type,
+            parameter_names=list(command.fault.parameters),
+            parameter_values=list(command.fault.parameters.values()),
+        )
+        return InjectFault, InjectFault.Request(fault=fault, duration=command.duration)
+    return ClearFault, ClearFault.Request(channel=command.channel, type=command.type)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the live node."""
+    return run_node(LiveNode, LIVE.name, args, executor_class=LiveExecutor)

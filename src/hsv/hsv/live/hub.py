@@ -1,0 +1,185 @@
+"""What is known of the flight now: the latest messages, a decimated history of what is drawn, faults, diagnostics."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.graph.description import ACTUATOR, NOMINAL, STATE, TUBE_STATUS
+from hsv.graph.exchange import fault_in
+from hsv.live.columns import columns, row
+from hsv.vehicle.plant import FlightStatus
+
+MOST_ROWS = 20_000
+"""Rows of the history after which every second one is given up."""
+
+_FIRST_ROWS = 1024
+
+_EVENTS = 200
+"""Lines of what has happened that are kept."""
+
+
+@dataclass(frozen=True)
+class History:
+    """Rows of the history from one on, and which history it is: another one begins anew."""
+
+    generation: int
+    first: int
+    rows: np.ndarray
+    """Of time (s) and columns, single precision: (n, 1 + columns)."""
+
+
+class Hub:
+    """Gathers what the page shows; written by one thread, read by those that serve."""
+
+    def __init__(self, decode: Callable[[str, bytes], Any], about: Mapping[str, str]) -> None:
+        """Know nothing yet.
+
+        Args:
+            decode: Returns the message of a topic that is serialized in bytes.
+            about: What else the page says: ``title``, and where the flight is written to, ``bag``; empty where unknown.
+        """
+        self.columns = columns()
+        self._topics = tuple(dict.fromkeys(column.topic for column in self.columns))
+        self._steady = frozenset(self._topics) - {TUBE_STATUS}
+        """Topics that every step has; of the tube a controller of one's own says nothing."""
+        self._decode = decode
+        self._about = dict(about)
+        self._lock = threading.Lock()
+        self._generation = 0
+        self._status: dict[str, Any] = {"run": None, "settings": {}, "limits": {}}
+        self.version = 0
+        """Counts the changes of what :meth:`status` says."""
+        self._forget()
+
+    def start_run(self, run_id: str, period: float, last_step: int) -> None:
+        """Forget the run before."""
+        with self._lock:
+            self._forget()
+            self._period = period
+            self._status |= {"run": {"id": run_id, "period": period, "last_step": last_step}}
+            self.version += 1
+
+    def offer(self, topic: str, time: int, data: bytes) -> None:
+        """Take a message of a step topic, serialized, of simulated ``time`` (ns)."""
+        pair = self._latest.get(topic)
+        self._latest[topic] = (time, data, pair[0] if pair else -1, pair[1] if pair else b"")
+
+    def say(self, **values: Any) -> None:
+        """Change what :meth:`status` says: ``settings`` and ``limits`` by name, how the run ended, ``ending``."""
+        with self._lock:
+            self._say(values)
+
+    def diagnose(self, node: str, level: int, words: str, values: Mapping[str, str]) -> None:
+        """Take what a node says of itself."""
+        with self._lock:
+            entry = {"level": level, "words": words, "values": dict(values)}
+            self._say({"diagnostics": self._status["diagnostics"] | {node: entry}})
+
+    def note(self, words: str, *, step: int | None = None, warning: bool = False) -> None:
+        """Add a line to what has happened, which acts or is said at ``step``; None: now."""
+        with self._lock:
+            at = self._step if step is None else step
+            event = {"time": round(at * self._period, 9), "step": at, "words": words, "warning": warning}
+            self._say({"events": [*self._status["events"], event][-_EVENTS:]})
+
+    def sample(self) -> bool:
+        """Add the newest step of which every topic is here, if it is new; return whether it was.
+
+        All are decoded here and nowhere else, so that a fast flight costs no more than a slow one.
+        """
+        due = self._newest_step()
+        if due is None:
+            return False
+        time, serialized = due
+        messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
+        values = row(self.columns, messages)
+        with self._lock:
+            if self._count == len(self._rows):
+                self._make_room()
+            self._rows[self._count] = values
+            self._count += 1
+            self._sampled = time
+            state, actuator = messages[STATE], messages[ACTUATOR]
+            self._step = int(state.step)
+            said = {
+                "faults": [
+                    {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}
+                    for fault, since in zip(actuator.active, actuator.since, strict=True)
+                ],
+                "nominal_status": messages[NOMINAL].status,
+            }
+            if TUBE_STATUS in messages:
+                tube = messages[TUBE_STATUS]
+                said |= {"tau": [round(float(value), 12) for value in tube.tau], "tube_status": tube.status}
+            self._say(said)
+        return True
+
+    def history(self, generation: int, first: int) -> History:
+        """Return the rows that a reader lacks who has those before ``first`` of a ``generation``."""
+        with self._lock:
+            first = first if generation == self._generation else 0
+            return History(self._generation, first, self._rows[first : self._count].astype("<f4"))
+
+    def status(self) -> dict[str, Any]:
+        """Return everything but the rows, as plain data."""
+        with self._lock:
+            return {**self._about, **self._status}
+
+    @property
+    def time(self) -> int:
+        """The simulated time (ns) of the newest state, 0 before there is one."""
+        return self._latest[STATE][0] if STATE in self._latest else 0
+
+    def end(self, status: int, step: int) -> None:
+        """Note with which ``status`` of the vehicle, at which step, the run has ended; running: it was broken off."""
+        how = {FlightStatus.FINISHED: "finished", FlightStatus.DIVERGED: "diverged"}
+        self.say(ending={"how": how.get(FlightStatus(status), "broken off"), "time": round(step * self._period, 9)})
+
+    def _forget(self) -> None:
+        self._generation += 1
+        self._latest: dict[str, tuple[int, bytes, int, bytes]] = {}
+        self._rows = np.empty((_FIRST_ROWS, 1 + len(self.columns)), np.float32)
+        self._count = 0
+        self._sampled = -1
+        self._step = 0
+        self._period = 0.0
+        self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
+        self._status |= {"tube_status": None, "nominal_status": 0}
+
+    def _say(self, values: Mapping[str, Any]) -> None:
+        changed = {name: value for name, value in values.items() if self._status.get(name) != value}
+        self._status |= changed
+        self.version += bool(changed)
+
+    def _make_room(self) -> None:
+        if self._count < MOST_ROWS:
+            self._rows = np.concatenate([self._rows, np.empty_like(self._rows)])
+        else:
+            self._generation += 1
+            thinned = self._rows[: self._count : 2].copy()
+            self._count = len(thinned)
+            self._rows[: self._count] = thinned
+
+    def _newest_step(self) -> tuple[int, dict[str, bytes]] | None:
+        latest = self._latest
+        if not latest.keys() >= self._steady:
+            return None
+        # The topics of a step come one after the other: of some the message of the next one may be here.
+        time = min(latest[topic][0] for topic in self._steady)
+        if TUBE_STATUS in latest:
+            time = min(time, latest[TUBE_STATUS][0])
+        if time <= self._sampled:
+            return None
+        found = {}
+        for topic in self._topics:
+            if topic in latest:
+                now, data, before, data_before = latest[topic]
+                if time not in (now, before):
+                    return None
+                found[topic] = data if time == now else data_before
+        return time, found

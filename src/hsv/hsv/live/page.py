@@ -1,0 +1,99 @@
+"""The live page: what the report draws, of a flight that is on its way, with the controls of that flight."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from itertools import groupby
+from typing import Any
+
+from markupsafe import Markup
+
+from hsv.faults.table import CHANNELS, FAULT_KINDS
+from hsv.live.addresses import origins
+from hsv.live.hub import Hub
+from hsv.recording.report import text
+from hsv.recording.report.page import LIBRARY
+from hsv.recording.report.panels import GROUPS, Panel
+from hsv.recording.report.payload import compressed
+from hsv.recording.report.templates import environment_of
+from hsv.recording.report.text import unit_html
+from hsv.units import to_paper
+
+READOUTS = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equivalence_ratio", "elevator_deflection")
+"""Panels whose newest value stands in figures at the top."""
+
+
+def render(hub: Hub, port: int) -> str:
+    """Return the page of a flight that ``hub`` knows, as it is served on ``port``."""
+    panels = list(dict.fromkeys(column.panel for column in hub.columns))
+    return (
+        environment_of("hsv.live")
+        .get_template("live.html.j2")
+        .render(
+            title=hub.status()["title"],
+            groups={key: heading for key, heading in GROUPS.items() if any(panel.group == key for panel in panels)},
+            panels=panels,
+            readouts=[panel for name in READOUTS for panel in panels if panel.name == name],
+            kinds=_kinds(),
+            sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
+            unit=text.unit,
+            styles=[_asset("hsv.recording.report", "style.css"), _asset("hsv.live", "live.css")],
+            scripts=[_asset("hsv.recording.report", "charts.js"), _asset("hsv.live", "live.js")],
+            plots={"panels": _panels(hub)},
+            library=Markup(compressed(LIBRARY.read_bytes())),
+        )
+    )
+
+
+def _panels(hub: Hub) -> list[dict[str, Any]]:
+    """Return the panels as :mod:`hsv.recording.report.payload` describes them; x is array 0, the columns follow."""
+    described = []
+    for panel, columns in groupby(enumerate(hub.columns, 1), lambda numbered: numbered[1].panel):
+        described.append(
+            {
+                "name": panel.name,
+                "units": _units(panel),
+                "curves": [
+                    {"kind": column.kind, "label": column.label, "run": 0, "x": 0, "y": number}
+                    for number, column in columns
+                ],
+                "limits": [1.0] if panel.name == "level" else [],
+                "shades": [],
+            }
+        )
+    return described
+
+
+def _units(panel: Panel) -> dict[str, dict[str, Any]]:
+    factor, unit = to_paper(1.0, panel.unit)
+    return {
+        "si": {"unit": unit_html(panel.unit), "factor": 1.0},
+        "paper": {"unit": unit_html(unit), "factor": factor},
+    }
+
+
+def _kinds() -> dict[str, dict[str, Any]]:
+    """Return what the form of faults offers: the types of fault by channel, with parameters as they are written."""
+    return {
+        channel: {
+            name: {
+                "meaning": kind.meaning,
+                "parameters": [
+                    {
+                        "name": parameter.name,
+                        "unit": parameter.of(channel).unit,
+                        "range": parameter.of(channel).constraint,
+                        "due": parameter.default is None,
+                    }
+                    for parameter in kind.parameters
+                ],
+            }
+            for name, kind in FAULT_KINDS.items()
+            if channel in kind.channels
+        }
+        for channel in CHANNELS
+    }
+
+
+def _asset(package: str, name: str) -> Markup:
+    return Markup(files(package).joinpath("template", name).read_text(encoding="utf-8"))
