@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -11,6 +11,8 @@ from hsv_msgs.msg import Ready, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.event_handler import QoSSubscriptionMatchedInfo, SubscriptionEventCallbacks
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
@@ -123,8 +125,9 @@ class LockstepNode(ProcessNode):
                 (there if endpoint.topic_type_hash in definitions else different).update(found)
             self.linked |= there
             absent = [role for role in roles if role.name not in there]
-            # Types say who is there, counts that the link itself stands: both are needed before the first message.
-            absent = absent or roles[self._matched(topic) :]
+            # Types say who is there, counts that the link itself stands: both are needed before the first message. Who
+            # only watches counts for none of them.
+            absent = absent or roles[max(self._matched(topic) - self._watching(seen, topic, there), 0) :]
             kind = description.TOPICS[topic]
             missing += [
                 f"{role.name} ({name}"
@@ -200,6 +203,19 @@ class LockstepNode(ProcessNode):
         message = DiagnosticArray(status=[status])
         message.header.stamp = step_stamp
         self._diagnostics.publish(message)
+
+    def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
+        """Return how many of the endpoints ``seen`` are of nodes that are not ``linked``, and matched all the same."""
+
+        def ends(other: QoSProfile) -> tuple[QoSProfile, QoSProfile]:
+            return (STEP, other) if topic in self._outputs else (other, STEP)
+
+        return sum(
+            full_name(endpoint.node_name, endpoint.node_namespace) not in linked.values()
+            and endpoint.topic_type == description.TOPICS[topic]
+            and qos_check_compatible(*ends(endpoint.qos_profile))[0] is not QoSCompatibility.ERROR
+            for endpoint in seen
+        )
 
     def _matched(self, topic: str) -> int:
         if topic in self._outputs:

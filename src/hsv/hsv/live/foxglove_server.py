@@ -27,7 +27,7 @@ class FoxgloveServer:
             RecordingError: A message type is not installed.
         """
         # Of a client that comes wrongly or leaves, a person at the flight need not hear.
-        foxglove.set_log_level(logging.ERROR)
+        foxglove.set_log_level(logging.CRITICAL)
         # Kept: its channels close with it.
         self._context = foxglove.Context()
         self._channels = {

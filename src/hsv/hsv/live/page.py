@@ -11,6 +11,7 @@ from markupsafe import Markup
 from hsv.faults.table import CHANNELS, FAULT_KINDS
 from hsv.live.addresses import origins
 from hsv.live.hub import Hub
+from hsv.parameters import Parameter
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.panels import GROUPS, Panel
@@ -26,22 +27,21 @@ READOUTS = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equi
 def render(hub: Hub, port: int) -> str:
     """Return the page of a flight that ``hub`` knows, as it is served on ``port``."""
     panels = list(dict.fromkeys(column.panel for column in hub.columns))
-    return (
-        environment_of("hsv.live")
-        .get_template("live.html.j2")
-        .render(
-            title=hub.status()["title"],
-            groups={key: heading for key, heading in GROUPS.items() if any(panel.group == key for panel in panels)},
-            panels=panels,
-            readouts=[panel for name in READOUTS for panel in panels if panel.name == name],
-            kinds=_kinds(),
-            sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
-            unit=text.unit,
-            styles=[_asset("hsv.recording.report", "style.css"), _asset("hsv.live", "live.css")],
-            scripts=[_asset("hsv.recording.report", "charts.js"), _asset("hsv.live", "live.js")],
-            plots={"panels": _panels(hub)},
-            library=Markup(compressed(LIBRARY.read_bytes())),
-        )
+    environment = environment_of("hsv.live")
+    environment.policies["json.dumps_kwargs"] = {}  # in the order of the tables
+    template = environment.get_template("live.html.j2")
+    return template.render(
+        title=hub.status()["title"],
+        groups={key: heading for key, heading in GROUPS.items() if any(panel.group == key for panel in panels)},
+        panels=panels,
+        readouts=[panel for name in READOUTS for panel in panels if panel.name == name],
+        kinds=_kinds(),
+        sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
+        unit=text.unit,
+        styles=[_asset("hsv.recording.report", "style.css"), _asset("hsv.live", "live.css")],
+        scripts=[_asset("hsv.recording.report", "charts.js"), _asset("hsv.live", "live.js")],
+        plots={"panels": _panels(hub)},
+        library=Markup(compressed(LIBRARY.read_bytes())),
     )
 
 
@@ -81,8 +81,7 @@ def _kinds() -> dict[str, dict[str, Any]]:
                 "parameters": [
                     {
                         "name": parameter.name,
-                        "unit": parameter.of(channel).unit,
-                        "range": parameter.of(channel).constraint,
+                        "range": _range(parameter.of(channel)),
                         "due": parameter.default is None,
                     }
                     for parameter in kind.parameters
@@ -93,6 +92,10 @@ def _kinds() -> dict[str, dict[str, Any]]:
         }
         for channel in CHANNELS
     }
+
+
+def _range(parameter: Parameter) -> str:
+    return f"{parameter.minimum:.4g} to {parameter.maximum:.4g} {parameter.unit}".strip()
 
 
 def _asset(package: str, name: str) -> Markup:

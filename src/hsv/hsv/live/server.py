@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import secrets
 import threading
 from collections.abc import Callable
@@ -92,7 +93,12 @@ class PageServer:
             changed.set()
 
     async def _listen(self, port: int) -> Server:
-        return await serve(self._serve, HOST, port, process_request=self._respond, max_size=_LONGEST_REQUEST)
+        # Of a client that comes wrongly, a person at the flight need not hear.
+        logger = logging.getLogger(__name__)
+        logger.addFilter(lambda record: record.msg != "opening handshake failed")
+        return await serve(
+            self._serve, HOST, port, process_request=self._respond, max_size=_LONGEST_REQUEST, logger=logger
+        )
 
     async def _sent(self) -> None:
         await asyncio.sleep(0)

@@ -224,7 +224,9 @@ class Flight {
     charts.follow();
     for (const place of document.querySelectorAll("[id^=value-]")) {
       const value = charts.newest(place.id.slice("value-".length));
-      place.textContent = Number.isFinite(value) ? value.toPrecision(5).replace("-", "−") : "–";
+      // As many digits as do not flicker more than they tell.
+      const text = Math.abs(value) >= 1000 ? value.toFixed(1) : value.toPrecision(3);
+      place.textContent = Number.isFinite(value) ? text.replace("-", "−") : "–";
     }
     document.getElementById("value-level").classList.toggle("bad", charts.newest("level") > 1);
     this.tellState();
