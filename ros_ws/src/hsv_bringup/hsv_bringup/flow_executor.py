@@ -34,14 +34,19 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Sweep while messages come, at most ``SWEEPS`` times; then run one other callback, waiting if none came."""
-        super().spin_once(timeout_sec=0.0 if self.sweep() else timeout_sec)
-
-    def sweep(self) -> bool:
-        """Sweep while messages come, at most ``SWEEPS`` times; return whether any came."""
         sweeps = 0
         while sweeps < SWEEPS and self._sweep():
             sweeps += 1
-        return sweeps > 0
+        super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
+
+    def drain(self) -> None:
+        """Take all that has come, subscription by subscription, up to ``SWEEPS`` messages of each."""
+        for take, kind, raw, callback in self._subscriptions:
+            for _ in range(SWEEPS):
+                taken = take(kind, raw)
+                if taken is None:
+                    break
+                callback(taken[0])
 
     def _sweep(self) -> bool:
         came = False

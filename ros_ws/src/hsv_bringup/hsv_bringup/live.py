@@ -54,18 +54,21 @@ from hsv_node.process import ProcessNode
 from hsv_node.qos import LATCHED
 from hsv_node.roles import full_name, node_in_role, services
 
-RATE = 25.0
+RATE = 20.0
 """Looks a second at what has come: rows of the page, and batches for Foxglove."""
 
+AT_ONCE = 100
+"""Steps that are decoded at most in one look, of a flight that was on its way before anybody looked at its page."""
+
 DEPTH = 1000
-"""Messages of a topic that wait between two looks: a flight that is faster than 25 times as many steps a second loses
-some here, and so does one whose viewer gets no processor time for 20 s at real-time pace."""
+"""Messages of a topic that wait to be taken: of a flight at full speed some are lost here, at real-time pace only where
+this process gets no processor time for 20 s."""
 
 WATCHING = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 """No publisher waits for who watches."""
 
-_LOOK = 0.25
-"""Seconds between two looks at everything but topics, while nothing is asked."""
+_LOOK = 1.0
+"""Seconds between two looks for the plant."""
 
 _STAMP = struct.Struct("<iI")
 
@@ -73,18 +76,11 @@ _STAMP = struct.Struct("<iI")
 class LiveExecutor(FlowExecutor):
     """Sleeps until a look is due, and not until a message comes: a hundred of them cost little more than one."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self._looks = 0.0
-
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sleep for so long, take all that has come, and now and then look at everything else."""
+        """Sleep for so long, then take all that has come, and look for an answer where a service was asked."""
         time.sleep(timeout_sec or 0.0)
-        self.sweep()
-        now = time.monotonic()
-        asked = any(True for node in self.get_nodes() for _ in node.clients)
-        if now >= self._looks or asked:
-            self._looks = now + _LOOK
+        self.drain()
+        if any(True for node in self.get_nodes() for _ in node.clients):
             SingleThreadedExecutor.spin_once(self, 0.0)
 
 
@@ -122,7 +118,7 @@ class LiveNode(ProcessNode):
         self._plant = ""
         """Full name of the plant's node, once it has answered."""
         self._requests: list[_Request] = []
-        self._next_look = time.monotonic()
+        self._next_look = self._looks_for_plant = time.monotonic()
         # In the order in which they are looked at: a run before its messages, its end behind them.
         self.create_subscription(Run, RUN, self._on_run, LATCHED, raw=True)
         for topic in TOPICS:
@@ -139,6 +135,8 @@ class LiveNode(ProcessNode):
         """Sample what has come, and go on with what is asked."""
         self._next_look = max(self._next_look + 1.0 / RATE, time.monotonic())
         self.hub.sample()
+        if self.page.watched:
+            self.hub.decode(AT_ONCE)
         while not self.page.commands.empty():
             self._carry_out(*self.page.commands.get())
         for request in list(self._requests):
@@ -146,7 +144,9 @@ class LiveNode(ProcessNode):
                 self._requests.remove(request)
                 if request.client is not None:
                     self.destroy_client(request.client)
-        self._look_for_plant()
+        if time.monotonic() >= self._looks_for_plant:
+            self._looks_for_plant = time.monotonic() + _LOOK
+            self._look_for_plant()
         self.page.publish()
 
     def wait_timeout(self) -> float:
@@ -156,9 +156,11 @@ class LiveNode(ProcessNode):
     def close(self) -> None:
         """Show the last of what has come, and leave the viewers."""
         if isinstance(self.executor, LiveExecutor):
-            self.executor.sweep()
-        self.hub.sample()
+            self.executor.drain()
         self._look_for_plant()
+        if self.page.watched:
+            self.hub.sample()
+            self.hub.decode()
         self.page.close()
         self.foxglove.close()
 

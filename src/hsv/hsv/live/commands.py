@@ -58,7 +58,8 @@ def read_command(fields: Mapping[str, Any]) -> Command:
 
 def _inject(fields: Mapping[str, Any]) -> Command:
     channel, kind = _choice(fields, "channel", CHANNELS), _choice(fields, "type", FAULT_KINDS)
-    parameters = [word.strip() for word in _text(fields, "parameters", "").split(",") if word.strip()]
+    words = filter(str.strip, _text(fields, "parameters", "").split(","))
+    parameters = ["=".join(map(str.strip, word.split("=", 1))) for word in words]
     duration = parse_quantity(_text(fields, "duration", "") or "0 s", "s", "duration")
     if duration < 0.0:
         raise ParameterError(f"duration = {duration:g}: expected at least 0 (seconds; 0: until cleared)")

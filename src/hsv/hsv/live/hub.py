@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from collections import defaultdict, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +19,9 @@ MOST_ROWS = 20_000
 """Rows of the history after which every second one is given up."""
 
 _FIRST_ROWS = 1024
+
+_KEPT = 16
+"""Messages of a topic among which that of the newest whole step is found, however fast the flight is."""
 
 _EVENTS = 200
 """Lines of what has happened that are kept."""
@@ -54,6 +58,7 @@ class Hub:
         self._status: dict[str, Any] = {"run": None, "settings": {}, "limits": {}}
         self.version = 0
         """Counts the changes of what :meth:`status` says."""
+        self._waiting: list[dict[str, bytes]] = []
         self._forget()
 
     def start_run(self, run_id: str, period: float, last_step: int) -> None:
@@ -66,8 +71,7 @@ class Hub:
 
     def offer(self, topic: str, time: int, data: bytes) -> None:
         """Take a message of a step topic, serialized, of simulated ``time`` (ns)."""
-        pair = self._latest.get(topic)
-        self._latest[topic] = (time, data, pair[0] if pair else -1, pair[1] if pair else b"")
+        self._latest[topic].append((time, data))
 
     def say(self, **values: Any) -> None:
         """Change what :meth:`status` says: ``settings`` and ``limits`` by name, how the run ended, ``ending``."""
@@ -83,41 +87,33 @@ class Hub:
     def note(self, words: str, *, step: int | None = None, warning: bool = False) -> None:
         """Add a line to what has happened, which acts or is said at ``step``; None: now."""
         with self._lock:
-            at = self._step if step is None else step
+            at = round(self.time * 1e-9 / self._period) if step is None else step
             event = {"time": round(at * self._period, 9), "step": at, "words": words, "warning": warning}
             self._say({"events": [*self._status["events"], event][-_EVENTS:]})
 
     def sample(self) -> bool:
-        """Add the newest step of which every topic is here, if it is new; return whether it was.
-
-        All are decoded here and nowhere else, so that a fast flight costs no more than a slow one.
-        """
-        due = self._newest_step()
-        if due is None:
+        """Keep the newest step of which every topic is here, if it is new; return whether it was."""
+        step = self._newest_step()
+        if step is None:
             return False
-        time, serialized = due
-        messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
-        values = row(self.columns, messages)
-        with self._lock:
-            if self._count == len(self._rows):
-                self._make_room()
-            self._rows[self._count] = values
-            self._count += 1
-            self._sampled = time
-            state, actuator = messages[STATE], messages[ACTUATOR]
-            self._step = int(state.step)
-            said = {
-                "faults": [
-                    {"words": str(fault_in(fault)), "channel": fault.channel, "type": fault.type, "since": int(since)}
-                    for fault, since in zip(actuator.active, actuator.since, strict=True)
-                ],
-                "nominal_status": messages[NOMINAL].status,
-            }
-            if TUBE_STATUS in messages:
-                tube = messages[TUBE_STATUS]
-                said |= {"tau": [round(float(value), 12) for value in tube.tau], "tube_status": tube.status}
-            self._say(said)
+        self._sampled = step[0]
+        self._waiting.append(step[1])
+        if len(self._waiting) > MOST_ROWS:
+            self._waiting = self._waiting[::2]
         return True
+
+    def decode(self, most: int = MOST_ROWS) -> None:
+        """Add the rows of steps that were kept, the oldest ``most`` of them: for somebody who looks at them."""
+        waiting, self._waiting = self._waiting[:most], self._waiting[most:]
+        for serialized in waiting:
+            messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
+            values = row(self.columns, messages)
+            with self._lock:
+                if self._count == len(self._rows):
+                    self._make_room()
+                self._rows[self._count] = values
+                self._count += 1
+                self._say(self._said(messages))
 
     def history(self, generation: int, first: int) -> History:
         """Return the rows that a reader lacks who has those before ``first`` of a ``generation``."""
@@ -133,7 +129,7 @@ class Hub:
     @property
     def time(self) -> int:
         """The simulated time (ns) of the newest state, 0 before there is one."""
-        return self._latest[STATE][0] if STATE in self._latest else 0
+        return self._latest[STATE][-1][0] if self._latest[STATE] else 0
 
     def end(self, status: int, step: int) -> None:
         """Note with which ``status`` of the vehicle, at which step, the run has ended; running: it was broken off."""
@@ -142,14 +138,37 @@ class Hub:
 
     def _forget(self) -> None:
         self._generation += 1
-        self._latest: dict[str, tuple[int, bytes, int, bytes]] = {}
+        self._latest: dict[str, deque[tuple[int, bytes]]] = defaultdict(lambda: deque(maxlen=_KEPT))
         self._rows = np.empty((_FIRST_ROWS, 1 + len(self.columns)), np.float32)
         self._count = 0
         self._sampled = -1
-        self._step = 0
+        self._waiting = []
+        self._faults: dict[tuple[Any, ...], str] = {}
         self._period = 0.0
         self._status |= {"faults": [], "diagnostics": {}, "events": [], "ending": None, "tau": None}
         self._status |= {"tube_status": None, "nominal_status": 0}
+
+    def _said(self, messages: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what a step says besides the rows."""
+        actuator = messages[ACTUATOR]
+        said = {
+            "faults": [
+                {"words": self._words(fault), "channel": fault.channel, "type": fault.type, "since": int(since)}
+                for fault, since in zip(actuator.active, actuator.since, strict=True)
+            ],
+            "nominal_status": messages[NOMINAL].status,
+        }
+        if TUBE_STATUS in messages:
+            tube = messages[TUBE_STATUS]
+            said |= {"tau": [round(float(value), 12) for value in tube.tau], "tube_status": tube.status}
+        return said
+
+    def _words(self, fault: Any) -> str:
+        """Return a fault in words, which takes longer than all the rest of a sample: once for each."""
+        key = fault.channel, fault.type, *fault.parameter_names, *fault.parameter_values
+        if key not in self._faults:
+            self._faults[key] = str(fault_in(fault))
+        return self._faults[key]
 
     def _say(self, values: Mapping[str, Any]) -> None:
         changed = {name: value for name, value in values.items() if self._status.get(name) != value}
@@ -166,20 +185,12 @@ class Hub:
             self._rows[: self._count] = thinned
 
     def _newest_step(self) -> tuple[int, dict[str, bytes]] | None:
-        latest = self._latest
-        if not latest.keys() >= self._steady:
+        kept = {topic: self._latest[topic] for topic in self._topics if self._latest[topic]}
+        if not kept.keys() >= self._steady:
             return None
-        # The topics of a step come one after the other: of some the message of the next one may be here.
-        time = min(latest[topic][0] for topic in self._steady)
-        if TUBE_STATUS in latest:
-            time = min(time, latest[TUBE_STATUS][0])
+        # The topics of a step come one after the other: of some, messages of later ones are here.
+        time = min(messages[-1][0] for messages in kept.values())
         if time <= self._sampled:
             return None
-        found = {}
-        for topic in self._topics:
-            if topic in latest:
-                now, data, before, data_before = latest[topic]
-                if time not in (now, before):
-                    return None
-                found[topic] = data if time == now else data_before
-        return time, found
+        step = {topic: dict(messages).get(time, b"") for topic, messages in kept.items()}
+        return (time, step) if all(step.values()) else None

@@ -15,7 +15,6 @@ from hsv.parameters import Parameter
 from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.panels import GROUPS, Panel
-from hsv.recording.report.payload import compressed
 from hsv.recording.report.templates import environment_of
 from hsv.recording.report.text import unit_html
 from hsv.units import to_paper
@@ -39,9 +38,12 @@ def render(hub: Hub, port: int) -> str:
         sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
         unit=text.unit,
         styles=[_asset("hsv.recording.report", "style.css"), _asset("hsv.live", "live.css")],
-        scripts=[_asset("hsv.recording.report", "charts.js"), _asset("hsv.live", "live.js")],
+        scripts=[
+            Markup(LIBRARY.read_text(encoding="utf-8")),
+            _asset("hsv.recording.report", "charts.js"),
+            _asset("hsv.live", "live.js"),
+        ],
         plots={"panels": _panels(hub)},
-        library=Markup(compressed(LIBRARY.read_bytes())),
     )
 
 

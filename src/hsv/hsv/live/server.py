@@ -68,9 +68,15 @@ class PageServer:
         """The address of the page, with the token of its commands in the part that a browser sends to nobody."""
         return f"http://{HOST}:{self.port}/#token={self._token}"
 
+    @property
+    def watched(self) -> bool:
+        """Whether somebody looks at the page."""
+        return bool(self._changed)
+
     def publish(self) -> None:
         """Send what is new in the hub to everybody, whenever each is ready for it."""
-        self._loop.call_soon_threadsafe(self._wake)
+        if self._changed:
+            self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
         """Send what is new, and leave the clients."""
@@ -83,10 +89,15 @@ class PageServer:
             self._server.close(code=_GOING, reason="the live view has ended")
             with suppress(TimeoutError):
                 await asyncio.wait_for(self._server.wait_closed(), _LAST_WORDS)
+            unread = asyncio.all_tasks() - {asyncio.current_task()}
+            for task in unread:
+                task.cancel()
+            await asyncio.gather(*unread, return_exceptions=True)
 
         asyncio.run_coroutine_threadsafe(leave(), self._loop).result()
         self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join()
+        self._loop.close()
 
     def _wake(self) -> None:
         for changed in self._changed:
@@ -97,7 +108,13 @@ class PageServer:
         logger = logging.getLogger(__name__)
         logger.addFilter(lambda record: record.msg != "opening handshake failed")
         return await serve(
-            self._serve, HOST, port, process_request=self._respond, max_size=_LONGEST_REQUEST, logger=logger
+            self._serve,
+            HOST,
+            port,
+            process_request=self._respond,
+            max_size=_LONGEST_REQUEST,
+            close_timeout=_LAST_WORDS,
+            logger=logger,
         )
 
     async def _sent(self) -> None:

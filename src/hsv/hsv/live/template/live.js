@@ -298,11 +298,8 @@ function connectControls(flight) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => charts.set({}));
 }
 
-async function start() {
+function start() {
   try {
-    const script = document.createElement("script");
-    script.textContent = new TextDecoder().decode(await inflate("library"));
-    document.head.append(script);
     const charts = new LiveCharts(JSON.parse(document.getElementById("plots").textContent));
     const flight = new Flight(charts);
     connectControls(flight);

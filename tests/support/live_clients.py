@@ -1,0 +1,137 @@
+"""Clients of the live view, on another WebSocket library than the servers': one for each of the two protocols."""
+
+from __future__ import annotations
+
+import json
+import re
+import struct
+import threading
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+from websocket import WebSocket, WebSocketException, create_connection
+
+_MESSAGE = struct.Struct("<BIQ")
+"""Of foxglove.sdk.v1: 1 for message data, number of the subscription, log time (ns); the message follows."""
+
+LATER = 60.0
+"""Seconds without anything at all after which a client gives up."""
+
+
+class FoxgloveClient:
+    """Subscribes every topic of a server that speaks ``foxglove.sdk.v1``, and keeps what comes until it is left."""
+
+    def __init__(self, port: int, *, reads: bool = True) -> None:
+        self._socket = create_connection(f"ws://127.0.0.1:{port}", LATER, subprotocols=["foxglove.sdk.v1"])
+        self.protocol = self._socket.getsubprotocol()
+        self.channels: dict[int, dict[str, Any]] = {}
+        self.sessions: list[str] = []
+        self.messages: dict[str, list[tuple[int, bytes]]] = defaultdict(list)
+        """Log time (ns) and bytes, by topic."""
+        self._thread = threading.Thread(target=self._read, daemon=True)
+        while not self.channels:
+            self._take(self._socket.recv())
+        if reads:
+            self._thread.start()
+
+    def wait(self) -> None:
+        """Wait until the server has left."""
+        self._thread.join()
+
+    def leave(self) -> None:
+        """Leave without a word."""
+        self._socket.sock.close()
+
+    def _read(self) -> None:
+        try:
+            while data := self._socket.recv():
+                self._take(data)
+        except (WebSocketException, OSError):
+            pass  # the server has left
+
+    def _take(self, data: str | bytes) -> None:
+        if isinstance(data, bytes):
+            kind, number, time = _MESSAGE.unpack_from(data)
+            if kind == 1:
+                self.messages[self.channels[number]["topic"]].append((time, data[_MESSAGE.size :]))
+            return
+        said = json.loads(data)
+        if said["op"] == "serverInfo":
+            self.sessions.append(said["sessionId"])
+        elif said["op"] == "advertise":
+            self.channels |= {channel["id"]: channel for channel in said["channels"]}
+            wanted = [{"id": channel["id"], "channelId": channel["id"]} for channel in said["channels"]]
+            self._socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
+
+class PageClient:
+    """Does what the page does: gathers rows and status, asks, and waits for the answers."""
+
+    def __init__(self, url: str, *, origin: str | None = "", token: str | None = None) -> None:
+        """Connect to the page of an address as the start prints it; without an ``origin``, as that page itself."""
+        found = re.fullmatch(r"(http://([^/]+))/#token=(.+)", url)
+        assert found, url
+        self.token = found[3] if token is None else token
+        self._socket: WebSocket = create_connection(
+            f"ws://{found[2]}/flight",
+            LATER,
+            origin=found[1] if origin == "" else origin,
+            suppress_origin=origin is None,
+        )
+        self.status: dict[str, Any] = {}
+        self._blocks: list[bytes] = []
+        self.answers: list[dict[str, Any]] = []
+
+    @property
+    def data(self) -> bytes:
+        """All rows, one after the other."""
+        return b"".join(self._blocks)
+
+    def times(self, columns: int) -> np.ndarray:
+        """Return the times (s) of the rows, of so many columns beside the time."""
+        return np.frombuffer(self.data, "<f4").reshape(-1, 1 + columns)[:, 0]
+
+    def read(self) -> bool:
+        """Take the next message; return whether there was one."""
+        try:
+            data = self._socket.recv()
+        except (WebSocketException, OSError):
+            return False
+        if isinstance(data, bytes):
+            self._blocks.append(data)
+        elif not data:
+            return False
+        else:
+            said = json.loads(data)
+            match said.pop("kind"):
+                case "history":
+                    self._blocks.clear()
+                case "status":
+                    self.status = said
+                case "answer":
+                    self.answers.append(said)
+        return True
+
+    def ask(self, command: str, **fields: str) -> dict[str, Any]:
+        """Return the answer to a command."""
+        return self.send(json.dumps({"id": 1, "token": self.token, "command": command, **fields}))
+
+    def send(self, text: str) -> dict[str, Any]:
+        """Return the answer to a request, whatever it is."""
+        self._socket.send(text)
+        before = len(self.answers)
+        while len(self.answers) == before:
+            assert self.read(), "the server has left"
+        return self.answers[-1]
+
+    def leave(self) -> None:
+        """Leave without a word."""
+        self._socket.sock.close()
+
+
+def addresses(text: str) -> tuple[str, int]:
+    """Return the address of the page and the port for Foxglove, of what the start has printed."""
+    page, data = re.search(r"live page: (\S+)", text), re.search(r"live data: ws://127\.0\.0\.1:(\d+)", text)
+    assert page and data, text
+    return page[1], int(data[1])
