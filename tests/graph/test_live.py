@@ -1,0 +1,186 @@
+"""A flight that is watched: with viewers of every kind it is the same flight, and what they ask of it is recorded."""
+
+import os
+import re
+import signal
+import socket
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live_clients import FoxgloveClient, PageClient, addresses
+from node_processes import Processes, children, recorded_steps, short_scenario
+from waiting import output_of, wait_until
+
+from hsv.graph.description import TOPICS, resolved
+from hsv.live.columns import columns
+from hsv.recording.flight import flight_fingerprint
+from hsv.recording.reader import Bag
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+LIVE = ("--live", "--live-port", "0", "--no-report")
+
+
+class Watched:
+    """A live flight, and what it has printed."""
+
+    def __init__(self, processes: Processes, *words: str | Path) -> None:
+        self.log = processes.folder / "live.txt"
+        with self.log.open("w") as output:
+            self.popen = processes.start("hsv", "run", *words, *LIVE, output=output)
+        wait_until(lambda: "live data" in self.text or self.popen.poll() is not None, [self.popen.pid])
+        self.page, self.port = addresses(self.text)
+
+    @property
+    def text(self) -> str:
+        return self.log.read_text()
+
+    def land(self) -> None:
+        """Wait for the end, which must be a good one."""
+        wait_until(lambda: self.popen.poll() is not None, [self.popen.pid])
+        assert self.popen.returncode == 0, self.text
+
+
+def steps_of(client: FoxgloveClient, topic: str) -> np.ndarray:
+    """Return the steps of which a client has a message."""
+    return np.rint(np.array([time for time, _ in client.messages[resolved(topic)]]) / 0.02e9).astype(int)
+
+
+def assert_without_gap(client: FoxgloveClient, bag: Bag) -> None:
+    """Every topic has every step, with the bytes of the bag, from the one on at which the client was there."""
+    for topic in TOPICS:
+        steps = steps_of(client, topic)
+        recorded = [data for _, data in bag.messages(topic)]
+        # The first is a matter of who was there first, the client or the flight.
+        assert steps[0] <= 1 and steps.tolist() == list(range(steps[0], len(recorded))), topic
+        assert [data for _, data in client.messages[resolved(topic)]] == recorded[steps[0] :], topic
+
+
+def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes, tmp_path: Path) -> None:
+    scenario = short_scenario(tmp_path, duration=20)
+    watched = Watched(processes, scenario, "--bag", tmp_path / "bag", "--real-time-factor", "10")
+    readers = [FoxgloveClient(watched.port) for _ in range(2)]
+    leaves = FoxgloveClient(watched.port)
+    idle = FoxgloveClient(watched.port, reads=False)
+    page = PageClient(watched.page)
+    threading.Thread(target=lambda: all(iter(page.read, False)), daemon=True).start()
+    wait_until(lambda: len(leaves.messages["/hsv/state"]) > 50, [watched.popen.pid])
+    leaves.leave()
+    late = PageClient(watched.page)
+    while late.read():
+        pass
+    watched.land()
+    idle.leave()
+    bag = Bag(tmp_path / "bag")
+    assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
+    for reader in readers:
+        reader.wait()
+        assert_without_gap(reader, bag)
+    # Whoever comes late sees the flight from its start to its end, and how it ended.
+    times = late.times(len(columns()))
+    assert times[0] < 1.0 and times[-1] == pytest.approx(20.0) and np.all(np.diff(times) > 0)
+    assert late.status["ending"] == {"how": "finished", "time": 20.0}
+    assert late.status["bag"] == str(tmp_path / "bag")
+    assert late.status["limits"]["fuel_equivalence_ratio"] == [0.0, 1.5]
+
+
+def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, tmp_path: Path) -> None:
+    scenario = short_scenario(tmp_path, duration=3600, fault=3000)
+    watched = Watched(processes, scenario, "--bag", tmp_path / "bag", "--real-time-factor", "2")
+    page = PageClient(watched.page)
+    while len(page.data) < 5_000:
+        assert page.read()
+    loss = {"channel": "elevator_deflection", "type": "loss_of_effectiveness"}
+    refused = page.ask("inject", **loss, parameters="1.8")
+    assert refused["accepted"] is False and "fault.effectiveness = '1.8': expected from 0 to 1" in refused["message"]
+    refused = page.ask("tau", tau="0.5")
+    assert refused["accepted"] is False and "expected 1: no other factor is certified" in refused["message"]
+    injected = page.ask("inject", **loss, parameters="0.9")
+    assert injected["accepted"], injected
+    paused = page.ask("pause", paused="true")
+    # Nothing is flown any more from the acknowledged step on.
+    assert paused["message"].startswith(f"paused = True from step {paused['step']} on")
+    wait_until(lambda: recorded_steps(tmp_path / "bag") >= paused["step"] - 50, [watched.popen.pid])
+    while not page.status["settings"].get("paused"):
+        assert page.read()
+    resumed = page.ask("pause", paused="false")
+    assert resumed["step"] == paused["step"]
+    faster = page.ask("pace", real_time_factor="0")
+    cleared = page.ask("clear")
+    assert faster["accepted"] and cleared["accepted"] and cleared["step"] > injected["step"]
+    words = [event["words"] for event in page.status["events"]]
+    assert any(word.startswith("loss_of_effectiveness effectiveness 0.9 of elevator_deflection") for word in words)
+    wait_until(
+        lambda: recorded_steps(tmp_path / "bag") > cleared["step"] + 50,
+        [watched.popen.pid],
+        lambda: recorded_steps(tmp_path / "bag"),
+    )
+    watched.popen.send_signal(signal.SIGINT)
+    wait_until(lambda: watched.popen.poll() is not None, [watched.popen.pid])
+    active = [message.step for _, message in Bag(tmp_path / "bag").decode("/hsv/actuator") if message.active]
+    assert active == list(range(injected["step"], cleared["step"]))
+
+
+@pytest.mark.long
+def test_at_real_time_pace_nothing_is_missed(processes: Processes, tmp_path: Path) -> None:
+    watched = Watched(processes, short_scenario(tmp_path, duration=20), "--bag", tmp_path / "bag")
+    client = FoxgloveClient(watched.port)
+    watched.land()
+    client.wait()
+    assert re.search(r"flown 20 s in \d+(\.\d+)? s: 1 x real time|0\.\d+ x real time", watched.text)
+    assert_without_gap(client, Bag(tmp_path / "bag"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("composed", [(), ("--composed",)], ids=["separate", "composed"])
+def test_at_full_speed_a_stopped_live_node_holds_nobody_up(processes: Processes, tmp_path: Path, composed) -> None:
+    scenario = short_scenario(tmp_path, duration=120)
+    words = [scenario, "--bag", tmp_path / "bag", "--real-time-factor", "0", *composed]
+    watched = Watched(processes, *words)
+    client = FoxgloveClient(watched.port)
+    wait_until(lambda: len(client.messages["/hsv/state"]) > 10, [watched.popen.pid])
+    os.kill(children(watched.popen.pid)["live"], signal.SIGSTOP)
+    watched.land()
+    bag = Bag(tmp_path / "bag")
+    assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
+    assert 0 < len(client.messages["/hsv/state"]) < len(bag.times("/hsv/state"))
+
+
+def test_a_port_in_use_ends_it_before_anything_has_begun(processes: Processes, tmp_path: Path) -> None:
+    with socket.socket() as held:
+        held.bind(("127.0.0.1", 0))
+        held.listen()
+        port = held.getsockname()[1]
+        refused = processes.start("hsv", "run", "case1", "--bag", tmp_path / "bag", "--live", "--live-port", str(port))
+        said = output_of(refused)
+    assert refused.returncode == 2 and said.count("\n") == 1
+    assert f"live-port = {port}: port {port}: address already in use, expected two free ports" in said
+    assert not (tmp_path / "bag").exists()
+
+
+@pytest.mark.long
+def test_beside_a_running_graph_it_shows_what_is_left_of_the_flight(processes: Processes, tmp_path: Path) -> None:
+    words = ["--bag", tmp_path / "bag", "--real-time-factor", "2", "--no-report"]
+    flight = processes.start("hsv", "run", short_scenario(tmp_path, duration=3600), *words)
+    wait_until(lambda: recorded_steps(tmp_path / "bag") > 50, [flight.pid], lambda: recorded_steps(tmp_path / "bag"))
+    log = tmp_path / "live.txt"
+    with log.open("w") as output:
+        live = processes.start(
+            "ros2", "run", "hsv_bringup", "live", "--ros-args", "-p", "live.port:=0", "-p", "live.page_port:=0",
+            output=output,
+        )  # fmt: skip
+    wait_until(lambda: "live data" in log.read_text() or live.poll() is not None, [live.pid])
+    page = PageClient(addresses(log.read_text())[0])
+    while len(page.data) < 5_000:
+        assert page.read()
+    assert page.times(len(columns()))[0] > 0.5
+    assert page.status["settings"]["real_time_factor"] == 2.0
+    flight.send_signal(signal.SIGINT)
+    while page.status["ending"] is None:
+        assert page.read()
+    assert page.status["ending"]["how"] == "broken off"
