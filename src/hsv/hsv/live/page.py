@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from hsv.airframe import side_view
 from hsv.faults.table import CHANNELS, FAULT_KINDS
 from hsv.live.addresses import origins
 from hsv.live.hub import Hub
@@ -18,9 +19,6 @@ from hsv.recording.report.panels import GROUPS, Panel
 from hsv.recording.report.templates import environment_of
 from hsv.recording.report.text import unit_html
 from hsv.units import to_paper
-
-READOUTS = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equivalence_ratio", "elevator_deflection")
-"""Panels whose newest value stands in figures at the top."""
 
 
 def render(hub: Hub, port: int) -> str:
@@ -33,7 +31,6 @@ def render(hub: Hub, port: int) -> str:
         title=hub.status()["title"],
         groups={key: heading for key, heading in GROUPS.items() if any(panel.group == key for panel in panels)},
         panels=panels,
-        readouts=[panel for name in READOUTS for panel in panels if panel.name == name],
         kinds=_kinds(),
         sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
         unit=text.unit,
@@ -41,9 +38,11 @@ def render(hub: Hub, port: int) -> str:
         scripts=[
             Markup(LIBRARY.read_text(encoding="utf-8")),
             _asset("hsv.recording.report", "charts.js"),
+            Markup(side_view.script()),
             _asset("hsv.live", "live.js"),
         ],
         plots={"panels": _panels(hub)},
+        airframe=side_view.geometry(),
     )
 
 

@@ -68,9 +68,40 @@ class LiveCharts extends Charts {
   drawLater() {}
 }
 
+/* The side view at the newest step, beside the nominal one. */
+class Vehicle {
+  constructor(charts) {
+    this.charts = charts;
+    const section = document.getElementById("vehicle"), slider = section.querySelector("[name=exaggeration]");
+    this.view = createSideView(section.querySelector(".side-view"), JSON.parse(document.getElementById("airframe").textContent));
+    slider.addEventListener("input", () => this.view.setExaggeration(Number(slider.value)));
+    section.querySelector("form").addEventListener("submit", (event) => event.preventDefault());
+  }
+
+  /* The newest values of the curves of a kind; of what moves in it, the actuators come before the command. */
+  sample(...kinds) {
+    const { charts } = this;
+    const newest = (name) => {
+      const { curves } = charts.panels.find((panel) => panel.name === name);
+      const curve = kinds.map((kind) => curves.find((each) => each.kind === kind)).find(Boolean);
+      return charts.store[curve.y][charts.count - 1];
+    };
+    const names = ["altitude", "velocity", "angle_of_attack", "pitch_angle", "fuel_equivalence_ratio", "elevator_deflection"];
+    const elastic = [newest("elastic_coordinate_1"), newest("elastic_coordinate_2")];
+    return { time: charts.now, elastic, ...Object.fromEntries(names.map((name) => [name, newest(name)])) };
+  }
+
+  draw(faults) {
+    if (!this.charts.count) return;
+    const said = faults.map(({ channel, type }) => ({ channel, text: `${channel}: ${type}`.replaceAll("_", " ") }));
+    this.view.draw({ ...this.sample("actuator", "actual"), faults: said, nominal: this.sample("nominal") });
+  }
+}
+
 class Flight {
   constructor(charts) {
     this.charts = charts;
+    this.vehicle = new Vehicle(charts);
     this.form = document.getElementById("toolbar").elements;
     this.token = new URLSearchParams(location.hash.slice(1)).get("token");
     this.status = null;
@@ -222,13 +253,10 @@ class Flight {
       panel.element.closest("figure").hidden = !drawn;
     }
     charts.follow();
-    for (const place of document.querySelectorAll("[id^=value-]")) {
-      const value = charts.newest(place.id.slice("value-".length));
-      // As many digits as do not flicker more than they tell.
-      const text = Math.abs(value) >= 1000 ? value.toFixed(1) : value.toPrecision(3);
-      place.textContent = Number.isFinite(value) ? text.replace("-", "−") : "–";
-    }
-    document.getElementById("value-level").classList.toggle("bad", charts.newest("level") > 1);
+    this.vehicle.draw(this.status ? this.status.faults : []);
+    const level = charts.newest("level"), place = document.getElementById("level");
+    place.textContent = Number.isFinite(level) ? level.toPrecision(3) : "–";
+    place.classList.toggle("bad", level > 1);
     this.tellState();
   }
 }
@@ -273,7 +301,7 @@ function connectControls(flight) {
   }
   document.getElementById("toolbar").addEventListener("submit", (event) => event.preventDefault());
   document.addEventListener("keydown", (event) => {
-    if (event.key !== " " || event.target.closest("input, select, button, a") || form.pause.matches(":disabled")) return;
+    if (event.key !== " " || event.target.closest("input, select, button, a, summary") || form.pause.matches(":disabled")) return;
     event.preventDefault();
     pause();
   });
@@ -282,6 +310,7 @@ function connectControls(flight) {
       case "units":
         document.documentElement.dataset.units = event.target.value;
         charts.set({ units: event.target.value });
+        flight.vehicle.view.setUnits(event.target.value);
         break;
       case "window":
         charts.window = event.target.value === "" ? null : Number(event.target.value);
