@@ -5,6 +5,7 @@ import signal
 import time
 from pathlib import Path
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 # Started in the background, a shell's child ignores SIGINT, and so would every process that a test interrupts.
@@ -13,6 +14,21 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # Neither an example nor the search for one has a time limit: other work on the machine must not fail a test.
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy")
+
+PICTURES = Path(__file__).parents[1] / "docs" / "images"
+"""The pictures of the documentation."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option to make the documentation's pictures anew."""
+    parser.addoption("--pictures", action="store_true", help="write what the browser shows to docs/images")
+
+
+@pytest.fixture
+def pictures(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    """Return the folder for pictures of the documentation: its own if they are asked for."""
+    return PICTURES if request.config.getoption("--pictures") else tmp_path
+
 
 MOST_WORKERS = 8
 """Each may have a graph of six processes, of a tenth of a gigabyte each."""

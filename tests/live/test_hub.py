@@ -73,6 +73,8 @@ def test_faults_come_and_the_end_is_told(hub, messages):
     offer(hub, messages[50 * A_STEP :])
     [fault] = hub.status()["faults"]
     assert (fault["channel"], fault["since"]) == ("elevator_deflection", 100)
+    [event] = hub.status()["events"]
+    assert (event["time"], event["words"]) == (2.0, f"{fault['words']} begins")
     hub.end(1, 200)
     assert hub.status()["ending"] == {"how": "finished", "time": 4.0}
 

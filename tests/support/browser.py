@@ -66,6 +66,11 @@ class Browser:
         self.driver.find_element("css selector", selector).click()
         self.settle()
 
+    def press(self, key: str) -> None:
+        """Press a key on the page itself, whatever has had the focus."""
+        self.run("document.activeElement.blur()")
+        self.driver.find_element("css selector", "body").send_keys(key)
+
     def console(self) -> list[str]:
         """Return what the console received since the last call."""
         return [entry["message"] for entry in self.driver.get_log("browser")]

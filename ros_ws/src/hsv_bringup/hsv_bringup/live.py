@@ -245,7 +245,8 @@ class LiveNode(ProcessNode):
 
         def acknowledge(words: str, step: int) -> None:
             period = self._run.period if self._run else 0.0
-            self.hub.note(words, step=step)
+            if isinstance(command, Change):  # faults are noted when they act
+                self.hub.note(words, step=step)
             answer({"accepted": True, "message": f"{words}, t = {step * period:.2f} s", "step": step})
 
         def done(response: Any) -> None:

@@ -31,12 +31,14 @@ from launch import Action, LaunchContext, LaunchDescription
 ARGUMENTS = {
     "scenario": ("case1", "name of a shipped scenario (hsv scenarios lists them), or path of a TOML file"),
     "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
-    "real_time_factor": ("0.0", "pace: 1 is real time, 0 as fast as possible"),
+    "real_time_factor": ("", "pace: 1 is real time, 0 as fast as possible; empty: 0, with a live view 1"),
     "step_timeout": (
         "",
         "wall time (s) after which a silent node ends the run; empty: 10, beside a foreign node 2.5",
     ),
     "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
+    "live": ("false", "true: show the flight while it is flown, on a page and to Foxglove; or false"),
+    "live_port": ("8765", "port for Foxglove, the page has the next one; 0: any two that are free"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),
     "units": ("si", "units of the summary and the report: si, or paper for ft, ft/s, deg"),
@@ -48,6 +50,7 @@ ARGUMENTS = {
 CHOICES = {
     "composed": ("true", "false"),
     "external": ("true", "false"),
+    "live": ("true", "false"),
     "report": ("true", "false"),
     "units": ("si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
@@ -69,6 +72,7 @@ class Flight:
         self._run = run
         self._options = options
         self._running: dict[Action, dict[str, Any]] = {}
+        self._ending = False
         self._failure = ""
         self._verdict = ""
 
@@ -89,10 +93,11 @@ class Flight:
         return list(self._running)
 
     def _on_exit(self, event: ProcessExited, context: LaunchContext) -> list[Action]:
-        first = len(self._running) == len(self._run["nodes"])
         node, code = self._running.pop(event.action), event.returncode
         actions = []
-        if first:
+        # Without who only watches the flight goes on.
+        if node["in_flight"] and not self._ending:
+            self._ending = True
             # Whoever ends first ends the run: the plant when it has landed, any other when something went wrong.
             if not (node["ends_run"] and code in self._run["landed_exit_codes"]):
                 what = f"was killed by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
@@ -138,11 +143,12 @@ def prepare(context: LaunchContext) -> list[Action]:
     except PackageNotFoundError:
         refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
-    command += ["--real-time-factor", options["real_time_factor"]]
+    command += ["--real-time-factor", options["real_time_factor"]] if options["real_time_factor"] else []
+    command += ["--live-port", options["live_port"]]
     command += ["--step-timeout", options["step_timeout"]] if options["step_timeout"] else []
     command += ["--namespace", options["namespace"]]
     command += ["--bag", options["bag"]] if options["bag"] else []
-    command += [f"--{name}" for name in ("composed", "external") if options[name] == "true"]
+    command += [f"--{name}" for name in ("composed", "external", "live") if options[name] == "true"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         refuse(as_arguments(done.stderr.strip().removeprefix("hsv: error: ")), done.returncode)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hsv.bench import campaigns, graph, in_process, offline, writing
+from hsv.bench import campaigns, graph, in_process, live, offline, writing
 from hsv.bench.figure import Figure
 
 
@@ -22,6 +22,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "jsbsim": lambda: in_process.against_jsbsim(times(10)),
         "mcap": lambda: writing.against_mcap(times(10)),
         "graph": lambda: graph.against_rings(times(5)),
+        "live": lambda: live.watched(times(2)),
         "montecarlo": lambda: [*campaigns.over_workers(times(3), max(cores, 2)), *campaigns.corners(max(cores, 2))],
         "offline": offline.design_and_verify,
     }

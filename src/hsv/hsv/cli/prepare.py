@@ -48,7 +48,7 @@ def prepare(
     import tempfile
 
     from hsv.cli.targets import check_folder
-    from hsv.graph.description import LANDED, ROOT, checked_namespace, graph
+    from hsv.graph.description import LANDED, LIVE, ROOT, checked_namespace, graph
     from hsv.graph.launcher import claim_graph
     from hsv.graph.preparation import prepare as prepare_run
 
@@ -89,6 +89,7 @@ def prepare(
                         "package": node.package,
                         "executable": node.executable,
                         "ends_run": node is nodes[-1],
+                        "in_flight": node is not LIVE,
                     }
                     for node in nodes
                 ],

@@ -87,9 +87,7 @@ class Hub:
     def note(self, words: str, *, step: int | None = None, warning: bool = False) -> None:
         """Add a line to what has happened, which acts or is said at ``step``; None: now."""
         with self._lock:
-            at = round(self.time * 1e-9 / self._period) if step is None else step
-            event = {"time": round(at * self._period, 9), "step": at, "words": words, "warning": warning}
-            self._say({"events": [*self._status["events"], event][-_EVENTS:]})
+            self._note(words, round(self.time * 1e-9 / self._period) if step is None else step, warning)
 
     def sample(self) -> bool:
         """Keep the newest step of which every topic is here, if it is new; return whether it was."""
@@ -151,17 +149,28 @@ class Hub:
     def _said(self, messages: Mapping[str, Any]) -> dict[str, Any]:
         """Return what a step says besides the rows."""
         actuator = messages[ACTUATOR]
-        said = {
-            "faults": [
-                {"words": self._words(fault), "channel": fault.channel, "type": fault.type, "since": int(since)}
-                for fault, since in zip(actuator.active, actuator.since, strict=True)
-            ],
-            "nominal_status": messages[NOMINAL].status,
-        }
+        faults = [
+            {"words": self._words(fault), "channel": fault.channel, "type": fault.type, "since": int(since)}
+            for fault, since in zip(actuator.active, actuator.since, strict=True)
+        ]
+        self._note_faults(faults, int(messages[STATE].step))
+        said = {"faults": faults, "nominal_status": messages[NOMINAL].status}
         if TUBE_STATUS in messages:
             tube = messages[TUBE_STATUS]
             said |= {"tau": [round(float(value), 12) for value in tube.tau], "tube_status": tube.status}
         return said
+
+    def _note(self, words: str, step: int, warning: bool) -> None:
+        event = {"time": round(step * self._period, 9), "step": step, "words": words, "warning": warning}
+        self._say({"events": [*self._status["events"], event][-_EVENTS:]})
+
+    def _note_faults(self, faults: list[dict[str, Any]], step: int) -> None:
+        """Note which faults have begun, whoever has planned or injected them, and which have ended."""
+        before = self._status["faults"]
+        for fault in (fault for fault in faults if fault not in before):
+            self._note(f"{fault['words']} begins", fault["since"], True)
+        for fault in (fault for fault in before if fault not in faults):
+            self._note(f"{fault['words']} has ended", step, False)
 
     def _words(self, fault: Any) -> str:
         """Return a fault in words, which takes longer than all the rest of a sample: once for each."""

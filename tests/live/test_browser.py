@@ -1,0 +1,136 @@
+"""The live page as a browser shows it: a flight over DDS with a fault injected by its button, and its report."""
+
+import time
+from pathlib import Path
+
+import pytest
+from browser import Browser
+from live_clients import FoxgloveClient, addresses
+from node_processes import Processes, recorded_steps, short_scenario
+from ros_domain import own_environment
+from waiting import wait_until
+
+from hsv.graph.description import TOPICS, resolved
+from hsv.recording.reader import Bag
+
+pytestmark = pytest.mark.viewer
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.driver.quit()
+
+
+@pytest.fixture
+def processes(tmp_path):
+    with own_environment() as environment:
+        started = Processes(environment, tmp_path)
+        yield started
+        started.stop()
+
+
+def fly(processes, *words):
+    """Start a live flight; return its process, the address of its page and the port for Foxglove."""
+    log = processes.folder / "live.txt"
+    with log.open("w") as output:
+        flight = processes.start("hsv", "run", *words, "--live", "--live-port", "0", output=output)
+    wait_until(lambda: "live data" in log.read_text() or flight.poll() is not None, [flight.pid])
+    return flight, *addresses(log.read_text())
+
+
+def until(browser, flight, condition):
+    """Wait until a condition of the page, in JavaScript, is true."""
+    wait_until(lambda: browser.run(f"return Boolean({condition})"), [flight.pid])
+
+
+def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, tmp_path, pictures):
+    bag = tmp_path / "bag"
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 40, fault=35), "--bag", bag, "--real-time-factor", "2")
+    driver = browser.driver
+    driver.set_window_size(1280, 1000)
+    browser.console()
+    browser.requests()
+    driver.get(page)
+    until(browser, flight, "window.live && live.charts.now > 4")
+    # Space pauses, and the flight goes on where it was.
+    browser.press(" ")
+    until(browser, flight, "live.status.settings.paused")
+    until(browser, flight, "live.form.pause.textContent === 'Resume'")
+    stood = browser.run("return live.charts.now")
+    steps = recorded_steps(bag)
+    time.sleep(0.5)
+    assert browser.run("return live.charts.now") - stood < 0.1 and recorded_steps(bag) - steps <= 50
+    browser.press(" ")
+    until(browser, flight, "!live.status.settings.paused")
+    driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
+    driver.find_element("css selector", "[name=inject]").click()
+    until(browser, flight, "live.status.faults.length === 1")
+    answer = browser.run("return document.getElementById('answer').textContent")
+    assert answer.startswith("loss_of_effectiveness effectiveness 0.8 of elevator_deflection from step ")
+    step = int(answer.partition("from step ")[2].split()[0])
+    until(browser, flight, f"live.charts.now > {step * 0.02 + 6.0}")
+    driver.save_screenshot(str(pictures / "live.png"))
+    shade = browser.run("return document.getElementById('plot-altitude').layout.shapes[0]")
+    assert shade["x0"] == pytest.approx(step * 0.02) and shade["x1"] > shade["x0"]
+    limits = "document.getElementById('plot-elevator_deflection')"
+    browser.run(f"{limits}.scrollIntoView()")
+    until(browser, flight, f"{limits}.layout && {limits}.layout.shapes.filter((s) => s.type === 'line').length === 2")
+    until(browser, flight, "live.status.ending")
+    state = browser.run("return document.getElementById('state').textContent")
+    assert state == f"Flight finished at t = 40.00 s · verdict, metrics and report: {bag}/report.html"
+    wait_until(lambda: flight.poll() is not None, [flight.pid])
+    # The server has left; the curves stay.
+    until(browser, flight, "live.over")
+    assert browser.run("return live.charts.now") == pytest.approx(40.0)
+    assert browser.run("return document.querySelector('fieldset.flight').disabled")
+    assert browser.console() == []
+    assert {address.split("/")[2] for address in browser.requests() if ":" in address} <= {page.split("/")[2]}
+    active = [message.step for _, message in Bag(bag).decode("/hsv/actuator") if message.active]
+    assert active[0] == step
+    report = bag / "report.html"
+    browser.open(report)
+    driver.get(f"{report.as_uri()}#events")
+    events = browser.run("return document.getElementById('events').textContent")
+    assert "effectiveness 0.8" in events
+    driver.save_screenshot(str(pictures / "live_report.png"))
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1280, "light")])
+def test_it_fits_narrow_and_wide_windows_in_both_themes(browser, processes, tmp_path, width, scheme):
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 3600), "--bag", tmp_path / "bag", "--no-report")
+    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    theme = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", theme)
+    browser.driver.get(page)
+    until(browser, flight, "window.live && live.charts.now > 1")
+    assert browser.run("return document.documentElement.scrollWidth") <= width
+    channels = browser.run("return getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
+    assert (min(channels) > 128) == (scheme == "light")
+    browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_without_the_token_it_shows_and_asks_nothing(browser, processes, tmp_path):
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 3600), "--bag", tmp_path / "bag", "--no-report")
+    browser.driver.get(page.partition("#")[0])
+    until(browser, flight, "window.live && live.charts.now > 1")
+    assert browser.run("return document.querySelector('fieldset.flight').disabled")
+    assert "token" in browser.run("return document.getElementById('answer').textContent")
+    browser.run("live.ask('pause', { paused: 'true' })")
+    until(browser, flight, "document.getElementById('answer').className === 'bad'")
+    assert browser.run("return document.getElementById('answer').textContent").startswith("token: wrong or missing")
+
+
+def test_two_hundred_seconds_at_real_time_pace_lack_nothing(processes, tmp_path):
+    flight, _, port = fly(processes, "case1", "--bag", tmp_path / "bag", "--no-report")
+    client = FoxgloveClient(port)
+    wait_until(lambda: flight.poll() is not None, [flight.pid])
+    client.wait()
+    bag = Bag(Path(tmp_path, "bag"))
+    for topic in TOPICS:
+        recorded = list(bag.messages(topic))
+        assert len(recorded) == 10_001
+        assert client.messages[resolved(topic)] == recorded, topic
