@@ -53,9 +53,19 @@ def test_prepare_composed_names_one_process_and_a_command_for_people(hsv: Hsv, t
     assert len(list(temporary.iterdir())) == 1
 
 
+def test_prepare_live_names_who_watches_and_keeps_the_pace_of_the_clock(hsv: Hsv) -> None:
+    told = hsv("prepare", "case1", "--live", "--live-port", "0", "--folder", "files", "--json").json
+    first, *others = told["nodes"]
+    assert (first["name"], first["in_flight"], first["ends_run"]) == ("live", False, False)
+    assert all(node["in_flight"] for node in others) and [node["name"] for node in others][-1] == "plant"
+    values = yaml.safe_load(Path(told["parameter_files"][-1]).read_text())["/**"]["ros__parameters"]
+    assert values["real_time_factor"] == 1.0 and values["live.bag"] == told["bag"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
+        (["case1", "--live", "--live-port", "65535"], "live-port = 65535: expected 1 to 65534"),
         (["nowhere"], "scenario 'nowhere'"),
         (["case1", "--real-time-factor", "nan"], "real-time-factor = nan: expected 0"),
         (["case1", "--step-timeout", "0"], "step-timeout = 0.0: expected at least 0.1"),

@@ -166,6 +166,15 @@ def test_a_port_in_use_ends_it_before_anything_has_begun(processes: Processes, t
 
 
 @pytest.mark.long
+def test_a_live_node_that_is_killed_takes_no_flight_with_it(processes: Processes, tmp_path: Path) -> None:
+    watched = Watched(processes, short_scenario(tmp_path), "--bag", tmp_path / "bag")
+    os.kill(children(watched.popen.pid)["live"], signal.SIGKILL)
+    watched.land()
+    assert "live: [WARN] was killed by SIGKILL" in watched.text
+    assert len(Bag(tmp_path / "bag").times("/hsv/state")) == 251
+
+
+@pytest.mark.long
 def test_beside_a_running_graph_it_shows_what_is_left_of_the_flight(processes: Processes, tmp_path: Path) -> None:
     words = ["--bag", tmp_path / "bag", "--real-time-factor", "2", "--no-report"]
     flight = processes.start("hsv", "run", short_scenario(tmp_path, duration=3600), *words)

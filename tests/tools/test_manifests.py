@@ -17,8 +17,8 @@ KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 """By imported module: its key in rosdep."""
 
 WITHOUT_KEY = {"cvxpy", "dask", "distributed", "foxglove", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow"}
-WITHOUT_KEY |= {"llvmlite", "rosbags", "tomli_w", "zstandard"}
-"""Modules for which rosdep has no key of a Debian package; docs/installation.md names them, pip installs them."""
+WITHOUT_KEY |= {"llvmlite", "rosbags", "tomli_w", "websockets", "zstandard"}
+"""Modules for which rosdep has no key of a Debian package that will do; docs/installation.md names them, pip installs them."""
 
 
 def imported(folder: Path) -> set[str]:
