@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from websocket import WebSocket, WebSocketException, create_connection
 
+from hsv.graph.description import TOPICS, resolved
+from hsv.recording.reader import Bag
+
 _MESSAGE = struct.Struct("<BIQ")
 """Of foxglove.sdk.v1: 1 for message data, number of the subscription, log time (ns); the message follows."""
 
@@ -135,3 +138,13 @@ def addresses(text: str) -> tuple[str, int]:
     page, data = re.search(r"live page: (\S+)", text), re.search(r"live data: ws://127\.0\.0\.1:(\d+)", text)
     assert page and data, text
     return page[1], int(data[1])
+
+
+def assert_without_gap(client: FoxgloveClient, bag: Bag) -> None:
+    """Every step topic has what the bag has, byte by byte, from the time on at which the client was there."""
+    for topic in TOPICS:
+        recorded = list(bag.messages(topic))
+        received = client.messages[resolved(topic)]
+        # Nobody waits for a client: on a busy machine the flight may have begun before it.
+        assert len(received) > len(recorded) // 2, topic
+        assert received == recorded[-len(received) :], topic

@@ -18,7 +18,7 @@ KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 
 WITHOUT_KEY = {"cvxpy", "dask", "distributed", "foxglove", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow"}
 WITHOUT_KEY |= {"llvmlite", "rosbags", "tomli_w", "websockets", "zstandard"}
-"""Modules for which rosdep has no key of a Debian package that will do; docs/installation.md names them, pip installs them."""
+"""Modules for which rosdep has no key of a Debian package that will do; docs/installation.md names them."""
 
 
 def imported(folder: Path) -> set[str]:

@@ -136,6 +136,8 @@ class Launcher:
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
+                if description is LIVE:
+                    self._await_first_words(self._processes[-1])
         except BaseException:
             self.__exit__()
             raise
@@ -174,6 +176,11 @@ class Launcher:
                 if code == 0 or _landed(last, code):
                     return code
                 raise self._failure(last, code)
+            time.sleep(_LOOK)
+
+    def _await_first_words(self, process: _Process) -> None:
+        """Wait until who watches has said where, and so sees the flight from its start; not where it fails or hangs."""
+        while not process.words and process.popen.poll() is None and process.idle() < HUNG_AFTER:
             time.sleep(_LOOK)
 
     def _watch(self, process: _Process, decides: bool) -> None:
