@@ -12,7 +12,7 @@ from flown_bags import flown_bag
 
 from hsv.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
 from hsv.errors import ParameterError, RecordingError
-from hsv.graph.description import ACTUATOR, COMMAND, STATE, TOPICS, checked_namespace, resolved
+from hsv.graph.description import ACTUATOR, COMMAND, MARKERS, STATE, TOPICS, checked_namespace, resolved
 from hsv.recording.bag_warnings import bag_warnings
 from hsv.recording.compare import compare
 from hsv.recording.flight import flight_fingerprint
@@ -89,8 +89,8 @@ def test_layouts_are_made_for_the_names_of_a_bag(flown: Path, tmp_path: Path, la
     assert made.parent == bag.folder
     text, shipped = made.read_text(encoding="utf-8"), (LAYOUTS / layout).read_text(encoding="utf-8")
     assert text.replace("/lab/veh1", "") == shipped
-    # Topics that a copy with pictures adds are called the same in every bag.
-    for added in (OVERVIEW_TOPIC, SCENE_TOPIC, TRANSFORMS_TOPIC):
+    # Topics of pictures are called the same in every bag.
+    for added in (OVERVIEW_TOPIC, SCENE_TOPIC, TRANSFORMS_TOPIC, resolved(MARKERS)):
         text, shipped = text.replace(added, ""), shipped.replace(added, "")
     assert text.count("/lab/veh1/hsv/") == shipped.count("/hsv/") > 30 and '"/hsv/' not in text
 
