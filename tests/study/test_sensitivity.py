@@ -206,6 +206,13 @@ def test_gusts_that_stay_and_those_that_fall():
     assert at.elevator == pytest.approx(gusts.STOP, rel=1e-3)
 
 
+def test_a_limit_below_the_first_velocity_is_found():
+    found = gusts.gust_limits(hardware.RMPC, "paper_like", gusts.SHAPES[1]).attitude
+    assert found < gusts.VELOCITIES[0]
+    at = gusts.worse(hardware.RMPC, "paper_like", gusts.SHAPES[1], found)
+    assert at.attitude == pytest.approx(gusts.HALF_DEGREE, rel=1e-3)
+
+
 def test_a_gust_moves_the_elevator_more_the_faster_it_is():
     shape = gusts.SHAPES[1]
     slow, fast = (gusts.worse(WITH_NOTCH, "paper_like", shape, velocity) for velocity in (10.0, 20.0))

@@ -141,6 +141,7 @@ def gust_limits(controller: Controller, coupling: str, shape: Shape) -> GustLimi
     }
 
     def limit(excess: Callable[[Answer], float]) -> float | None:
-        return stability_limit(lambda v: excess(worse(controller, coupling, shape, v)), VELOCITIES, 1e-3)
+        # From still air on: the first of the velocities may be beyond a limit already.
+        return stability_limit(lambda v: excess(worse(controller, coupling, shape, v)), (0.0, *VELOCITIES), 1e-3)
 
     return GustLimits(**{name: limit(excess) for name, excess in beyond.items()})
