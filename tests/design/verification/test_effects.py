@@ -202,6 +202,22 @@ def test_what_has_no_bound_is_said(subject):
     assert declared(subject, scenario) == ({}, ["drop-out of a sensor", "estimator"])
 
 
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"link.measurement.delay": 1}, "link of the measurement"),
+        ({"link.command.loss": "1 %"}, "link of the command"),
+        ({"link.computational_delay": "5 ms"}, "link of the command"),
+        (
+            {"actuator.elevator_deflection": {"set": "elevator_50", "natural_frequency": "5 rad/s"}},
+            "actuator.elevator_deflection.natural_frequency",
+        ),
+    ],
+)
+def test_links_and_actuators_of_ones_own_have_no_bound(subject, change, named):
+    assert declared(subject, load_scenario("case1", change)) == ({}, [named])
+
+
 def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
     changes = {
         "wind": {"up": "-3 ft/s"},

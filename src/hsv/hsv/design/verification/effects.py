@@ -33,13 +33,14 @@ from hsv.design.verification.invariant_set import lag_feedback
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.errors import DesignError, QuantityError
+from hsv.links import command_link, computation, measurement_link
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.noise import LARGEST
 from hsv.sensors import ALPHA, PITCH, SENSOR_SETS, SensorData, sensor_data
 from hsv.simulation.scenario import Scenario
 from hsv.units import parse_quantity, to_paper
-from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
+from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, ACTUATOR_SETS, IDEAL
 from hsv.vehicle.atmosphere import atmosphere_data
 from hsv.vehicle.dynamics import (
     INPUT_NAMES,
@@ -331,7 +332,15 @@ def declared(subject: Subject, scenario: Scenario, reach: float = REACH) -> tupl
             models[name] = air(vehicle, design.period, forward, up)
     if density := abs(moving.density_offset) + reach * moving.density_sigma:
         models["density"] = air(vehicle, design.period, density=density)
-    return models, unbounded
+    return models, [*unbounded, *_beside(values, design.period)]
+
+
+def _beside(values: Mapping[str, Any], period: float) -> list[str]:
+    """Return what of links, and of actuators that are not as published, there is: no model of it is made here."""
+    own = [p.name for p in ACTUATOR_PARAMETERS if isinstance(p.default, list) and values.get(p.name)]
+    late = not command_link(values, period).ideal or computation(values, period)[1] > 0.0
+    found = {"link of the measurement": not measurement_link(values).ideal, "link of the command": late}
+    return [*own, *(name for name, there in found.items() if there)]
 
 
 def _remeasure(models: dict[str, Model], unbounded: list[str], plan: Plan, equipment: Mapping[str, Any]) -> None:
