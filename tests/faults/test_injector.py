@@ -128,6 +128,16 @@ def test_one_kind_can_be_cleared():
         injector.clear(ELEVATOR, "melted")
 
 
+def test_two_faults_that_are_the_same_keep_their_memories_when_another_comes():
+    delay = Fault.of(ELEVATOR, "delay", {"steps": 3})
+    without, changed = (injector_of((delay, 2), (delay, 2)) for _ in range(2))
+    for step in range(20):
+        if step == 10:
+            changed.inject(loss(0.9, FUEL))
+        command = np.array([0.4, 0.01 * step])
+        assert actuator(changed, step, command)[1] == actuator(without, step, command)[1]
+
+
 def test_clearing_one_channel_leaves_the_other():
     injector = injector_of((loss(0.9), 0), (loss(0.8, FUEL), 0))
     injector.step(0, COMMAND)

@@ -113,14 +113,16 @@ def fault_memory(rows: FaultRows, earlier: FaultRows | None = None, memory: np.n
         earlier: Those that were known before a change in flight, with their ``memory``, which the same faults keep.
         memory: See there.
     """
-    kept: dict[tuple[Any, ...], np.ndarray] = {}
+    kept: dict[tuple[Any, ...], list[np.ndarray]] = {}
     if earlier is not None and memory is not None:
-        kept = {_identity(earlier, i): memory[i] for i in range(len(earlier.table))}
+        for i in range(len(earlier.table)):
+            kept.setdefault(_identity(earlier, i), []).append(memory[i])
     found = np.zeros((len(rows.table), MEMORY))
     found[:, LAST] = found[:, ONSET] = _NOT_YET
     for i in range(len(found)):
-        if (known := kept.get(_identity(rows, i))) is not None:
-            found[i] = known
+        # Of several that are the same each keeps its own.
+        if same := kept.get(_identity(rows, i)):
+            found[i] = same.pop(0)
     return found
 
 
