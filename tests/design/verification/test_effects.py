@@ -231,3 +231,7 @@ def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
     assert found["gusts"] == pytest.approx([0.0, 7 * 0.3048, 0.0])
     assert found["turbulence"] == pytest.approx([0.0, REACH * 0.3048, 0.0])
     assert found["density"] == pytest.approx([0.0, 0.0, 0.05])
+
+
+def test_the_reach_that_is_written_as_the_bound_of_all_noise_is_taken(subject):
+    assert "turbulence 2 ft/s" in described(subject, turbulence="2 ft/s", reach=8.572)[0]

@@ -60,6 +60,9 @@ Progress = Callable[[str, int, int], None]
 REACH = 3.0
 """Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""
 
+LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
+"""Bound of all normal numbers, as it is written: rounded up."""
+
 _WIND_FORWARD, _WIND_UP, _DENSITY = 0, 1, 2
 """Of the conditions that :func:`hsv.vehicle.dynamics.forces_in` takes."""
 
@@ -383,8 +386,8 @@ def described(
     """
     if sensor_set not in SENSOR_SETS:
         raise QuantityError(f"sensors = {sensor_set!r}: expected one of {', '.join(SENSOR_SETS)}")
-    if not 0.0 < reach <= LARGEST:
-        raise QuantityError(f"reach = {reach:g}: expected more than 0, up to {LARGEST:.4g}, beyond which no noise is")
+    if not 0.0 < reach <= LARGEST_REACH:
+        raise QuantityError(f"reach = {reach:g}: expected more than 0, up to {LARGEST_REACH}, beyond which no noise is")
     names = STATE_NAMES[:N_RIGID]
     biases = np.zeros(N_RIGID)
     for text in bias:
