@@ -1,12 +1,19 @@
 """For all tests."""
 
+from __future__ import annotations
+
 import os
 import signal
 import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+if TYPE_CHECKING:
+    from browser import Browser
 
 # Started in the background, a shell's child ignores SIGINT, and so would every process that a test interrupts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -48,3 +55,21 @@ def _running() -> int:
         time.sleep(1.0 / looks)
         others += int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0]) - 1
     return round(others / looks)
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Return a browser that shows pages."""
+    from browser import Browser
+
+    browser = Browser(tmp_path_factory.mktemp("profile"))
+    yield browser
+    browser.driver.quit()
+
+
+@pytest.fixture
+def screen(browser: Browser) -> Iterator[Callable[..., None]]:
+    """Emulate a screen for one test."""
+    yield browser.screen
+    browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})

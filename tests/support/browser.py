@@ -9,6 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from bag_readers import NPM
+
+AXE = NPM / "node_modules" / "axe-core" / "axe.min.js"
+"""What checks pages for barriers."""
+
+SETTLED = """
+    if (!document.getElementById("library")) return true;
+    return Boolean(window.report) && report.panels.every((panel) => !panel.stale);
+"""
+"""Whether everything is drawn, on a page that draws plots."""
 
 HINT = "make test-viewers installs it"
 FLAGS = (
@@ -40,6 +50,7 @@ class Browser:
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
         self.driver = webdriver.Chrome(options=options, service=service.Service(driver))
+        self.driver.set_script_timeout(600)
 
     def open(self, page: Path) -> float:
         """Open a report; return the seconds until every plot was drawn."""
@@ -52,7 +63,7 @@ class Browser:
     def settle(self) -> None:
         """Wait until nothing is left to draw."""
         for _ in range(600):
-            if self.run("return Boolean(window.report) && report.panels.every((panel) => !panel.stale)"):
+            if self.run(SETTLED):
                 return
             time.sleep(0.05)
         raise AssertionError(f"the plots were not drawn: {self.console()}")
@@ -70,6 +81,24 @@ class Browser:
         """Press a key on the page itself, whatever has had the focus."""
         self.run("document.activeElement.blur()")
         self.driver.find_element("css selector", "body").send_keys(key)
+
+    def screen(self, width: int, scheme: str = "light") -> None:
+        """Emulate a screen of a width, in pixels, of someone who prefers a colour scheme."""
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": features})
+
+    def barriers(self) -> list[str]:
+        """Return what axe-core finds wrong with the page, everything on it unfolded: rule and place."""
+        if not AXE.is_file():
+            pytest.skip(f"no axe-core; {HINT}")
+        self.run("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+        self.run(AXE.read_text(encoding="utf-8"))
+        found = self.driver.execute_async_script(
+            "axe.run({resultTypes: ['violations']}).then((found) => arguments[0](found.violations))"
+        )
+        return [f"{rule['id']}: {node['target']}" for rule in found for node in rule["nodes"]]
 
     def console(self) -> list[str]:
         """Return what the console received since the last call."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import TYPE_CHECKING, Any
@@ -31,6 +32,20 @@ PAPER_UNITS = {
     "m s": "ft s",
 }
 """The unit in which the paper (or the literature it cites) prints a quantity of an SI unit of ours."""
+
+METRIC_UNITS = {"rad": "deg"}
+"""The unit in which people read a quantity of an SI unit of ours, where that is another one."""
+
+
+class UnitSystem(StrEnum):
+    """Units in which something is printed or drawn for people."""
+
+    metric = "metric"
+    """SI, but angles in degrees and shares in percent"""
+    si = "si"
+    paper = "paper"
+    """Feet, pounds, slugs and degrees"""
+
 
 _EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
 
@@ -65,16 +80,33 @@ def factor(unit: str, to: str) -> float:
     return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
 
 
-def paper_unit(unit: str) -> str:
-    """Return the paper's unit of an SI unit; of a quotient that it has none for, that of the dividend converted."""
+def unit_in(system: UnitSystem, unit: str) -> str:
+    """Return the unit of an SI unit in ``system``, of a quotient without one that of the dividend converted."""
+    if system is UnitSystem.si:
+        return unit
+    own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
     dividend, slash, divisor = unit.rpartition("/")
-    return PAPER_UNITS.get(unit) or (f"{paper_unit(dividend)}/{divisor}" if slash else unit)
+    return own.get(unit) or (f"{unit_in(system, dividend)}/{divisor}" if slash else unit)
+
+
+def in_system(value: float, unit: str, system: UnitSystem, *, share: bool = False) -> tuple[float, str]:
+    """Return ``value``, given in the SI ``unit``, in the unit of ``system``, and the name of that unit.
+
+    Args:
+        value: The number.
+        unit: Its SI unit.
+        system: Units of what is printed.
+        share: Whether it is a share of something, which the metric system has in percent.
+    """
+    if share and system is UnitSystem.metric:
+        return 100.0 * value, "%"
+    other = unit_in(system, unit)
+    return (value * factor(unit, other) if other != unit else value), other
 
 
 def to_paper(value: float, unit: str) -> tuple[float, str]:
     """Return ``value``, given in the SI ``unit``, in the paper's unit, and the name of that unit."""
-    paper = paper_unit(unit)
-    return (value * factor(unit, paper) if paper != unit else value), paper
+    return in_system(value, unit, UnitSystem.paper)
 
 
 def si_unit_of(text: object) -> str:

@@ -1,12 +1,10 @@
-"""Flights recorded in this process, and the browser that shows their reports."""
+"""Flights recorded in this process."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import Browser
 from recorded_flight import record_flight
 
 from hsv.recording.reader import Bag
@@ -38,10 +36,3 @@ def loud(bags: Path, quiet: Bag) -> Bag:
         tube__shape=[shrunk * number for number in design["tube.shape"]],
         tube__half_width=[number / shrunk**0.5 for number in design["tube.half_width"]],
     )
-
-
-@pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    browser = Browser(tmp_path_factory.mktemp("profile"))
-    yield browser
-    browser.driver.quit()

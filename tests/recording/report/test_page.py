@@ -1,14 +1,19 @@
+import base64
+import gzip
 import html
 import re
 
+import numpy as np
 import pytest
 from full_disk import files_no_larger_than
 from recorded_flight import message_types
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
+from hsv.recording.report.differences import differences
+from hsv.recording.report.opening import sentence
 from hsv.recording.report.page import render, write_report
-from hsv.recording.report.payload import all_panels, payload
+from hsv.recording.report.payload import Numbers, all_panels, payload
 from hsv.recording.report.run import reported_runs
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
@@ -60,12 +65,12 @@ def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
     assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits) + 1
 
 
-def test_both_systems_of_units_are_there(page):
-    (run, *_) = re.findall(r"<tr>\s*<th scope=\"row\">altitude end error.*?</tr>", page, re.DOTALL)
-    cells = re.findall(r'<span class="si">([^&]*)&nbsp;m</span><span class="paper">([^&]*)&nbsp;ft</span>', run)
+def test_all_systems_of_units_are_there(page):
+    (run, *_) = re.findall(r"<tr[^>]*>\s*<th scope=\"row\">altitude end error.*?</tr>", page, re.DOTALL)
+    cells = re.findall(r'<span class="metric si">([^&]*)&nbsp;m</span><span class="paper">([^&]*)&nbsp;ft</span>', run)
     assert len(cells) >= 2
     for si, paper in cells:
-        assert float(paper.replace("−", "-")) == pytest.approx(float(si.replace("−", "-")) / 0.3048, rel=1e-3)
+        assert float(paper.replace("−", "-")) == pytest.approx(float(si.replace("−", "-")) / 0.3048, rel=5e-3)
 
 
 def test_what_happened_is_told_and_escaped(page):
@@ -92,11 +97,53 @@ def test_parameters_that_differ_are_marked_and_others_said_once(page):
 
 def test_all_recorded_steps_are_drawn(loud, quiet):
     runs = reported_runs([quiet, loud])
-    described, _ = payload(runs)
+    found = differences(runs)
+    described, _ = payload(runs, found)
     names = [panel.name for panel in all_panels(runs)]
-    assert names == [panel["name"] for panel in described["panels"]]
-    assert len(names) == 12 + 7
+    assert [panel["name"] for panel in described["panels"]] == names + [each.name for each in found]
+    assert len(names) == 12 + 7 and len(found) == 12
     assert set(described["lengths"]) == {1001, 2}
+
+
+def test_numbers_come_back_bit_for_bit():
+    rng = np.random.default_rng(1)
+    arrays = [rng.normal(size=1000), np.array([0.0, -0.0, np.nan, np.inf, -1e-40]), np.linspace(0.0, 200.0, 10_001)]
+    numbers = Numbers()
+    for array in arrays:
+        numbers.add(array)
+    packed, offset = np.frombuffer(gzip.decompress(base64.b64decode(numbers.packed())), "u1"), 0
+    for array in arrays:
+        planes = packed[offset : offset + 4 * len(array)].reshape(4, -1)
+        bits = np.cumsum(np.ascontiguousarray(planes.T).view("<u4").ravel(), dtype=np.uint32)
+        np.testing.assert_array_equal(bits, array.astype("<f4").view("<u4"))
+        offset += 4 * len(array)
+
+
+def test_it_opens_with_the_verdict_and_a_picture_before_any_table(page, quiet):
+    assert page.index('class="lead') < page.index('class="picture"') < page.index("<table")
+    (run,) = reported_runs([quiet])
+    said = sentence([run], [])
+    assert said.startswith("Not within its limits: ") and "altitude end error" in said
+    assert "loss of effectiveness of the elevator deflection from 8 s" in said
+    level = quiet.columns("/hsv/tube_status")["level"].max()
+    assert f"the error stayed in the invariant set, largest level {level:.3g}." in said
+
+
+def test_sections_are_in_the_order_of_the_links_to_them(page):
+    links = re.findall(r'<a href="#([^"]*)"', page.partition("<nav")[2].partition("</nav>")[0])
+    assert links == re.findall(r'<section id="([^"]*)"', page)
+    assert links[:2] == ["summary", "metrics"] and links.index("differences") < links.index("trajectory")
+
+
+def test_metrics_that_differ_are_marked_with_their_difference(page, quiet, loud):
+    first, second = (run.metrics for run in reported_runs([quiet, loud]))
+    rows = re.findall(r'<tr( class=differs)?>\s*<th scope="row">([^<]+)<small>(.*?)</tr>', page, re.DOTALL)
+    marked = {name for mark, name, _ in rows if mark}
+    assert marked == {name.replace("_", " ") for name in first if first[name] != second.get(name)}
+    (cells,) = [cells for _, name, cells in rows if name == "altitude integral absolute error"]
+    shown = float(re.search(r'difference <span class="metric si">([^&]*)', cells)[1].replace("−", "-"))
+    name = "altitude_integral_absolute_error"
+    assert shown == pytest.approx(second[name] - first[name], rel=5e-3)
 
 
 def test_a_design_without_a_set_is_said_to_have_none(bags):

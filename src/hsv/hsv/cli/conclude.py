@@ -52,6 +52,7 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     from hsv.recording.report.page import write_report
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import parse_scenario
+    from hsv.units import UnitSystem
 
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:
@@ -64,7 +65,7 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     if report:
         page = bag / "report.html"
         try:
-            write_report([recorded], page, paper_units=units is Units.paper)
+            write_report([recorded], page, units=UnitSystem.paper if units is Units.paper else UnitSystem.metric)
             extra["report"] = str(page)
         except RecordingError as error:
             unwritten = error  # the flight itself is whole, and told first

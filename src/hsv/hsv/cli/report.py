@@ -30,6 +30,7 @@ def report(
     from hsv.errors import QuantityError
     from hsv.recording.reader import Bag
     from hsv.recording.report.page import write_report
+    from hsv.units import UnitSystem
 
     if out.suffix not in (".html", ".htm"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
@@ -40,6 +41,6 @@ def report(
 
         for bag in opened:
             supply(bag, design, scenario)
-    write_report(opened, out, paper_units=units is Units.paper)
+    write_report(opened, out, units=UnitSystem.paper if units is Units.paper else UnitSystem.metric)
     print_written([out], json)
     print_bag_warnings(*opened)

@@ -1,4 +1,4 @@
-"""Parameters of several runs side by side."""
+"""Parameters and metrics of several runs side by side."""
 
 from __future__ import annotations
 
@@ -21,6 +21,12 @@ class Row:
 def comparisons(runs: Sequence[ReportedRun]) -> dict[str, list[Row]]:
     """Return the rows of each part of the parameters: scenario, design."""
     return {part: list(_rows(part, runs)) for part in ("scenario", "design")}
+
+
+def differing_metrics(runs: Sequence[ReportedRun]) -> set[str]:
+    """Return the metrics that are not the same number in all runs."""
+    names = {name for run in runs for name in run.metrics}
+    return {name for name in names if len({run.metrics.get(name) for run in runs}) > 1}
 
 
 def _rows(part: str, runs: Sequence[ReportedRun]) -> Iterator[Row]:

@@ -10,8 +10,9 @@ from markupsafe import Markup
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
-from hsv.recording.report import text
-from hsv.recording.report.comparison import comparisons
+from hsv.recording.report.comparison import comparisons, differing_metrics
+from hsv.recording.report.differences import differences
+from hsv.recording.report.opening import flight_picture, sentence
 from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
@@ -19,6 +20,7 @@ from hsv.recording.report.templates import environment_of
 from hsv.recording.report.values import Quantity, Section, Table
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import scenario_names
+from hsv.units import UnitSystem
 
 LIBRARY = files("hsv.recording.report").joinpath("plotly", "plotly-basic.min.js")
 """The plotting library; see the README beside it."""
@@ -27,18 +29,18 @@ EVENTS_SHOWN = 200
 """Events of a run that are listed; of a run with more, the page says how many there are."""
 
 
-def write_report(bags: Sequence[Bag], out: Path, *, paper_units: bool = False) -> None:
+def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSystem.metric) -> None:
     """Write the report of ``bags``, laid over one another, to the HTML file ``out``.
 
     Args:
         bags: One flight or several, which are then compared.
         out: File to write.
-        paper_units: Whether the page opens in the paper's units; it can be switched there.
+        units: In which the page opens; they can be switched there.
 
     Raises:
         RecordingError: A bag holds no flight, or the file cannot be written.
     """
-    page = render(reported_runs(bags), paper_units=paper_units)
+    page = render(reported_runs(bags), units=units)
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as error:
@@ -47,7 +49,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, paper_units: bool = False) -
         raise RecordingError(f"{out}: cannot be written ({error.strerror}), expected an HTML file to write") from None
 
 
-def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
+def render(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the page."""
     environment = environment_of("hsv.recording.report")
     environment.tests |= {
@@ -55,28 +57,31 @@ def render(runs: Sequence[ReportedRun], *, paper_units: bool = False) -> str:
         "table": lambda value: isinstance(value, Table),
         "section": lambda value: isinstance(value, Section),
     }
-    plots, numbers = payload(runs)
+    found = differences(runs)
+    plots, numbers = payload(runs, found)
     panels = all_panels(runs)
     drawn = {panel.group for panel in panels}
+    groups = {key: heading for key, heading in GROUPS.items() if key not in OF_EQUIPMENT or key in drawn}
+    sections = {"summary": "Summary", "metrics": "Metrics", "events": "Events", "vehicle": "Vehicle"}
+    if found:
+        sections["differences"] = "Differences"
+    sections |= groups | {"parameters": "Parameters", "certificate": "Certificate", "repeat": "Repeat"}
     return environment.get_template("page.html.j2").render(
         runs=runs,
-        paper_units=paper_units,
-        groups={key: heading for key, heading in GROUPS.items() if key not in OF_EQUIPMENT or key in drawn},
+        units=units,
+        sections=sections,
+        sentence=sentence(runs, found),
+        picture=flight_picture(runs),
+        differences=found,
+        differing=differing_metrics(runs),
+        groups=groups,
         panels=panels,
         effectors=any(curve["kind"] == Kind.effector for panel in plots["panels"] for curve in panel["curves"]),
         metrics={name: metric for name, metric in METRICS.items() if any(name in run.metrics for run in runs)},
         comparisons=comparisons(runs),
         shipped_scenarios=scenario_names(),
         events_shown=EVENTS_SHOWN,
-        quantity=text.quantity,
-        unit=text.unit,
-        style=_asset("style.css"),
-        scripts=[_asset(name) for name in ("charts.js", "side_view.js", "player.js", "page.js")],
         plots=plots,
         numbers=Markup(numbers),
         library=Markup(compressed(LIBRARY.read_bytes())),
     )
-
-
-def _asset(name: str) -> Markup:
-    return Markup(files("hsv.recording.report").joinpath("template", name).read_text(encoding="utf-8"))

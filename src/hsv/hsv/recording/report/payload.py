@@ -11,11 +11,11 @@ import numpy as np
 
 from hsv.airframe import side_view
 from hsv.recording.report.curves import DrawnCurve
+from hsv.recording.report.differences import Difference
 from hsv.recording.report.events import Event
 from hsv.recording.report.panels import Kind, Panel
 from hsv.recording.report.run import ReportedRun
-from hsv.recording.report.text import unit_html, words
-from hsv.units import to_paper
+from hsv.recording.report.text import units_of, words
 
 _COMMON = (Kind.reference, Kind.bound)
 """Kinds that are drawn once, for all flights, where they are the same in all."""
@@ -40,7 +40,7 @@ class Numbers:
             block = np.asarray(values, "<f4").tobytes()
         if block not in self._known:
             self._known[block] = len(self.lengths)
-            self._blocks.append(block)
+            self._blocks.append(_transposed(block))
             self.lengths.append(len(values))
         return self._known[block]
 
@@ -49,10 +49,20 @@ class Numbers:
         return compressed(b"".join(self._blocks))
 
 
-def payload(runs: Sequence[ReportedRun]) -> tuple[dict[str, Any], str]:
+def _transposed(block: bytes) -> bytes:
+    """Return numbers in single precision so that they compress well, and without loss.
+
+    Their bits as integers, each less the one before it; then all lowest bytes, and so on to the highest ones.
+    """
+    bits = np.frombuffer(block, "<u4")
+    return np.diff(bits, prepend=np.uint32(0)).astype("<u4").view("u1").reshape(-1, 4).T.tobytes()
+
+
+def payload(runs: Sequence[ReportedRun], differences: Sequence[Difference]) -> tuple[dict[str, Any], str]:
     """Return the description of the plots, as plain data, and the numbers they draw, compressed."""
     numbers = Numbers()
     panels = [_panel(panel, runs, numbers) for panel in all_panels(runs)]
+    panels += [_difference(difference, runs, numbers) for difference in differences if not difference.none]
     described = {
         "runs": [{"label": run.label, "end": run.duration, "faults": _faults(run)} for run in runs],
         "airframe": side_view.geometry(),
@@ -94,16 +104,26 @@ def _panel(panel: Panel, runs: Sequence[ReportedRun], numbers: Numbers) -> dict[
             time = runs[index].curves.time
             time = time if len(curve.y) == len(time) else time[[0, -1]]
             curves.append(described | {"x": numbers.add(time), "y": numbers.add(curve.y)})
-    factor, unit = to_paper(1.0, panel.unit)
     return {
         "name": panel.name,
-        "units": {
-            "si": {"unit": unit_html(panel.unit), "factor": 1.0},
-            "paper": {"unit": unit_html(unit), "factor": factor},
-        },
+        "units": units_of(panel.unit),
         "curves": curves,
         "limits": sorted({limit for run in runs for limit in run.input_limits.get(panel.name, ())}),
         "shades": _shades(panel, runs),
+    }
+
+
+def _difference(difference: Difference, runs: Sequence[ReportedRun], numbers: Numbers) -> dict[str, Any]:
+    label = f"less {runs[0].label}"
+    return {
+        "name": difference.name,
+        "units": units_of(difference.panel.unit),
+        "curves": [
+            {"kind": Kind.actual, "label": label, "run": d.run, "x": numbers.add(d.time), "y": numbers.add(d.y)}
+            for d in sorted(difference.runs, key=lambda d: d.largest, reverse=True)
+        ],
+        "limits": [],
+        "shades": [shade for shade in _shades(difference.panel, runs) if shade["kind"] == "fault"],
     }
 
 

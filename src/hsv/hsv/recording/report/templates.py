@@ -2,24 +2,46 @@
 
 from __future__ import annotations
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
+from importlib.resources import files
+
+from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from hsv.recording.report import text
 
+SHARED = "hsv.recording.report"
+"""The package whose templates, style and scripts all pages share."""
+
 
 def environment_of(package: str, *, escaped: bool = True) -> Environment:
-    """Return the environment of the templates in the folder ``template`` of a package.
+    """Return the environment of the templates in the folder ``template`` of a package, and of the shared ones.
 
     Args:
         package: Its dotted name.
         escaped: Whether what is put into them is text for HTML.
     """
     environment = Environment(
-        loader=PackageLoader(package, "template"),
+        loader=ChoiceLoader([PackageLoader(package, "template"), PackageLoader(SHARED, "template")]),
         autoescape=escaped,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": text.number, "words": text.words}
+    environment.filters |= {
+        "number": text.number,
+        "percent": text.percent,
+        "words": text.words,
+        "breakable": text.breakable,
+    }
+    environment.globals |= {
+        "asset": asset,
+        "quantity": text.quantity,
+        "unit": text.unit,
+        "unit_systems": text.SYSTEMS,
+    }
     return environment
+
+
+def asset(name: str, package: str = SHARED) -> Markup:
+    """Return a style or script of the folder ``template`` of a package, as it is."""
+    return Markup(files(package).joinpath("template", name).read_text(encoding="utf-8"))

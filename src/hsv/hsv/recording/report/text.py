@@ -1,10 +1,15 @@
-"""Quantities as the page prints them: both systems of units are there, the page shows one."""
+"""Quantities as pages print them: all systems of units are there, the page shows one."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from markupsafe import Markup, escape
 
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_system
+
+SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSystem.paper: "paper (ft, deg)"}
+"""What the switch of a page calls the systems of units."""
 
 
 def unit_html(unit: str) -> str:
@@ -15,26 +20,53 @@ def unit_html(unit: str) -> str:
     return raised.replace(" ", "·")
 
 
-def quantity(value: float, unit: str, digits: int = 5) -> Markup:
-    """Return ``value``, given in the SI ``unit``, in both systems of units."""
-    other, paper = to_paper(value, unit)
-    text = _with_unit(value, unit, digits)
-    if paper == unit:
-        return Markup(text)
-    return Markup(f'<span class="si">{text}</span><span class="paper">{_with_unit(other, paper, digits)}</span>')
+def quantity(value: float, unit: str, digits: int = 5, *, signed: bool = False, share: bool = False) -> Markup:
+    """Return ``value``, given in the SI ``unit``, in all systems of units.
+
+    Args:
+        value: The number.
+        unit: Its SI unit.
+        digits: Significant digits.
+        signed: Whether a positive number has a sign too.
+        share: Whether it is a share of something.
+    """
+    plus = "+" if signed and value > 0.0 else ""
+    shown = {system: in_system(value, unit, system, share=share) for system in SYSTEMS}
+    return _switched({system: plus + _with_unit(*pair, digits) for system, pair in shown.items()})
 
 
-def unit(unit: str) -> Markup:
-    """Return the unit in both systems."""
-    paper = to_paper(1.0, unit)[1]
-    if paper == unit:
-        return Markup(unit_html(unit))
-    return Markup(f'<span class="si">{unit_html(unit)}</span><span class="paper">{unit_html(paper)}</span>')
+def decimals(value: float | None, unit: str, places: Mapping[str, int]) -> Markup:
+    """Return ``value``, given in the SI ``unit``, with so many decimals in each system of units; a dash for none."""
+    if value is None:
+        return Markup("–")
+    shown = {system: in_system(value, unit, system)[0] for system in SYSTEMS}
+    return _switched({system: f"{number:.{places[system]}f}".replace("-", "−") for system, number in shown.items()})
+
+
+def unit(unit: str, *, share: bool = False) -> Markup:
+    """Return the unit in all systems; nothing for a pure number."""
+    return _switched({system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS})
+
+
+def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
+    """Return what the script of a page needs to draw a quantity of an SI ``unit``: by system, factor and unit."""
+    found = {system: in_system(1.0, unit, system, share=share) for system in SYSTEMS}
+    return {str(system): {"unit": unit_html(name), "factor": scale} for system, (scale, name) in found.items()}
 
 
 def number(value: float, digits: int = 5) -> str:
     """Return ``value`` with so many significant digits, a true minus sign and no empty decimals."""
     return f"{value:.{digits}g}".replace("-", "−")
+
+
+def percent(share: float) -> str:
+    """Return a share in percent, with two significant digits and no power of ten but of a small one."""
+    return f"{number(float(f'{100.0 * share:.2g}'), 15)} %"
+
+
+def breakable(name: str) -> Markup:
+    """Return a name of the program that may go on in a next line where it has underscores."""
+    return Markup("_<wbr>").join(name.split("_"))
 
 
 def words(name: str) -> str:
@@ -44,3 +76,13 @@ def words(name: str) -> str:
 
 def _with_unit(value: float, unit: str, digits: int) -> str:
     return f"{number(value, digits)}&nbsp;{unit_html(unit)}" if unit not in ("1", "") else number(value, digits)
+
+
+def _switched(texts: dict[UnitSystem, str]) -> Markup:
+    """Return a text of which the page shows the one of its system of units; equal ones are there once."""
+    systems: dict[str, list[str]] = {}
+    for system, text in texts.items():
+        systems.setdefault(text, []).append(system)
+    if len(systems) == 1:
+        return Markup(next(iter(systems)))
+    return Markup("".join(f'<span class="{" ".join(names)}">{text}</span>' for text, names in systems.items()))

@@ -12,7 +12,12 @@ const LOOKS = {
   reference: { dash: "dot", width: 1.2 },
   filtered: { dash: "dot", width: 1.1 },
   bound: { dash: "dash", width: 1 },
+  mean: { dash: "dot", width: 1 },
+  low: { width: 0 },
+  high: { width: 0 },
 };
+/* Between the curves of these kinds and those before them. */
+const FILLS = { high: "rgba(0,114,178,.2)" };
 const SHADES = { fault: "rgba(179,38,30,.09)", saturation: "rgba(214,158,0,.3)", tube: "rgba(91,95,199,.22)" };
 const RUN_COLOURS = 6;
 
@@ -24,28 +29,41 @@ async function inflate(id) {
   return new Response(stream).arrayBuffer();
 }
 
+/* The numbers of a curve: their bits as integers, each less the one before it, lowest bytes first (payload.py). */
+function restored(buffer, offset, length) {
+  const bytes = new Uint8Array(buffer, offset, 4 * length), bits = new Uint32Array(length);
+  let last = 0;
+  for (let i = 0; i < length; i++) {
+    const step = bytes[i] | (bytes[i + length] << 8) | (bytes[i + 2 * length] << 16) | (bytes[i + 3 * length] << 24);
+    last = (last + step) >>> 0;
+    bits[i] = last;
+  }
+  return new Float32Array(bits.buffer);
+}
+
 class Charts {
   /* `plots` describes the panels; `buffer` holds their numbers, one array after the other. */
   constructor(plots, buffer) {
     this.runs = plots.runs;
-    this.end = Math.max(...plots.runs.map((run) => run.end));
+    this.end = plots.end ?? Math.max(...plots.runs.map((run) => run.end));
     let offset = 0;
     this.arrays = plots.lengths.map((length) => {
-      const array = new Float32Array(buffer, offset, length);
+      const array = restored(buffer, offset, length);
       offset += array.byteLength;
       return array;
     });
     this.state = { units: document.documentElement.dataset.units, hiddenRuns: new Set(), hiddenKinds: new Set(), limits: false, time: null };
     this.panels = plots.panels.map((panel) => ({ ...panel, element: document.getElementById(`plot-${panel.name}`), stale: true, y: null }));
     this.onTime = () => {};
+    this.onZoom = () => {};
     this.watch = new IntersectionObserver((entries) => this.seen(entries), { rootMargin: "300px" });
     this.panels.forEach((panel) => this.watch.observe(panel.element));
   }
 
   /* Change the state and draw: at once what is in sight, then the rest while nothing else is to do. */
   set(change) {
+    if ("units" in change && change.units !== this.state.units) this.panels.forEach((panel) => { panel.y = null; });
     Object.assign(this.state, change);
-    if ("units" in change) this.panels.forEach((panel) => { panel.y = null; });
     this.panels.forEach((panel) => { panel.stale = true; });
     this.panels.filter((panel) => panel.inSight).forEach((panel) => this.draw(panel));
     this.drawLater();
@@ -110,6 +128,7 @@ class Charts {
       return {
         type: "scatter", mode: "lines", name: whose + curve.label, x: this.arrays[curve.x], y: this.values(panel, curve),
         line: { ...LOOKS[curve.kind], color: colour }, hovertemplate: `%{y:.6g} ${unit}`,
+        ...(curve.kind in FILLS ? { fill: "tonexty", fillcolor: FILLS[curve.kind] } : {}),
         opacity: curve.kind === "actual" || curve.run === null ? 1 : 0.75,
       };
     });
@@ -177,5 +196,77 @@ class Charts {
     } else if (own) {
       panel.y = own;
     }
+    this.onZoom();
+  }
+
+  /* The vertical ranges that differ from all that is there, by panel, in the units shown. */
+  get zooms() {
+    return Object.fromEntries(this.panels.filter((panel) => panel.y).map((panel) => [panel.name, panel.y]));
+  }
+
+  set zooms(zooms) {
+    this.panels.forEach((panel) => { panel.y = zooms[panel.name] || null; });
+    this.set({});
+  }
+}
+
+/* Draw what the toolbar says, in a window of time; pictures hide the runs that the charts hide. */
+function followToolbar(charts, form, time) {
+  const unchecked = (name) => [...form.querySelectorAll(`[name=${name}]:not(:checked)`)].map((box) => box.value);
+  const hiddenRuns = new Set(unchecked("run").map(Number)), hiddenKinds = new Set(unchecked("kind"));
+  for (const each of document.querySelectorAll("main [data-run]")) each.toggleAttribute("hidden", hiddenRuns.has(Number(each.dataset.run)));
+  charts.set({ units: form.elements.units.value, hiddenRuns, hiddenKinds, limits: Boolean(form.elements.limits?.checked), time });
+}
+
+/* Let a form control the charts, and the address of the page keep what it says; `show(time)` shows it in a window of time. */
+function connectCharts(charts, form, show) {
+  const { from, to } = form.elements;
+  const typed = () => {
+    const low = from.value === "" ? 0 : Number(from.value);
+    const high = to.value === "" ? charts.end : Number(to.value);
+    return low < high && (low > 0 || high < charts.end) ? [low, high] : null;
+  };
+  const zooms = { get: () => charts.zooms, set: (found) => { charts.zooms = found; } };
+  const address = new Address([form], () => show(typed()), zooms);
+  form.addEventListener("change", (event) => {
+    show([from, to].includes(event.target) ? typed() : charts.state.time);
+    address.write();
+  });
+  form.addEventListener("submit", (event) => event.preventDefault());
+  form.elements.all.addEventListener("click", () => {
+    charts.zooms = {};
+    charts.set({ time: null });
+    address.write();
+  });
+  charts.onTime = (time) => {
+    from.value = time ? Number(time[0].toPrecision(6)) : "";
+    to.value = time ? Number(time[1].toPrecision(6)) : "";
+  };
+  charts.onZoom = () => address.write();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => show(charts.state.time));
+  /* On paper every plot is drawn, in the light colours and at the width of its place there. */
+  matchMedia("print").addEventListener("change", () => {
+    show(charts.state.time);
+    charts.drawAll();
+    document.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.Plots.resize(plot));
+  });
+  address.read();
+}
+
+/* Start the plotting library, draw `plots`, and let `connect(charts)` do what is the page's own. */
+async function startCharts(plots, connect) {
+  const trouble = document.getElementById("trouble");
+  try {
+    const [numbers, library] = await Promise.all([inflate("numbers"), inflate("library")]);
+    const script = document.createElement("script");
+    script.textContent = new TextDecoder().decode(library);
+    document.head.append(script);
+    const charts = new Charts(plots, numbers);
+    connect(charts);
+    window.report = charts;
+  } catch (error) {
+    trouble.textContent = `The plots could not be drawn (${error.message}). They need a browser of 2023 or later.`;
+    trouble.hidden = false;
+    throw error;
   }
 }

@@ -26,7 +26,6 @@ class Player {
     speed.addEventListener("change", () => { this.last = null; });
     exaggeration.addEventListener("input", () => this.each((view) => view.setExaggeration(Number(exaggeration.value))));
     this.form.addEventListener("submit", (event) => event.preventDefault());
-    document.getElementById("toolbar").addEventListener("change", (event) => this.follow(event.target));
     this.markFaults();
     new IntersectionObserver((entries) => {
       this.inSight = entries[0].isIntersecting;
@@ -39,12 +38,8 @@ class Player {
     (this.views || []).forEach(work);
   }
 
-  /* The toolbar of the page is about the views too. */
-  follow(control) {
-    if (control.name === "units") this.each((view) => view.setUnits(control.value));
-    if (control.name === "run") {
-      for (const figure of this.section.querySelectorAll(`figure[data-run="${control.value}"]`)) figure.hidden = !control.checked;
-    }
+  setUnits(units) {
+    this.each((view) => view.setUnits(units));
   }
 
   markFaults() {
