@@ -1,8 +1,12 @@
 """The page of a campaign."""
 
-import numpy as np
+import re
 
-from hsv.campaign.page import BINS, histogram, render
+import numpy as np
+import pytest
+
+from hsv.campaign.page import BINS, histogram, render, sentence, share_interval
+from hsv.campaign.summary import Share, limits, shares, within_all
 
 
 def test_times_of_whole_periods_make_bars_and_no_comb():
@@ -21,3 +25,34 @@ def test_what_is_the_same_in_all_flights_is_said_not_drawn(results):
     page = render(results)
     assert "The same in all flights: end time 3&nbsp;s" in page
     assert 'id="histogram-tube_level"' in page and 'id="histogram-end_time"' not in page
+
+
+def test_flights_are_counted(results):
+    page = render(results)
+    text = re.sub(r"<[^>]+>", " ", re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL))
+    for share in shares(results):
+        assert f"{share.within} of {share.flights}" in text
+    for places in re.findall(r"\d+(\.\d+)? …", text):
+        assert not places, "44 flights tell whole percents apart, at most"
+
+
+def test_it_opens_with_how_many_flights_keep_all_limits(results):
+    rows = np.column_stack([np.abs(results.column(name)) <= limit for name, limit in limits(results).items()])
+    count = int(np.count_nonzero(rows.all(axis=1)))
+    assert within_all(results) == count
+    assert sentence(results).startswith(f"{count} of 44 flights are within all {rows.shape[1]} limits")
+    page = render(results)
+    assert page.index('class="lead') < page.index('class="picture"') < page.index("<table")
+
+
+@pytest.mark.parametrize(
+    ("flights", "text"), [(64, "94 … 100 %"), (1000, "94.4 … 100.0 %"), (10_000, "94.38 … 100.00 %")]
+)
+def test_intervals_have_the_digits_that_the_flights_can_tell(flights, text):
+    assert share_interval(Share("x", None, flights, flights, (0.94378, 1.0))) == text
+
+
+def test_the_worst_flights_are_columns(results):
+    table = render(results).partition('id="worst"')[2].partition("</table>")[0]
+    assert len(re.findall(r"<tr>", table)) == 3 + len(results.campaign.factors)
+    assert len(re.findall(r'<th scope="col"', table)) == 1 + 10

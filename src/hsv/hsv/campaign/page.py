@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -13,13 +13,16 @@ import numpy as np
 from markupsafe import Markup
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
-from hsv.campaign.summary import ENDED, Results, distributions, limits, shares, worst_flights
+from hsv.campaign.factors import Factor
+from hsv.campaign.summary import ENDED, Results, Share, distributions, limits, shares, within_all, worst_flights
 from hsv.errors import CampaignError, ControllerError, reason
-from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
-from hsv.recording.report.payload import compressed
+from hsv.recording.report.payload import Numbers, compressed
+from hsv.recording.report.picture import Band, Line, Picture, picture, strip
 from hsv.recording.report.templates import environment_of
+from hsv.recording.report.text import units_of, words
 from hsv.simulation.closed_loop import Flight
+from hsv.units import UnitSystem
 from hsv.vehicle.plant import Plant
 
 POINTS = 2000
@@ -28,13 +31,27 @@ POINTS = 2000
 BINS = 60
 
 
-def write_page(results: Results, out: Path) -> None:
-    """Write the page of ``results`` to the HTML file ``out``.
+PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
+"""Signals that the picture is made of."""
+
+SECTIONS = {
+    "summary": "Summary",
+    "worst": "Worst flights",
+    "envelopes": "Envelopes",
+    "distributions": "Distributions",
+    "scatter": "Against each parameter",
+    "repeat": "Repeat",
+}
+"""Headings in the order of the page."""
+
+
+def write_page(results: Results, out: Path, units: UnitSystem = UnitSystem.metric) -> None:
+    """Write the page of ``results`` to the HTML file ``out``; ``units`` are those in which it opens.
 
     Raises:
         CampaignError: The file cannot be written.
     """
-    page = render(results)
+    page = render(results, units)
     try:
         out.write_text(page, encoding="utf-8")
     except OSError as error:
@@ -43,43 +60,79 @@ def write_page(results: Results, out: Path) -> None:
         raise CampaignError(f"{out}: cannot be written ({reason(error)}), expected an HTML file to write") from error
 
 
-def render(results: Results) -> str:
+def render(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the page."""
     environment = environment_of("hsv.campaign")
     worst = worst_flights(results)
     shown = distributions(results)
+    flights = _flown(results, worst[0].flight)
+    plots, numbers = _plots(results, flights)
+    differing = [d for d in shown if d.minimum < d.maximum]
     return environment.get_template("page.html.j2").render(
         campaign=results.campaign,
+        units=units,
+        sections={name: heading for name, heading in SECTIONS.items() if differing or name != "scatter"},
+        sentence=sentence(results),
+        picture=_picture(results, flights),
         title=results.campaign.scenario.title,
         result=results.path.name,
         shares=shares(results),
-        distributions=[d for d in shown if d.minimum < d.maximum],
+        within_all=within_all(results),
+        flights=list(flights),
+        distributions=differing,
         constant=[d for d in shown if d.minimum == d.maximum],
-        units={d.name: d.unit for d in shown},
+        units_of={d.name: d.unit for d in shown},
         worst=worst,
         ended=ENDED,
+        relative=relative,
+        share_interval=share_interval,
         flown_again=results.flyable,
         points=POINTS,
         drawn=len(_drawn(results)),
         signals=SIGNALS,
-        quantity=text.quantity,
-        style=_shared("style.css"),
-        script=Markup(files("hsv.campaign").joinpath("template", "page.js").read_text(encoding="utf-8")),
-        charts=_shared("charts.js"),
-        data=_data(results, [d.name for d in shown if d.minimum < d.maximum], worst[0].flight),
+        plots=plots,
+        numbers=Markup(numbers),
+        data=_data(results, [d.name for d in differing]),
         library=Markup(compressed(LIBRARY.read_bytes())),
     )
 
 
-def _data(results: Results, names: Sequence[str], worst: int) -> dict[str, Any]:
-    """Return what the page's script draws, as plain data."""
+def sentence(results: Results) -> str:
+    """Return the verdict: how many flights are within all limits, and which limit most of them break."""
+    ended, *limited = shares(results)
+    lost = ended.flights - ended.within
+    said = f"{lost} of {ended.flights} flights did not come to their end" if lost else "All flights came to their end"
+    if not limited:
+        return f"{said}; there are no limits to judge them by."
+    text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
+    over = min(limited, key=lambda share: share.within)
+    if broken := ended.flights - over.within:
+        text += f"; the limit of {words(over.name)} is the one that most do not keep, {broken} of {ended.flights}"
+    return f"{text}. {said}."
+
+
+def share_interval(share: Share) -> str:
+    """Return the interval of a share in percent, in as many digits as the number of flights can tell apart."""
+    assert share.interval is not None
+    places = max(0, math.ceil(math.log10(share.flights)) - 2)
+    low, high = (f"{100.0 * end:.{places}f}" for end in share.interval)
+    return f"{low} … {high} %"
+
+
+def relative(factor: Factor) -> bool:
+    """Return whether a factor is the relative change of a parameter, which people read in percent."""
+    return factor.field != factor.name and factor.unit == "1"
+
+
+def _data(results: Results, names: Sequence[str]) -> dict[str, Any]:
+    """Return what the page's script draws besides curves over time, as plain data."""
     drawn = _drawn(results)
     columns = {name: results.column(name) for name in names}
     stated, units = limits(results), {d.name: d.unit for d in distributions(results)}
     return {
         "metrics": {
             name: {
-                "unit": units[name],
+                "units": units_of(units[name]),
                 "limit": stated.get(name),
                 "values": _packed(values[drawn]),
                 **histogram(values),
@@ -89,13 +142,12 @@ def _data(results: Results, names: Sequence[str], worst: int) -> dict[str, Any]:
         "factors": [
             {
                 "name": factor.name,
-                "unit": factor.unit,
+                "units": units_of(factor.unit, share=relative(factor)),
                 "values": _packed(results.column(f"sample_{factor.name}")[drawn]),
             }
             for factor in results.campaign.factors
         ],
         "flights": _packed(drawn),
-        "envelope": _envelope(results, worst),
     }
 
 
@@ -118,13 +170,8 @@ def histogram(values: np.ndarray) -> dict[str, list[float]]:
     return {"counts": counts.tolist(), "edges": edges.tolist()}
 
 
-def _envelope(results: Results, worst: int) -> dict[str, Any]:
-    """Return the envelopes, with the flight of the unchanged scenario and the worst one, where they may be flown."""
-    campaign, envelope = results.campaign, results.envelope
-    plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
-    windows = window_starts(plant.steps)
-    reached = np.flatnonzero(np.isfinite(envelope.low).all(axis=1))
-    time = windows[reached] * plant.period
+def _flown(results: Results, worst: int) -> dict[str, Flight]:
+    """Return the flight of the unchanged scenario and the worst one, flown again where that may be, by their names."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -132,23 +179,59 @@ def _envelope(results: Results, worst: int) -> dict[str, Any]:
             flights["unchanged"] = runner.fly_unchanged()
         with suppress(ControllerError):
             flights[f"flight {worst}"] = runner.fly(worst, runner.sample(worst))
-    return {
-        "time": _packed(time),
-        "signals": [
-            {
-                "name": signal.name,
-                "unit": signal.unit,
-                "low": _packed(envelope.low[reached, i]),
-                "high": _packed(envelope.high[reached, i]),
-                "mean": _packed(envelope.mean[reached, i]),
-                "flights": [
-                    {"label": label, "y": _packed(_curve(flight, windows, i))} for label, flight in flights.items()
-                ],
-            }
-            for i, signal in enumerate(SIGNALS)
-        ],
-        "flight_time": _packed(windows * plant.period),
+    return flights
+
+
+def _windows(results: Results) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """Return the first step of each window, its time (s), which windows any flight reached, and the end (s)."""
+    campaign = results.campaign
+    plant = Plant.from_parameters({**campaign.design, **campaign.scenario.parameters()})
+    reached = np.flatnonzero(np.isfinite(results.envelope.low).all(axis=1))
+    starts = window_starts(plant.steps)
+    return starts, starts * plant.period, reached, plant.steps * plant.period
+
+
+def _plots(results: Results, flights: Mapping[str, Flight]) -> tuple[dict[str, Any], str]:
+    """Return the description of the curves over time as that of the report, and the numbers they draw, compressed."""
+    envelope, numbers = results.envelope, Numbers()
+    windows, time, reached, end = _windows(results)
+    x, flown_x = numbers.add(time[reached]), numbers.add(time)
+
+    def panel(index: int, name: str, unit: str) -> dict[str, Any]:
+        of_all = {"low": envelope.low, "high": envelope.high, "mean": envelope.mean}
+        labels = {"low": "least", "high": "largest", "mean": "mean"}
+        curves = [
+            {"kind": kind, "label": labels[kind], "run": None, "x": x, "y": numbers.add(values[reached, index])}
+            for kind, values in of_all.items()
+        ]
+        for run, flight in enumerate(flights.values()):
+            y = numbers.add(_curve(flight, windows, index))
+            curves.append({"kind": "nominal" if run else "actual", "label": "", "run": run, "x": flown_x, "y": y})
+        return {"name": f"envelope_{name}", "units": units_of(unit), "curves": curves, "limits": [], "shades": []}
+
+    described = {
+        "panels": [panel(index, *signal) for index, signal in enumerate(SIGNALS)],
+        "runs": [{"label": label, "end": end} for label in flights],
+        "end": end,
     }
+    return described | {"lengths": numbers.lengths}, numbers.packed()
+
+
+def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
+    windows, time, reached, end = _windows(results)
+    envelope = results.envelope
+    strips = []
+    for index, signal in enumerate(SIGNALS):
+        if signal.name in PICTURED:
+            lines = [Line("mean", time[reached], envelope.mean[reached, index])]
+            for run, flight in enumerate(flights.values()):
+                curve = _curve(flight, windows, index)
+                look = f"run{run} nominal" if run else "run0"
+                lines.append(Line(look, time[: len(curve)], curve, run))
+            band = Band(time[reached], envelope.low[reached, index], envelope.high[reached, index])
+            strips.append(strip(words(signal.name).capitalize(), signal.unit, end, lines, [band]))
+    starts = [fault.start for fault in results.campaign.scenario.fault]
+    return picture(strips, end, [(start, end) for start in starts if start < end])
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
@@ -160,7 +243,3 @@ def _packed(values: np.ndarray) -> str:
     """Return numbers in single precision, as text."""
     with np.errstate(over="ignore"):
         return base64.b64encode(np.asarray(values, "<f4").tobytes()).decode()
-
-
-def _shared(name: str) -> Markup:
-    return Markup(files("hsv.recording.report").joinpath("template", name).read_text(encoding="utf-8"))

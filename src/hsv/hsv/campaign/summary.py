@@ -154,6 +154,14 @@ def limits(results: Results) -> dict[str, float]:
     return stated
 
 
+def within_all(results: Results) -> int:
+    """Return how many flights come to their end within every limit; an undefined metric is not within."""
+    within = ~(results.column("diverged") | results.crashed)
+    for name, limit in limits(results).items():
+        within &= np.abs(results.column(name)) <= limit
+    return int(np.count_nonzero(within))
+
+
 def shares(results: Results) -> list[Share]:
     """Return the share of flights that come to their end, and within each limit; an undefined metric is not within."""
     flown = ~(results.column("diverged") | results.crashed)

@@ -1,7 +1,10 @@
 "use strict";
-/* Plots of a campaign; css() and inflate() come from the report's charts.js. */
+/* Plots of a campaign: curves over time by the report's charts, here distributions and dependences. */
 
 const unpack = (text) => new Float32Array(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+const scaled = (values, { factor }) => (factor === 1 ? values : Float64Array.from(values, (value) => value * factor));
+/* The plotting library sets text of its own: no markup of units. */
+const plain = (unit) => unit.replaceAll("<sup>½</sup>", "½").replaceAll("<sup>2</sup>", "²");
 
 function layout(x, y, extra = {}) {
   return {
@@ -17,79 +20,59 @@ function draw(id, traces, described) {
   Plotly.react(id, traces, described, { displaylogo: false, responsive: true });
 }
 
-function envelopes(data) {
-  const time = unpack(data.time), flown = unpack(data.flight_time);
-  for (const signal of data.signals) {
-    const shade = { type: "scatter", mode: "lines", x: time, line: { width: 0 }, hoverinfo: "skip" };
-    const curves = signal.flights.map((flight, index) => ({
-      type: "scatter", mode: "lines", x: flown, y: unpack(flight.y), name: flight.label,
-      line: { width: 1.4, dash: index ? "dash" : "solid", color: css(`--run${index}`) },
-    }));
-    draw(`envelope-${signal.name}`, [
-      { ...shade, y: unpack(signal.low) },
-      { ...shade, y: unpack(signal.high), fill: "tonexty", fillcolor: "rgba(0,114,178,.2)" },
-      { type: "scatter", mode: "lines", x: time, y: unpack(signal.mean), name: "mean", line: { width: 1, dash: "dot", color: css("--muted") } },
-      ...curves,
-    ], layout("time [s]", ""));
-  }
-}
-
-function limitLines(limit, axis) {
+function limitLines(limit, axis, factor) {
   if (limit === null) return [];
   const [from, along, across] = axis === "x" ? ["yref", "x", "y"] : ["xref", "y", "x"];
   return [limit, -limit].map((value) => ({
-    type: "line", [from]: "paper", [`${along}0`]: value, [`${along}1`]: value, [`${across}0`]: 0, [`${across}1`]: 1,
+    type: "line", [from]: "paper", [`${along}0`]: value * factor, [`${along}1`]: value * factor, [`${across}0`]: 0, [`${across}1`]: 1,
     line: { width: 1.5, color: css("--bad") },
   }));
 }
 
-/* Limit lines that lie beyond the data would squeeze it: they are drawn where they are in sight. */
-const inSight = (limit, low, high) => limitLines(limit, "x").filter((line) => line.x0 >= low && line.x0 <= high);
-
-function histograms(metrics) {
+function histograms(metrics, units) {
   for (const [name, metric] of Object.entries(metrics)) {
-    const { edges, counts, limit } = metric;
+    const own = metric.units[units], edges = scaled(metric.edges, own), { counts } = metric;
     const middle = counts.map((_, i) => (edges[i] + edges[i + 1]) / 2);
     const width = counts.map((_, i) => edges[i + 1] - edges[i]);
+    /* Limit lines that lie beyond the data would squeeze it: they are drawn where they are in sight. */
+    const shapes = limitLines(metric.limit, "x", own.factor).filter((line) => line.x0 >= edges[0] && line.x0 <= edges[edges.length - 1]);
     draw(`histogram-${name}`, [{ type: "bar", x: middle, y: counts, width, marker: { color: css("--run0") } }],
-      layout("", "flights", { bargap: 0, shapes: inSight(limit, edges[0], edges[edges.length - 1]) }));
+      layout("", "flights", { bargap: 0, shapes }));
   }
 }
 
-function scatter(data, name) {
-  const metric = data.metrics[name], flights = unpack(data.flights), y = unpack(metric.values);
-  const finite = [...y].filter(Number.isFinite), low = Math.min(...finite), high = Math.max(...finite);
-  const shapes = limitLines(metric.limit, "y").filter((line) => line.y0 >= low && line.y0 <= high);
+function scatter(data, name, units) {
+  const metric = data.metrics[name], own = metric.units[units], flights = unpack(data.flights);
+  const y = scaled(unpack(metric.values), own), finite = [...y].filter(Number.isFinite);
+  const low = Math.min(...finite), high = Math.max(...finite), unit = plain(own.unit);
+  const shapes = limitLines(metric.limit, "y", own.factor).filter((line) => line.y0 >= low && line.y0 <= high);
   for (const factor of data.factors) {
+    const across = factor.units[units];
     draw(`scatter-${factor.name}`, [{
-      type: "scatter", mode: "markers", x: unpack(factor.values), y, text: [...flights].map((flight) => `flight ${flight}`),
+      type: "scatter", mode: "markers", x: scaled(unpack(factor.values), across), y, text: [...flights].map((flight) => `flight ${flight}`),
       marker: { size: 4, opacity: 0.5, color: css("--run0") }, hovertemplate: "%{text}: %{x:.4g}, %{y:.5g}<extra></extra>",
-    }], layout(factor.unit === "1" ? "" : factor.unit, `${name.replaceAll("_", " ")}${metric.unit === "1" ? "" : ` [${metric.unit}]`}`, { shapes }));
+    }], layout(plain(across.unit), `${name.replaceAll("_", " ")}${unit && ` [${unit}]`}`, { shapes }));
   }
 }
 
 async function start() {
-  try {
-    const script = document.createElement("script");
-    script.textContent = new TextDecoder().decode(await inflate("library"));
-    document.head.append(script);
-    const data = JSON.parse(document.getElementById("data").textContent);
-    const form = document.getElementById("metric"), all = () => {
-      envelopes(data.envelope);
-      histograms(data.metrics);
-      if (form) scatter(data, form.elements.metric.value);
-      document.documentElement.dataset.drawn = "all";
+  const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  await startCharts(read("plots"), (charts) => {
+    const data = read("data"), form = document.getElementById("toolbar"), { units, metric } = form.elements;
+    let shown = "";
+    const show = (time) => {
+      showUnits();
+      followToolbar(charts, form, time);
+      const wanted = [units.value, metric?.value, css("--run0")].join();
+      if (wanted !== shown) {
+        histograms(data.metrics, units.value);
+        if (metric) scatter(data, metric.value, units.value);
+      }
+      shown = wanted;
     };
-    form?.addEventListener("change", () => scatter(data, form.elements.metric.value));
-    form?.addEventListener("submit", (event) => event.preventDefault());
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", all);
-    all();
-  } catch (error) {
-    const trouble = document.getElementById("trouble");
-    trouble.textContent = `The plots could not be drawn (${error.message}). They need a browser of 2023 or later.`;
-    trouble.hidden = false;
-    throw error;
-  }
+    connectCharts(charts, form, show);
+    show(charts.state.time);
+  });
 }
 
 start();
