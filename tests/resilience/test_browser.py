@@ -1,7 +1,6 @@
 """The page as a browser shows it."""
 
 import pytest
-from browser import Browser
 from node_processes import short_scenario
 
 from hsv.campaign.executors import SerialExecutor
@@ -13,28 +12,51 @@ from hsv.resilience.summary import ResilienceResults
 pytestmark = pytest.mark.viewer
 
 
-@pytest.fixture
-def page(tmp_path):
-    campaign = plan((str(short_scenario(tmp_path, duration=6, fault=2)),), ("elevator_loss", "fuel_loss"))
-    store = CaseStore(tmp_path / "out")
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("resilience")
+    campaign = plan((str(short_scenario(folder, duration=6, fault=2)),), ("elevator_loss", "fuel_loss"))
+    store = CaseStore(folder / "out")
     run_resilience(campaign, store, SerialExecutor())
-    return write_results(ResilienceResults.read(campaign, store), tmp_path / "out", "hsv resilience")[0]
+    return write_results(ResilienceResults.read(campaign, store), folder / "out", "hsv resilience")[0]
 
 
 @pytest.mark.parametrize("width", [1280, 400])
-def test_the_page_is_as_wide_as_the_screen_and_prints_its_numbers(tmp_path, page, width):
-    browser = Browser(tmp_path / "profile")
-    try:
-        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-        browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        browser.driver.get(page.as_uri())
-        assert browser.console() == []
-        assert browser.run("return document.documentElement.scrollWidth") <= width
-        height = "return document.querySelector('details').getBoundingClientRect().height"
-        closed = browser.run(height)
-        browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
-        assert browser.run(height) > 1.5 * closed
-        links = browser.run("return [...document.querySelectorAll('a')].map((a) => a.getAttribute('href'))")
-        assert all((page.parent / link).is_file() for link in links if not link.startswith("#"))
-    finally:
-        browser.driver.quit()
+def test_the_page_is_as_wide_as_the_screen_and_prints_its_numbers(browser, page, screen, width):
+    screen(width)
+    browser.open(page)
+    assert browser.console() == []
+    assert browser.run("return document.documentElement.scrollWidth") <= width
+    height = "return document.querySelector('details').getBoundingClientRect().height"
+    closed = browser.run(height)
+    browser.media(media="print")
+    assert browser.run(height) > 1.5 * closed
+    assert browser.run("return getComputedStyle(document.getElementById('toolbar')).display") == "none"
+    links = browser.run("return [...document.querySelectorAll('a')].map((a) => a.getAttribute('href'))")
+    assert all((page.parent / link).is_file() for link in links if not link.startswith("#"))
+
+
+def test_units_are_switched_and_kept_in_the_address(browser, page):
+    head = """
+        document.querySelector("details").open = true;
+        const heads = [...document.querySelectorAll("thead th")].map((head) => head.innerText);
+        return heads.find((text) => text.startsWith("altitude"));
+    """
+    browser.driver.get("about:blank")
+    browser.open(page)
+    assert browser.run(head) == "altitude (m)"
+    browser.click("[name=units][value=paper]")
+    assert browser.run(head) == "altitude (ft)"
+    browser.driver.find_element("css selector", "nav a[href='#cells']").click()
+    address = browser.driver.current_url
+    assert address.endswith("#cells&units=paper")
+    browser.driver.get("about:blank")
+    browser.driver.get(address)
+    assert browser.run(head) == "altitude (ft)" and browser.console() == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_there_are_no_barriers(browser, page, screen, scheme):
+    screen(1280, scheme)
+    browser.open(page)
+    assert browser.barriers() == []

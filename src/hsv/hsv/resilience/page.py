@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path
 
 import tomli_w
-from markupsafe import Markup
 
 from hsv.campaign.store import write_whole
 from hsv.errors import CampaignError, reason
@@ -16,10 +14,20 @@ from hsv.resilience.faults import OBSERVED, SEVERITIES, TRIED, Moment
 from hsv.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND
 from hsv.resilience.summary import Cell, ResilienceResults, parameter_words, said_boundaries
 from hsv.simulation.scenario import scenario_table
-from hsv.units import to_paper
+from hsv.units import UnitSystem
 
 FLIGHTS = "flights"
 """Folder beside the page with the scenarios of the worst flights."""
+
+SECTIONS = {"map": "Map of survival", "controllers": "Controllers", "cells": "Numbers", "repeat": "Repeat a flight"}
+"""Headings in the order of the page."""
+
+PLACES = {
+    "attitude": {UnitSystem.metric: 2, UnitSystem.si: 4, UnitSystem.paper: 2},
+    "altitude": {UnitSystem.metric: 1, UnitSystem.si: 1, UnitSystem.paper: 1},
+    "time": {UnitSystem.metric: 2, UnitSystem.si: 2, UnitSystem.paper: 2},
+}
+"""Decimals of the numbers of the page."""
 
 
 def write_results(results: ResilienceResults, out: Path, command: str) -> list[Path]:
@@ -66,16 +74,21 @@ def vehicle_words(vehicle: int) -> str:
     return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 
-def decimals(value: float | None, unit: str, digits: int) -> str:
-    """Return a ``value``, given in the SI ``unit``, in the paper's with so many decimals; a dash for none."""
-    return "–" if value is None else f"{to_paper(value, unit)[0]:.{digits}f}"
+def sentence(results: ResilienceResults) -> str:
+    """Return the verdict: how many of its flights each controller survives, the best one first."""
+    counts = {}
+    for subject in results.campaign.subjects:
+        squares = [square for (_, name), square in results.squares.items() if name == subject.name]
+        survived, flown = (sum(numbers) for numbers in zip(*(square.survived for square in squares), strict=True))
+        counts[subject.name] = survived, flown
+    ranked = sorted(counts.items(), key=lambda item: item[1][0] / item[1][1], reverse=True)
+    return "Flights survived: " + ", ".join(f"{name} {survived} of {flown}" for name, (survived, flown) in ranked) + "."
 
 
 def render(results: ResilienceResults, name: str, command: str) -> str:
     """Return the page (``index.html``) or the Markdown (``result.md``), which name the ``command`` that makes them."""
     html = name.endswith(".html")
     environment = environment_of("hsv.resilience", escaped=html)
-    style = files("hsv.recording.report").joinpath("template", "style.css").read_text(encoding="utf-8")
     return environment.get_template(f"{name}.j2").render(
         command=command,
         campaign=results.campaign,
@@ -86,8 +99,11 @@ def render(results: ResilienceResults, name: str, command: str) -> str:
         observed=OBSERVED,
         attitude_band=ATTITUDE_BAND,
         altitude_band=ALTITUDE_BAND,
-        quantity=text.quantity,
-        decimals=decimals,
+        units=UnitSystem.metric,
+        sections=SECTIONS,
+        sentence=sentence(results),
+        decimals=text.decimals,
+        places=PLACES,
         said_boundaries=said_boundaries,
         corners=max(len(subject.vehicles) for subject in results.campaign.subjects) - 1,
         parameter_words=parameter_words,
@@ -95,5 +111,4 @@ def render(results: ResilienceResults, name: str, command: str) -> str:
         vehicle_words=vehicle_words,
         survived=sum(flight.survived for flight in results.flights),
         flights=len(results.flights),
-        style=Markup(style),
     )
