@@ -6,6 +6,7 @@ from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.region import record
 from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.verification import effects
 from hsv.design.verification.effects import (
     REACH,
     Measured,
@@ -17,6 +18,7 @@ from hsv.design.verification.effects import (
     with_models,
 )
 from hsv.design.verification.plan import Plan
+from hsv.errors import DesignError
 from hsv.lpv.polytope import schedule
 from hsv.noise import LARGEST
 from hsv.sensors import sensor_data
@@ -235,3 +237,11 @@ def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
 
 def test_the_reach_that_is_written_as_the_bound_of_all_noise_is_taken(subject):
     assert "turbulence 2 ft/s" in described(subject, turbulence="2 ft/s", reach=8.572)[0]
+
+
+def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeypatch):
+    def none(*_):
+        raise DesignError("no set")
+
+    monkeypatch.setattr(effects, "ellipsoid", none)
+    assert effects.verdict("x", subject.design, subject).said == "no set"

@@ -512,7 +512,7 @@ def verdict(
         # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
         if not best.certified and contractions:
             found = _with_contractions(name, design, subject, problem, contractions, lag, error)
-            best = max(best, found, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
+            best = max(found, best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
     return best
 
 
