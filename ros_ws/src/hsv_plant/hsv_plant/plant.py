@@ -31,7 +31,7 @@ from hsv.graph.description import (
     peers,
 )
 from hsv.graph.exchange import FILL, READ
-from hsv.graph.infrastructure_parameters import PACE_PARAMETERS
+from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
 from hsv.graph.progress import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES
@@ -185,8 +185,16 @@ class PlantNode(LockstepNode):
             self._continue()
             # Of who pauses nobody else is to blame.
             waited = self._standstill.look(time.monotonic() if self.values["paused"] else self._messages)
-            if waited > self.values["step_timeout"] + max(self._delay(), 0.0):
+            if waited > self._limit() + max(self._delay(), 0.0):
                 self._give_up(waited)
+
+    def _limit(self) -> float:
+        """Return the time (s) to wait; where a foreign controller's is shorter, not for the recorder, too."""
+        limit = float(self.values["step_timeout"])
+        return max(limit, STEP_TIMEOUT) if self._foreign_controller and self._behind_recorder() else limit
+
+    def _behind_recorder(self) -> bool:
+        return self._flown or not self._room()
 
     def wait_timeout(self) -> float:
         """Wake in time for the next state when paced."""
@@ -239,7 +247,7 @@ class PlantNode(LockstepNode):
 
     def _give_up(self, waited: float) -> None:
         step = self._signals.step
-        behind_recorder = self._flown or not self._room()
+        behind_recorder = self._behind_recorder()
         source, topic = (
             (RECORDER, self._confirmations.topic_name)
             if behind_recorder

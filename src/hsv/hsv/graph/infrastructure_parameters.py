@@ -17,13 +17,16 @@ LOCKSTEP_PARAMETERS = (
 )
 """Parameters that every node declares."""
 
+STEP_TIMEOUT = 10.0
+"""Wall time (s) after which silence ends a run, unless something else is said."""
+
 PACE_PARAMETERS = (
     Parameter(
         "real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3, read_only=False
     ),
     Parameter("paused", False, "whether the flight stands still, until this is false", read_only=False),
     Parameter("start_timeout", 0.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
-    Parameter("step_timeout", 10.0, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
+    Parameter("step_timeout", STEP_TIMEOUT, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
 """Parameters of the plant, which owns simulated time."""

@@ -18,6 +18,7 @@ from hsv.control.library import library_digest, library_record
 from hsv.design.certificate import certificate_path, find_certificate
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
 from hsv.graph.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
+from hsv.graph.infrastructure_parameters import STEP_TIMEOUT
 from hsv.graph.launcher import executable
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.live.addresses import ports
@@ -26,8 +27,8 @@ from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text, wit
 
 _NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})
 
-STEP_TIMEOUT, FOREIGN_STEP_TIMEOUT = 10.0, 2.5
-"""Wall time (s) after which a silent node ends a run; nobody knows what a controller that is a node of its own does."""
+FOREIGN_STEP_TIMEOUT = 2.5
+"""The same where nobody knows what the controller does, a node of its own."""
 
 
 @dataclass(frozen=True)
