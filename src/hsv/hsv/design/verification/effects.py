@@ -66,6 +66,9 @@ LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
 _WIND_FORWARD, _WIND_UP, _DENSITY = 0, 1, 2
 """Of the conditions that :func:`hsv.vehicle.dynamics.forces_in` takes."""
 
+N_SCHEDULING = 2
+"""The nominal model is scheduled by the first states, altitude and velocity."""
+
 _STILL = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 
 _STEP = np.array([1.0, 1.0, 1e-3])
@@ -114,8 +117,8 @@ class Measured:
             # A late sample is one of the plan as it was, and of the error as it was, anywhere else in the set.
             error = error + self.plan.change(self.late)
             apart = np.where(self.late > 0, 2.0 * self.plan.half_width, 0.0)
-            if (error + apart)[:2].any():
-                widening = self.plan.scheduling((error + apart)[:2])
+            if (error + apart)[:N_SCHEDULING].any():
+                widening = self.plan.scheduling((error + apart)[:N_SCHEDULING])
         if self.inertial:
             columns[:, :, PITCH] += columns[:, :, ALPHA]
             seen[:, PITCH] += seen[:, ALPHA]
@@ -506,12 +509,14 @@ def verdict(
     problem = with_models(tube_problem(design, subject.vehicle, disturbance), models)
     own = tube["invariant_set"]["contraction"]
     others = [value for value in inputs.contraction if value != own]
-    error = np.sum([model.error for model in models if isinstance(model, Measured)] or [np.zeros(N_RIGID)], axis=0)
+    measured = [model for model in models if isinstance(model, Measured)]
+    error = np.sum([model.error for model in measured] or [np.zeros(N_RIGID)], axis=0)
+    late = np.sum([model.late for model in measured] or [np.zeros(N_RIGID)], axis=0) > 0.0
     best = Verdict(name, "no contraction to try")
     for contractions in ([own], others):
         # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
         if not best.certified and contractions:
-            found = _with_contractions(name, design, subject, problem, contractions, lag, error)
+            found = _with_contractions(name, design, subject, problem, contractions, lag, error, late)
             best = max(found, best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
     return best
 
@@ -524,12 +529,17 @@ def _with_contractions(
     contractions: list[float],
     lag: tuple[np.ndarray, np.ndarray] | None,
     error: np.ndarray,
+    late: np.ndarray,
 ) -> Verdict:
     inputs, plan = subject.inputs.invariant_set, subject.certificate["tube"]["tightening"]["plan"]
     try:
         found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), contractions)
     except DesignError as failure:
         return Verdict(name, str(failure))
+    scheduling = late & (np.arange(N_RIGID) < N_SCHEDULING)
+    if np.any(found.half_width[:N_RIGID][scheduling] > Plan.of(subject).half_width[scheduling]):
+        # Measured took them to be as far from the truth as the design's own set is wide.
+        return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
     bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
     room = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
     limits = design.input_maximum - design.input_minimum
