@@ -20,7 +20,7 @@ def test_a_changed_scenario_is_flown_measured_and_drawn(tmp_path):
     assert flight.time[-1] == 6.0 and flight.fault_start == 3.0
     np.testing.assert_array_equal(flight.history.actuator[150:, 1], 0.8 * flight.history.command[150:, 1])
     assert flight.metrics["altitude_error_maximum"] == pytest.approx(182.88, rel=1e-3)
-    hsv.plot(flight, paper_units=True).savefig(tmp_path / "a.png")
+    hsv.plot(flight, units="paper").savefig(tmp_path / "a.png")
     assert (tmp_path / "a.png").stat().st_size > 20_000
 
 

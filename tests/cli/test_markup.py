@@ -14,7 +14,9 @@ from rich.console import Console
 
 from hsv.cli import output
 from hsv.cli.progress import flight, stages
+from hsv.cli.summary import print_section
 from hsv.recording.metadata import FILE_NAME
+from hsv.units import UnitSystem
 
 NAME = "run[old] [/x] :bug:"
 
@@ -44,9 +46,11 @@ def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys: pytest.Captur
     output.warn(NAME)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"plant: [WARN] {NAME}", f"hsv: error: {NAME}", f"hsv: warning: {NAME}"]
-    output.print_table(NAME, {"altitude": (1.0, "m")}, output.Units.si, {"altitude": NAME})
-    title, _, row = capsys.readouterr().out.splitlines()
-    assert title.strip() == NAME and row.strip().endswith(NAME)
+    output.print_table(NAME, {"altitude": (1.0, "m")}, UnitSystem.si)
+    assert capsys.readouterr().out.splitlines()[0].strip() == NAME
+    print_section(NAME, {NAME: NAME})
+    title, line = capsys.readouterr().out.splitlines()
+    assert title == NAME and line.split("  ")[1:] == [NAME, NAME]
 
 
 def test_a_bar_shows_the_name_of_a_scenario_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from hsv.control.design_file import find_design, read_parameters
 from hsv.control.design_parameters import digest
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
-from hsv.simulation.fingerprint import _table, as_published, fingerprint, in_words
+from hsv.simulation.fingerprint import _table, as_published, fingerprint, published_in_words
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario, scenario_names
 
@@ -67,10 +67,10 @@ def test_published_fingerprints_hold_for_the_shipped_scenario_with_its_design():
 
 
 def test_words_say_what_was_compared():
-    assert in_words("v1:0", True) == "v1:0, as published"
-    assert in_words("v1:0", False) == "v1:0, not the published flight of this scenario"
-    assert in_words("v1:0", None) == "v1:0"
-    assert in_words(None, None) == "none: steps are missing"
+    assert published_in_words("v1:0", True) == "as published"
+    assert published_in_words("v1:0", False) == "not the published flight of this scenario"
+    assert published_in_words("v1:0", None) == "none is published"
+    assert published_in_words(None, None) == "none: steps are missing"
 
 
 SOLVED_IN_FLIGHT = {

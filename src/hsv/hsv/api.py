@@ -21,6 +21,7 @@ from hsv.simulation.closed_loop import fly as fly_components
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario
 from hsv.simulation.scenario import load_scenario as load
+from hsv.units import UnitSystem, unit_system
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,13 +66,20 @@ def compare(flights: Mapping[str, Flight]) -> dict[str, dict[str, float]]:
     return {name: row for name, row in rows.items() if row}
 
 
-def plot(flights: Flight | Mapping[str, Flight], *, paper_units: bool = False) -> Figure:
+def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metric) -> Figure:
     """Return the paper's eight panels over time, of one flight or of several by label.
 
-    Dotted is the reference, shaded what follows the first fault. ``paper_units``: feet and degrees in place of SI.
+    Dotted is the reference, shaded what follows the first fault.
+
+    Args:
+        flights: One, or several by label.
+        units: ``metric`` (SI with degrees), ``si`` or ``paper`` (feet and degrees).
+
+    Raises:
+        QuantityError: ``units`` are none of these.
     """
     # Drawing takes a second to import, and a script may do without.
     from hsv.recording.plots import flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights
-    return flight_figure({label: flight.data() for label, flight in shown.items()}, paper_units)
+    return flight_figure({label: flight.data() for label, flight in shown.items()}, unit_system(units))

@@ -80,6 +80,17 @@ def factor(unit: str, to: str) -> float:
     return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
 
 
+def unit_system(name: str) -> UnitSystem:
+    """Return the units called ``name``.
+
+    Raises:
+        QuantityError: There are none.
+    """
+    if name not in [*UnitSystem]:
+        raise QuantityError(f"units = {name!r}: expected one of {', '.join(UnitSystem)}")
+    return UnitSystem(name)
+
+
 def unit_in(system: UnitSystem, unit: str) -> str:
     """Return the unit of an SI unit in ``system``, of a quotient without one that of the dividend converted."""
     if system is UnitSystem.si:
@@ -107,6 +118,11 @@ def in_system(value: float, unit: str, system: UnitSystem, *, share: bool = Fals
 def to_paper(value: float, unit: str) -> tuple[float, str]:
     """Return ``value``, given in the SI ``unit``, in the paper's unit, and the name of that unit."""
     return in_system(value, unit, UnitSystem.paper)
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Return ``value`` with so many significant digits, and all that it has before the decimal point up to 999999."""
+    return f"{value:.0f}" if 10.0 ** (digits - 1) <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
 def si_unit_of(text: object) -> str:

@@ -20,7 +20,10 @@ from hsv.campaign.summary import (
     worst_flights,
 )
 from hsv.campaign.table import OUTCOMES
-from hsv.cli.output import Units, console, errors, print_json, shown, to_json
+from hsv.cli.output import console, errors, json_system, print_json
+from hsv.simulation.metrics import METRICS
+from hsv.units import UnitSystem, in_system, significant, unit_in
+from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
 _LISTED = 5
 """Worst flights that are listed; the page has more."""
@@ -36,7 +39,7 @@ def announce(capacity: Capacity) -> None:
     )
 
 
-def show(results: Results, units: Units, json: bool, page: bool, flown: int | None = None) -> None:
+def show(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
     """Print the summary of a campaign and write its page; ``flown`` now, if any were."""
     written = results.path.with_suffix(".html") if page else None
     rows, worst, spread = shares(results), worst_flights(results, _LISTED), distributions(results)
@@ -62,10 +65,10 @@ def show(results: Results, units: Units, json: bool, page: bool, flown: int | No
                 ],
                 "distributions": {
                     d.name: {
-                        statistic: to_json({statistic: (getattr(d, statistic), d.unit)}, units).popitem()[1]
+                        statistic: in_system(getattr(d, statistic), d.unit, json_system(units))[0]
                         for statistic in ("minimum", "median", "percentile_95", "maximum", "mean")
                     }
-                    | {"unit": shown((1.0, d.unit), units)[1], "flights": d.flights}
+                    | {"unit": unit_in(json_system(units), d.unit), "flights": d.flights}
                     for d in spread
                 },
                 "worst_flights": [
@@ -83,28 +86,24 @@ def show(results: Results, units: Units, json: bool, page: bool, flown: int | No
 
 
 def _print_tables(
-    results: Results, rows: Sequence[Share], worst: Sequence[WorstFlight], spread: Sequence[Distribution], units: Units
+    results: Results,
+    rows: Sequence[Share],
+    worst: Sequence[WorstFlight],
+    spread: Sequence[Distribution],
+    units: UnitSystem,
 ) -> None:
-    def number(value: float, unit: str) -> str:
-        return f"{shown((value, unit), units)[0]:.5g}"
-
     campaign = results.campaign
     table = Table(title=f"{campaign.scenario.title}: {campaign.samples} flights", title_justify="left", box=None)
     for heading in ("limit", "", "within", "share", "95 % interval"):
         table.add_column(heading, justify="left" if heading == "limit" else "right")
     for share in rows:
-        unit = OUTCOMES.get(share.name, "1")
-        limit = (
-            ""
-            if share.limit is None
-            else f"{number(share.limit, unit)} {shown((1.0, unit), units)[1]}".removesuffix(" 1")
-        )
-        interval = "all corners" if share.interval is None else " to ".join(f"{100 * p:.2f} %" for p in share.interval)
+        limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
+        interval = "all corners" if share.interval is None else " to ".join(_percent(p) for p in share.interval)
         table.add_row(
-            share.name.replace("_", " "),
+            _words(share.name),
             limit,
             f"{share.within} of {share.flights}",
-            f"{100 * share.fraction:.2f} %",
+            _percent(share.fraction),
             interval,
         )
     console.print(table)
@@ -112,17 +111,37 @@ def _print_tables(
     for heading in ("metric", "least", "median", "95 %", "largest", "unit"):
         table.add_column(heading, justify="left" if heading in ("metric", "unit") else "right")
     for d in spread:
-        values = (number(v, d.unit) for v in (d.minimum, d.median, d.percentile_95, d.maximum))
-        table.add_row(d.name.replace("_", " "), *values, shown((1.0, d.unit), units)[1].removesuffix("1"))
+        cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
+        table.add_row(_words(d.name), *(number for number, _ in cells), cells[0][1])
     console.print(table)
     worst = [w for w in worst if w.limit]  # of a scenario without limits, those that ended early
     if worst:
         console.print("worst flights, by what they use of their limits:")
     for w in worst:
-        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {w.limit.replace('_', ' ')}"
-        console.print(f"  {w.flight}: {used}; {sample_words(w.sample)}", soft_wrap=True)
+        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {_words(w.limit)}"
+        console.print(f"  {w.flight}: {used}; {sample_words(w.sample, units)}", soft_wrap=True)
 
 
-def sample_words(sample: dict[str, float]) -> str:
-    """Return a sample (SI) on one line."""
-    return ", ".join(f"{name} {value:+.4g}" for name, value in sample.items())
+def sample_words(sample: dict[str, float], units: UnitSystem) -> str:
+    """Return a sample (SI; uncertain parameters are relative changes) on one line."""
+    return ", ".join(
+        f"{name} {100.0 * value:+.3g} %"
+        if units is UnitSystem.metric and name in COEFFICIENT_UNITS
+        else f"{name} {value:+.4g}"
+        for name, value in sample.items()
+    )
+
+
+def _words(name: str) -> str:
+    return METRICS[name].words if name in METRICS else name.replace("_", " ")
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"
+
+
+def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
+    """Return a number that is kept of a flight (SI) as it is printed, and its unit."""
+    share = name in METRICS and METRICS[name].share
+    number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=share)
+    return significant(number), "" if unit == "1" else unit

@@ -8,14 +8,14 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import BagArgument, JsonOption, ReportOption, UnitsOption
-from hsv.cli.output import Units
+from hsv.units import UnitSystem
 
 
 def conclude(
     bag: BagArgument,
     report: ReportOption = True,
     failure: Annotated[str, typer.Option(help="What a process failed with: then this is the verdict.")] = "",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Conclude a flight whose nodes have ended: close its bag, print the summary, write the report, give the verdict.
@@ -30,7 +30,7 @@ def conclude(
     conclude_flight(bag, report=report, units=units, json=json, wall_time=None)
 
 
-def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_time: float | None) -> None:
+def conclude_flight(bag: Path, *, report: bool, units: UnitSystem, json: bool, wall_time: float | None) -> None:
     """Print the summary of the flight in ``bag`` and write its report into the bag's folder.
 
     Args:
@@ -52,7 +52,6 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     from hsv.recording.report.page import write_report
     from hsv.simulation.metrics import flight_metrics
     from hsv.simulation.scenario import parse_scenario
-    from hsv.units import UnitSystem
 
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:
@@ -65,7 +64,7 @@ def conclude_flight(bag: Path, *, report: bool, units: Units, json: bool, wall_t
     if report:
         page = bag / "report.html"
         try:
-            write_report([recorded], page, units=UnitSystem.paper if units is Units.paper else UnitSystem.metric)
+            write_report([recorded], page, units=units)
             extra["report"] = str(page)
         except RecordingError as error:
             unwritten = error  # the flight itself is whole, and told first

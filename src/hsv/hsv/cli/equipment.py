@@ -8,12 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from hsv.cli.options import ListJsonOption, UnitsOption
-from hsv.cli.output import Units, console, print_json, print_rows, shown
+from hsv.cli.output import console, json_system, print_json, print_rows
+from hsv.units import UnitSystem, in_system
 
 
 def equipment(
     name: Annotated[str, typer.Argument(help="Set whose numbers to print; default: list all.")] = "",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
     """List the published sets of actuators and sensors that a scenario may name, or print the numbers of one.
@@ -22,7 +23,7 @@ def equipment(
     """
     from hsv.errors import ParameterError, did_you_mean
 
-    sets = _sets(units)
+    sets = _sets(json_system(units) if json else units)
     if name and name not in sets:
         raise ParameterError(f"name = {name!r}: expected one of {', '.join(sets)}{did_you_mean(name, sets)}")
     if json:
@@ -36,7 +37,7 @@ def equipment(
         print_rows([{"set": key, "table": entry["table"], "source": entry["source"]} for key, entry in sets.items()])
 
 
-def _sets(units: Units) -> dict[str, dict[str, Any]]:
+def _sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
     """Return the sets by name: the table of a scenario that may name them, their source and numbers."""
     from hsv.parameters import Parameter
     from hsv.sensors import SENSOR_SETS
@@ -47,8 +48,8 @@ def _sets(units: Units) -> dict[str, dict[str, Any]]:
 
     def number(channel: str, quantity: str, value: float, table: str) -> dict[str, Any]:
         # The paper has angles in degrees, but natural frequencies in rad/s.
-        system = Units.si if quantity == "natural_frequency" else units
-        value, unit = shown((value, declared[f"{table}.{quantity}"].unit), system)
+        system = UnitSystem.si if quantity == "natural_frequency" else units
+        value, unit = in_system(value, declared[f"{table}.{quantity}"].unit, system)
         return {"channel": channel, "quantity": quantity, "value": value, "unit": unit}
 
     sets = {}

@@ -7,12 +7,13 @@ from typing import Annotated, Any
 import typer
 
 from hsv.cli.options import ListJsonOption, UnitsOption
-from hsv.cli.output import Units, console, print_json, print_rows, shown
+from hsv.cli.output import console, json_system, print_json, print_rows
+from hsv.units import UnitSystem, in_system
 
 
 def faults(
     type: Annotated[str, typer.Argument(help="Type of fault whose parameters to print; default: list all.")] = "",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
     """List the types of faults, or print the parameters of one: units, ranges, defaults.
@@ -31,7 +32,7 @@ def faults(
         for name, kind in FAULT_KINDS.items()
     }
     if type:
-        parameters = _parameters(type, units)
+        parameters = _parameters(type, json_system(units) if json else units)
         if json:
             print_json({"type": type, **kinds[type], "parameters": parameters})
             return
@@ -60,7 +61,7 @@ def _listed(channels: list[str]) -> str:
     return "every state" if channels == list(STATE_NAMES) else ", ".join(channels)
 
 
-def _parameters(type: str, units: Units) -> list[dict[str, Any]]:
+def _parameters(type: str, units: UnitSystem) -> list[dict[str, Any]]:
     """Return a row a parameter, and one a channel where its unit is the channel's."""
     from hsv.faults.table import FAULT_KINDS, fault_parameters
 
@@ -71,8 +72,8 @@ def _parameters(type: str, units: Units) -> list[dict[str, Any]]:
         for channel in channels if own else channels[:1]:
             described = parameter.of(channel)
             # The paper has angles in degrees, but natural frequencies in rad/s.
-            system = units if own or parameter.unit != "rad/s" else Units.si
-            ends = [shown((end, described.unit), system) for end in (described.minimum, described.maximum)]
+            system = units if own or parameter.unit != "rad/s" else UnitSystem.si
+            ends = [in_system(end, described.unit, system) for end in (described.minimum, described.maximum)]
             (least, unit), (largest, _) = ends
             default = parameter.default
             rows.append(
@@ -81,7 +82,7 @@ def _parameters(type: str, units: Units) -> list[dict[str, Any]]:
                     "channel": channel if own else "",
                     "least": least,
                     "largest": largest,
-                    "default": None if default is None else shown((default, described.unit), system)[0],
+                    "default": None if default is None else in_system(default, described.unit, system)[0],
                     "unit": unit,
                     "meaning": parameter.description,
                 }

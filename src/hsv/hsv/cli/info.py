@@ -8,7 +8,8 @@ from typing import Any
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption, UnitsOption
-from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
+from hsv.cli.output import console, print_json, to_json
+from hsv.units import UnitSystem, in_system, significant
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
@@ -16,13 +17,14 @@ SHOWN_EXCURSIONS = 5
 
 def info(
     bag: BagArgument,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """What a bag holds: duration, topics, scenario, design, faults, metrics.
 
     Example: hsv info bags/case1_20260101T000000Z
     """
+    from hsv.cli.summary import print_metrics
     from hsv.errors import RecordingError
     from hsv.recording.bag_warnings import completeness
     from hsv.recording.flight import flight_data
@@ -45,16 +47,17 @@ def info(
     else:
         _print(description, units)
         if not problem:
-            print_table(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", quantities, units)
+            print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
     if problem:
         raise problem
     print_bag_warnings(opened)
 
 
-def _print(description: dict[str, Any], units: Units) -> None:
+def _print(description: dict[str, Any], units: UnitSystem) -> None:
     from rich.table import Table
 
-    from hsv.simulation.fingerprint import in_words
+    from hsv.cli.summary import print_section
+    from hsv.simulation.fingerprint import published_in_words
 
     heading = {
         "path": description["path"],
@@ -63,18 +66,18 @@ def _print(description: dict[str, Any], units: Units) -> None:
         "complete": f"no: {'; '.join(description['warnings'])}" if description["warnings"] else "yes",
         "ending": description["ending"] or "not recorded",
         **description["custom_data"],
-        "fingerprint": in_words(description["fingerprint"], description["as_published"]),
         "attached": ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
         or "nothing",
         "faults": _intervals(description["faults"], partial(_fault, units)),
         **_equipment(description["equipment"], units),
         "saturation": _saturation(description["saturation"]),
         "tube": _tube(description["tube"]),
+        "fingerprint": published_in_words(description["fingerprint"], description["as_published"])
+        + f"\n{description['fingerprint'] or ''}".rstrip(),
     }
-    for key, value in heading.items():
-        console.print(f"{key:12} {value}", soft_wrap=True)
-    for thing in description["not_covered"] or ():
-        console.print(f"{'not covered':12} {thing}", soft_wrap=True)
+    if description["not_covered"]:
+        heading["not covered"] = "; ".join(map(str, description["not_covered"]))
+    print_section("bag", heading)
     table = Table(box=None, pad_edge=False, header_style="bold")
     for column in ("topic", "type", "messages", "rate Hz"):
         table.add_column(column, justify="right" if column in ("messages", "rate Hz") else "left")
@@ -89,19 +92,19 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
     return "; ".join(f"{name(i)}{_span(i)}" for i in intervals) or "none"
 
 
-def _fault(units: Units, fault: dict[str, Any]) -> str:
+def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
     from hsv.recording.info import parameters_in_words
 
     parameters = parameters_in_words(fault, lambda value, unit: _quantity(value, unit, units))
     return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
 
 
-def _quantity(value: float, unit: str, units: Units) -> str:
-    value, unit = shown((value, unit), units)
-    return f"{value:g} {unit}" if unit not in ("", "1") else f"{value:g}"
+def _quantity(value: float, unit: str, units: UnitSystem) -> str:
+    value, unit = in_system(value, unit, units)
+    return f"{significant(value)} {unit}" if unit not in ("", "1") else significant(value)
 
 
-def _equipment(equipment: dict[str, Any] | None, units: Units) -> dict[str, str]:
+def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
     """Return lines on what is not ideal, none where all is."""
     from hsv.recording.equipment import AIR
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
@@ -147,7 +150,7 @@ def _tube(tube: dict[str, Any] | None) -> str:
     if not tube["checked_steps"]:
         return "no invariant set in this design"
     text = (
-        f"largest level {tube['largest_level']:.4g}, {tube['outside_steps']} of {tube['checked_steps']} steps outside"
+        f"largest level {tube['largest_level']:.3g}, {tube['outside_steps']} of {tube['checked_steps']} steps outside"
     )
     if tube["uncertified_steps"]:
         text += ", vehicle outside the set that it is certified for"

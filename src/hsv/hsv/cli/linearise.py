@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -14,7 +15,8 @@ from hsv.cli.options import (
     VehicleOption,
     VelocityOption,
 )
-from hsv.cli.output import Units, console, print_json
+from hsv.cli.output import console, json_system, print_json
+from hsv.units import UnitSystem, in_system, significant
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -23,8 +25,15 @@ if TYPE_CHECKING:
 
 READINGS = ("physical", "printed")
 
+_COLUMN = 12
+"""Characters of a column of a matrix, the gap included."""
+
 FILTER_UNITS = ("rad", "rad s")
-UNIT_SYSTEMS = {Units.si: "SI", Units.paper: "ft, ft/s, deg, slug^0.5 ft"}
+UNIT_SYSTEMS = {
+    UnitSystem.metric: "SI with degrees",
+    UnitSystem.si: "SI",
+    UnitSystem.paper: "ft, ft/s, deg, slug^0.5 ft",
+}
 
 
 def linearise(
@@ -38,7 +47,7 @@ def linearise(
     reading: Annotated[
         str, typer.Option(help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q').")
     ] = "physical",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Jacobians A, B and poles at a trim point (paper eq. 6 to eq. 9; of the ECM eq. 40 to eq. 43).
@@ -50,7 +59,6 @@ def linearise(
     from hsv.cli.flight_point import trim_at
     from hsv.control.notch_filter import continuous, default_sections, series
     from hsv.errors import QuantityError
-    from hsv.units import to_paper
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
     from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
     from hsv.vehicle.modes import modes
@@ -80,10 +88,11 @@ def linearise(
     else:
         A, B = jacobian(point.state, point.input, parameters)
     poles = modes(A)
-    if units is Units.paper:
-        state, inputs = (np.array([to_paper(1.0, unit)[0] for unit in row]) for row in (state_units, INPUT_UNITS))
-        A = A * state[:, None] / state
-        B = B * state[:, None] / inputs
+    if json:
+        units = json_system(units)
+    state, inputs = (np.array([in_system(1.0, unit, units)[0] for unit in row]) for row in (state_units, INPUT_UNITS))
+    A = A * state[:, None] / state
+    B = B * state[:, None] / inputs
     if json:
         print_json(
             {
@@ -96,23 +105,28 @@ def linearise(
             | ({"poles_of_the_other_reading": [_pole(mode) for mode in difference]} if difference else {})
         )
         return
-    from rich.console import Console
-    from rich.table import Table
-
-    # Nine columns need more room than some terminals have: a wrapped line is better than a cut number.
-    wide = Console(highlight=False, markup=False, width=max(console.width, 130))
     for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
-        title = f"{name} ({UNIT_SYSTEMS[units]})"
-        table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-        table.add_column("", no_wrap=True)
-        for column in columns:
-            table.add_column(column.replace("_", "\n"), justify="right", no_wrap=True)
-        for row, label in zip(matrix, names, strict=True):
-            table.add_row(label, *(f"{value:.4g}" for value in row))
-        wide.print(table)
+        _print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", matrix.tolist(), names, columns)
     console.print(_poles("Poles", poles))
     if difference:
         console.print(_poles("Poles of the other reading of eq. 40", difference))
+
+
+def _print_matrix(title: str, matrix: list[list[float]], rows: Sequence[str], columns: Sequence[str]) -> None:
+    """Print a matrix, with as many columns beside each other as fit on the terminal."""
+    from rich.table import Table
+
+    label = max(map(len, rows))
+    count = max(1, (console.width - label) // _COLUMN)
+    for first in range(0, len(columns), count):
+        shown = range(first, min(first + count, len(columns)))
+        table = Table(title="" if first else title, title_justify="left", box=None, pad_edge=False, header_style="bold")
+        table.add_column("", no_wrap=True, min_width=label)
+        for column in shown:
+            table.add_column(columns[column].replace("_", "\n"), justify="right", no_wrap=True, min_width=_COLUMN - 2)
+        for row, name in zip(matrix, rows, strict=True):
+            table.add_row(name, *(significant(row[column]) for column in shown))
+        console.print(table)
 
 
 def _pole(mode: Mode) -> dict[str, float]:

@@ -10,8 +10,9 @@ import typer
 from typer.core import TyperGroup
 
 from hsv.cli.options import JsonOption, ScenarioArgument, SchedulerOption, TrustOption, UnitsOption, WorkersOption
-from hsv.cli.output import Units, console, errors, print_json, resumable, to_json
+from hsv.cli.output import console, errors, print_json, resumable, to_json
 from hsv.cli.targets import check_target
+from hsv.units import UnitSystem
 
 
 class _FlyByDefault(TyperGroup):
@@ -61,7 +62,7 @@ def fly(
     scheduler: SchedulerOption = "",
     restart: Annotated[bool, typer.Option("--restart", help="Throw away what is there and begin anew.")] = False,
     page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Fly a campaign. Interrupted, the same command goes on where it was left.
@@ -110,7 +111,7 @@ def summary(
     result: ResultArgument,
     page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
     trust: TrustOption = False,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Show the results of a campaign again.
@@ -130,7 +131,7 @@ def replay(
     over_dds: Annotated[bool, typer.Option("--over-dds", help="Fly it with the graph of node processes.")] = False,
     bag: Annotated[Path | None, typer.Option(help="With --over-dds: bag to write; default: bags/<flight>.")] = None,
     trust: TrustOption = False,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Fly one flight of a campaign again, alone, and compare every outcome bit for bit.
@@ -175,7 +176,7 @@ def replay(
         )
     else:
         print_table(f"flight {flight} of {result.name}", quantities, units)
-        console.print("sample  " + sample_words(sample), soft_wrap=True)
+        console.print("sample  " + sample_words(sample, units), soft_wrap=True)
         if crashed := repeated.repeated["crashed"]:
             console.print(f"crashed {crashed}", soft_wrap=True, markup=False)
         else:

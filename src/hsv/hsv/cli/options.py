@@ -7,14 +7,16 @@ from typing import Annotated
 
 import typer
 
-from hsv.cli.output import Units
+from hsv.units import UnitSystem
 
 GraphNamespaceOption = Annotated[
     str, typer.Option("--namespace", help="ROS namespace of the graph, such as /veh1; default: none.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every key carries its unit.")]
 ListJsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every number has its unit beside it.")]
-UnitsOption = Annotated[Units, typer.Option(help="Units of what is printed: SI, or the paper's ft, ft/s, deg.")]
+UnitsOption = Annotated[
+    UnitSystem, typer.Option(help="Units: SI with degrees and percent, strict SI, or the paper's ft, ft/s, deg.")
+]
 AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '85000 ft'.")]
 VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
 CouplingOption = Annotated[

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hsv.json_text import json_text
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_system, significant
 
 # Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
 console = Console(highlight=False, markup=False, emoji=False)
@@ -38,13 +37,6 @@ def resumable(folder: Path) -> Iterator[None]:
         raise Interrupted(
             f"interrupted; what is finished is in {folder}, the same command goes on from there"
         ) from None
-
-
-class Units(StrEnum):
-    """Which units are printed."""
-
-    si = "si"
-    paper = "paper"
 
 
 UNIT_KEYS = {
@@ -77,18 +69,18 @@ Quantity = tuple[float, str]
 """A number and its SI unit."""
 
 
-def shown(quantity: Quantity, units: Units) -> Quantity:
-    """Return ``quantity`` in the units asked for."""
-    return to_paper(*quantity) if units is Units.paper else quantity
-
-
-def to_json(quantities: Mapping[str, Quantity], units: Units) -> dict[str, float]:
-    """Return the numbers with the unit appended to every key, e.g. ``altitude_ft``."""
+def to_json(quantities: Mapping[str, Quantity], units: UnitSystem) -> dict[str, float]:
+    """Return the numbers, SI but for the paper's units, with the unit appended to every key, e.g. ``altitude_ft``."""
     values = {}
     for name, quantity in quantities.items():
-        value, unit = shown(quantity, units)
+        value, unit = in_system(*quantity, json_system(units))
         values["_".join(filter(None, (name, UNIT_KEYS[unit])))] = value
     return values
+
+
+def json_system(units: UnitSystem) -> UnitSystem:
+    """Return the units of JSON: programs read strict SI, unless the paper's units are asked for."""
+    return UnitSystem.si if units is UnitSystem.metric else units
 
 
 def warn(text: str) -> None:
@@ -143,19 +135,13 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
         console.print(Text("  ".join(line).rstrip(), style="" if number else "bold"), soft_wrap=True)
 
 
-def print_table(title: str, quantities: Mapping[str, Quantity], units: Units, remarks: Mapping[str, str] = {}) -> None:
-    """Print name, value and unit of every quantity, with an optional remark; remarks on what has no value come last."""
+def print_table(title: str, quantities: Mapping[str, Quantity], units: UnitSystem, digits: int = 3) -> None:
+    """Print name, value and unit of every quantity."""
     table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    table.add_column("quantity")
-    table.add_column("value", justify="right")
+    table.add_column("quantity", overflow="fold")
+    table.add_column("value", justify="right", no_wrap=True)
     table.add_column("unit")
-    if remarks:
-        table.add_column("")
     for name, quantity in quantities.items():
-        value, unit = shown(quantity, units)
-        row = [name.replace("_", " "), f"{value:.5g}", "" if unit == "1" else unit]
-        table.add_row(*row, *([remarks.get(name, "")] if remarks else []))
-    for name in remarks:
-        if name not in quantities:
-            table.add_row(name.replace("_", " "), "-", "", remarks[name])
+        value, unit = in_system(*quantity, units)
+        table.add_row(name.replace("_", " "), significant(value, digits), "" if unit == "1" else unit)
     console.print(table)

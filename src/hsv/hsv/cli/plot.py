@@ -9,14 +9,15 @@ import typer
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, UnitsOption
-from hsv.cli.output import Units, print_written
+from hsv.cli.output import print_written
 from hsv.cli.targets import check_target, writing
+from hsv.units import UnitSystem
 
 
 def plot(
     bags: Annotated[list[Path], typer.Argument(help="Bags to lay over one another.")],
     out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Plot trajectory, attitude, elastic rates and inputs of recorded flights.
@@ -37,6 +38,6 @@ def plot(
     flights = {name: flight_data(bag) for name, bag in named.items()}
     remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := bag_warnings(bag))]
     with writing(out, "out"):
-        save_figure(flight_figure(flights, units is Units.paper, remarks), out)
+        save_figure(flight_figure(flights, units, remarks), out)
     print_written([out], json)
     print_bag_warnings(*opened)

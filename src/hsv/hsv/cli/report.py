@@ -9,8 +9,9 @@ import typer
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
-from hsv.cli.output import Units, print_written
+from hsv.cli.output import print_written
 from hsv.cli.targets import check_target
+from hsv.units import UnitSystem
 
 
 def report(
@@ -18,7 +19,7 @@ def report(
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Write a page about recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
@@ -30,7 +31,6 @@ def report(
     from hsv.errors import QuantityError
     from hsv.recording.reader import Bag
     from hsv.recording.report.page import write_report
-    from hsv.units import UnitSystem
 
     if out.suffix not in (".html", ".htm"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
@@ -41,6 +41,6 @@ def report(
 
         for bag in opened:
             supply(bag, design, scenario)
-    write_report(opened, out, units=UnitSystem.paper if units is Units.paper else UnitSystem.metric)
+    write_report(opened, out, units=units)
     print_written([out], json)
     print_bag_warnings(*opened)

@@ -20,7 +20,8 @@ from hsv.cli.options import (
     StepTimeoutOption,
     UnitsOption,
 )
-from hsv.cli.output import Units, report_line
+from hsv.cli.output import report_line
+from hsv.units import UnitSystem
 
 
 def run(
@@ -35,7 +36,7 @@ def run(
     step_timeout: StepTimeoutOption = None,
     report: ReportOption = True,
     verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Fly a scenario with the graph of ROS 2 nodes as separate processes, recorded to an MCAP bag.

@@ -8,13 +8,13 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
-from hsv.cli.output import Units
 from hsv.cli.targets import check_target, writing
+from hsv.units import UnitSystem
 
 
 def simulate(
     scenario: ScenarioArgument = "case1",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     out: Annotated[Path | None, typer.Option(help="Also save the time histories to this .npz file (SI).")] = None,
     json: JsonOption = False,
 ) -> None:

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import nan
+from textwrap import fill
 from typing import Any
 
-from hsv.cli.output import Units, console, print_json, print_table, shown, to_json
+from rich.table import Table
+from rich.text import Text
+
+from hsv.cli.output import console, print_json, to_json
 from hsv.errors import RunError
-from hsv.simulation.fingerprint import as_published, in_words
-from hsv.simulation.limits import Verdict, verdicts
-from hsv.simulation.metrics import METRICS
+from hsv.simulation.fingerprint import as_published, published_in_words
+from hsv.simulation.limits import Verdict, in_units, not_judged, verdict_sentence, verdicts
+from hsv.simulation.metrics import METRICS, Group
 from hsv.simulation.scenario import Scenario
+from hsv.units import UnitSystem, in_system, significant
 
 
 def report_flight(
     scenario: Scenario,
-    metrics: dict[str, float],
+    metrics: Mapping[str, float],
     *,
     fingerprint: str | None,
     design_hash: str,
     ending: str,
     wall_time: float | None,
     simulated_time: float,
-    units: Units,
+    units: UnitSystem,
     json: bool,
     not_covered: Sequence[str] | None,
     extra: dict[str, Any] | None = None,
@@ -37,7 +43,7 @@ def report_flight(
         ending: ``finished``, ``diverged`` or ``broken off``.
         wall_time: Wall time (s) that the flight took, where it is known.
         simulated_time: Simulated time (s) of the last step.
-        units: Units of what is printed.
+        units: UnitSystem of what is printed.
         json: Whether to print JSON.
         not_covered: What of the flight the certificate of its design does not cover; ``None``: not known.
         extra: More to print, by name.
@@ -56,6 +62,7 @@ def report_flight(
                 "scenario": scenario.name,
                 "diverged_at_s": simulated_time if ending == "diverged" else None,
                 "within_limits": finished and all(verdict.within for verdict in judged.values()),
+                "not_judged": not_judged(judged, metrics),
                 "metrics": to_json(quantities, units),
                 "fingerprint": fingerprint,
                 "as_published": same,
@@ -66,25 +73,80 @@ def report_flight(
             }
         )
     else:
-        print_table(scenario.title, quantities, units, limit_verdicts(judged, units))
-        console.print(f"fingerprint {in_words(fingerprint, same)}", soft_wrap=True)
-        pace = f" in {wall_time:.3g} s: {factor:.3g} x real time" if wall_time and factor else ""
-        console.print(f"flown {simulated_time:.6g} s{pace}")
-        for thing in not_covered or ():
-            console.print(f"not covered by the certificate: {thing}", soft_wrap=True)
-        for name, value in (extra or {}).items():
-            console.print(f"{name:5} {value}", soft_wrap=True)
+        pace = f" in {significant(wall_time)} s, {significant(factor)} x real time" if wall_time and factor else ""
+        run = {
+            "flown": f"{simulated_time:.6g} s{pace}",
+            **({"not covered": "; ".join(not_covered)} if not_covered else {}),
+            **(extra or {}),
+            # Alone on a line it is as wide as a terminal.
+            "fingerprint": f"{published_in_words(fingerprint, same)}\n{fingerprint or ''}".rstrip(),
+        }
+        print_metrics(scenario.title, metrics, units, judged)
+        print_section("run", run)
+        console.print(_verdict(judged, metrics, units, finished))
     if ending == "diverged":
         raise RunError(f"flight diverged at t = {simulated_time:.2f} s: the state left the range of the model")
     if not finished:
         raise RunError(f"flight broken off at t = {simulated_time:.2f} s of {scenario.duration:.2f} s")
 
 
-def limit_verdicts(judged: dict[str, Verdict], units: Units) -> dict[str, str]:
-    """Return, for each metric with a limit, whether its magnitude stays within it, in words."""
-    words = {}
-    for name, verdict in judged.items():
-        value, unit = shown((verdict.limit, METRICS[name].unit), units)
-        text = f"{value:.4g}{'' if unit == '1' else ' ' + unit}"
-        words[name] = f"{verdict.words} {text if verdict.words in ('within', 'over') else f'(limit {text})'}"
-    return words
+def print_metrics(
+    title: str, metrics: Mapping[str, float], units: UnitSystem, judged: Mapping[str, Verdict] | None = None
+) -> None:
+    """Print metrics (SI) in groups, each in words, with its unit and, where ``judged`` is given, with the verdict."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False, show_header=False)
+    table.add_column("metric", overflow="fold")
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("verdict", overflow="fold")
+    known = [*metrics, *(name for name in judged or () if name not in metrics)]
+    for group in Group:
+        names = [name for name in METRICS if name in known and METRICS[name].group is group]
+        if names:
+            table.add_row(Text(group, "bold"))
+        for name in names:
+            metric, verdict = METRICS[name], (judged or {}).get(name)
+            number, unit = in_system(metrics.get(name, nan), metric.unit, units, share=metric.share)
+            value = significant(number) if name in metrics else "-"
+            remark = Text() if judged is None else _remark(name, verdict, units)
+            table.add_row("  " + metric.words, value, "" if unit == "1" else unit, remark)
+    console.print(table)
+
+
+def print_section(title: str, lines: Mapping[str, object]) -> None:
+    """Print what has a name and is no number under a title, a line each, folded between words on a terminal.
+
+    What follows a line break in a text stands on a line of its own.
+    """
+    console.print(Text(title, "bold"))
+    width = max(map(len, lines)) + 4
+    for name, text in lines.items():
+        first, *others = f"  {name:{width - 2}}{text}".split("\n")
+        if console.is_terminal:
+            # Words are whole, those that are wider than the terminal as well: paths are copied.
+            first = fill(
+                first,
+                console.width,
+                subsequent_indent=" " * width,
+                break_long_words=False,
+                break_on_hyphens=False,
+                drop_whitespace=True,
+            )
+        for line in (first, *(f"  {other}" for other in others)):
+            console.print(line, soft_wrap=True)
+
+
+def _remark(name: str, verdict: Verdict | None, units: UnitSystem) -> Text:
+    if verdict is None:
+        return Text("not judged", "dim")
+    if verdict.words == "not flown to the end":
+        return Text(verdict.words, "red")
+    limit = in_units(name, verdict.limit, units)
+    text = f"{verdict.words} (limit {limit})" if verdict.value is None else f"{verdict.words} {limit}"
+    return Text(text, "green" if verdict.within else "red")
+
+
+def _verdict(judged: Mapping[str, Verdict], metrics: Mapping[str, float], units: UnitSystem, finished: bool) -> Text:
+    kept = finished and all(verdict.within for verdict in judged.values())
+    style = "bold red" if not kept else "bold green" if judged else "bold"
+    return Text.assemble(("verdict ", "bold"), (verdict_sentence(judged, metrics, units), style))

@@ -15,7 +15,8 @@ from hsv.cli.options import (
     VehicleOption,
     VelocityOption,
 )
-from hsv.cli.output import Units, print_json, print_table, to_json
+from hsv.cli.output import print_json, print_table, to_json
+from hsv.units import UnitSystem
 
 
 def trim(
@@ -25,7 +26,7 @@ def trim(
     acceleration: Annotated[str, typer.Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
-    units: UnitsOption = Units.si,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating as on a ramp.
@@ -50,4 +51,4 @@ def trim(
     if json:
         print_json(to_json(quantities, units) | {"largest_residual_si": result.residual})
     else:
-        print_table("Trim", quantities, units)
+        print_table("Trim", quantities, units, digits=5)

@@ -11,7 +11,7 @@ import matplotlib
 from matplotlib.figure import Figure
 
 from hsv.simulation.metrics import FlightData
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_system
 
 _PANELS = (
     ("altitude", "m", "state", 0),
@@ -28,19 +28,19 @@ _REMARK_WIDTH = 130
 """Characters in a line of a remark."""
 
 
-def flight_figure(flights: Mapping[str, FlightData], paper_units: bool, remarks: Sequence[str] = ()) -> Figure:
+def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
     """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
 
     Args:
         flights: The flights by label.
-        paper_units: Whether to draw in the paper's units.
+        system: Units that are drawn.
         remarks: What has to be said of the flights, such as that steps are missing; stands above the panels.
     """
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(10, 9), layout="constrained")
         axes = figure.subplots(4, 2, sharex=True).ravel()
         for axis, (title, unit, group, column) in zip(axes, _PANELS, strict=True):
-            factor, shown = to_paper(1.0, unit) if paper_units else (1.0, unit)
+            factor, shown = in_system(1.0, unit, system)
             for name, flight in flights.items():
                 axis.plot(flight.time, factor * getattr(flight, group)[:, column], linewidth=1.1, label=name)
             first = next(iter(flights.values()))

@@ -60,12 +60,11 @@ def as_published(found: str | None, scenario: Scenario | None, design_hash: str)
     return bool(found == entry["fingerprint"])
 
 
-def in_words(found: str | None, same: bool | None) -> str:
-    """Return a fingerprint and what :func:`as_published` said about it, for people."""
+def published_in_words(found: str | None, same: bool | None) -> str:
+    """Return what :func:`as_published` said about a fingerprint, for people."""
     if found is None:
         return "none: steps are missing"
-    verdict = {True: ", as published", False: ", not the published flight of this scenario", None: ""}[same]
-    return f"{found}{verdict}"
+    return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]
 
 
 @cache

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from hsv.simulation.metrics import CRITERIA, METRICS
 from hsv.simulation.scenario import Scenario
+from hsv.units import UnitSystem, in_system, significant
 
 
 @dataclass(frozen=True)
@@ -35,3 +37,48 @@ class Verdict:
 def verdicts(scenario: Scenario, metrics: Mapping[str, float], *, ended: bool) -> dict[str, Verdict]:
     """Return the verdict for each metric that ``scenario`` limits, on a flight that came to its end or did not."""
     return {name: Verdict(limit, metrics.get(name), ended) for name, limit in scenario.limits.items()}
+
+
+def in_units(name: str, value: float, system: UnitSystem) -> str:
+    """Return the value (SI) of a metric with its unit in ``system``, three digits."""
+    metric = METRICS[name]
+    number, unit = in_system(value, metric.unit, system, share=metric.share)
+    return significant(number) + ("" if unit == "1" else f" {unit}")
+
+
+def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> list[str]:
+    """Return the names of the metrics of a flight that have no limit, those that the paper judges by first."""
+    free = [name for name in metrics if name not in judged]
+    return sorted(free, key=lambda name: name not in CRITERIA)
+
+
+def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
+    """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged.
+
+    Args:
+        judged: What :func:`verdicts` returns.
+        metrics: Of the flight, by name, SI.
+        system: Units of the numbers in it.
+    """
+    over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
+    if not judged:
+        text = "not judged: the scenario has no limits"
+    elif all(verdict.within for verdict in judged.values()):
+        text = f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
+    else:
+        said = ", ".join(f"{METRICS[name].words} {_broken(name, verdict, system)}" for name, verdict in over)
+        head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
+        text = "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
+    free = not_judged(judged, metrics)
+    named = [name for name in free if name in CRITERIA]
+    words = [f"{METRICS[name].words} ({in_units(name, metrics[name], system)})" for name in named]
+    if others := len(free) - len(named):
+        plural = "s" if others > 1 else ""
+        words.append(f"{others} other{plural}" if words else f"{others} metric{plural} without a limit")
+    return f"{text}; not judged: {', '.join(words)}" if words and judged else text
+
+
+def _broken(name: str, verdict: Verdict, system: UnitSystem) -> str:
+    if verdict.value is None:
+        return verdict.words
+    return f"{in_units(name, verdict.value, system)} (limit {in_units(name, verdict.limit, system)})"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
@@ -16,44 +17,109 @@ PRE_FAULT_WINDOW = 5.0
 """Seconds before the fault over which the pre-fault mean is taken."""
 
 
+class Group(StrEnum):
+    """What a metric tells about, in the order in which people read it."""
+
+    tracking = "tracking"
+    after_the_fault = "after the fault"
+    modes = "modes"
+    inputs = "inputs"
+
+
 @dataclass(frozen=True)
 class Metric:
-    """Unit (SI) and meaning of a metric."""
+    """What a metric is: its name in words, its unit (SI), its meaning, and what it tells about."""
 
+    words: str
     unit: str
     meaning: str
+    group: Group
+    share: bool = False
+    """Whether it is a share of something, which people read in percent"""
 
 
 METRICS = {
-    "altitude_rise_time": Metric("s", "10 % to 90 % of the altitude step"),
-    "altitude_settling_time": Metric("s", "last time before the fault that altitude is more than 2 % of the step off"),
-    "altitude_overshoot": Metric("1", "largest excess over the altitude step before the fault, share of the step"),
-    "altitude_integral_absolute_error": Metric("m s", "integral of |h - h_r|"),
-    "altitude_error_maximum": Metric("m", "largest |h - h_r|"),
-    "altitude_end_error": Metric("m", "h - h_r at the end"),
-    "velocity_rise_time": Metric("s", "10 % to 90 % of the velocity step"),
-    "velocity_settling_time": Metric("s", "last time before the fault that velocity is more than 2 % of the step off"),
-    "velocity_overshoot": Metric("1", "largest excess over the velocity step before the fault, share of the step"),
-    "velocity_integral_absolute_error": Metric("m", "integral of |V - V_r|"),
-    "velocity_error_maximum": Metric("m/s", "largest |V - V_r|"),
-    "velocity_end_error": Metric("m/s", "V - V_r at the end"),
+    "altitude_rise_time": Metric("altitude rise time", "s", "10 % to 90 % of the altitude step", Group.tracking),
+    "altitude_settling_time": Metric(
+        "altitude settling time",
+        "s",
+        "last time before the fault that altitude is more than 2 % of the step off",
+        Group.tracking,
+    ),
+    "altitude_overshoot": Metric(
+        "altitude overshoot",
+        "1",
+        "largest excess over the altitude step before the fault, share of the step",
+        Group.tracking,
+        share=True,
+    ),
+    "altitude_integral_absolute_error": Metric(
+        "altitude error, integral", "m s", "integral of |h - h_r|", Group.tracking
+    ),
+    "altitude_error_maximum": Metric("altitude error, largest", "m", "largest |h - h_r|", Group.tracking),
+    "altitude_end_error": Metric("altitude error at the end", "m", "h - h_r at the end", Group.tracking),
+    "velocity_rise_time": Metric("velocity rise time", "s", "10 % to 90 % of the velocity step", Group.tracking),
+    "velocity_settling_time": Metric(
+        "velocity settling time",
+        "s",
+        "last time before the fault that velocity is more than 2 % of the step off",
+        Group.tracking,
+    ),
+    "velocity_overshoot": Metric(
+        "velocity overshoot",
+        "1",
+        "largest excess over the velocity step before the fault, share of the step",
+        Group.tracking,
+        share=True,
+    ),
+    "velocity_integral_absolute_error": Metric(
+        "velocity error, integral", "m", "integral of |V - V_r|", Group.tracking
+    ),
+    "velocity_error_maximum": Metric("velocity error, largest", "m/s", "largest |V - V_r|", Group.tracking),
+    "velocity_end_error": Metric("velocity error at the end", "m/s", "V - V_r at the end", Group.tracking),
     "post_fault_attitude_deviation": Metric(
-        "rad", "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before"
+        "attitude change after the fault",
+        "rad",
+        "largest change of angle of attack or pitch angle after the fault from its mean over the 5 s before",
+        Group.after_the_fault,
     ),
     "post_fault_attitude_from_nominal": Metric(
-        "rad", "largest difference of angle of attack or pitch angle after the fault from reference + nominal"
+        "attitude from nominal after the fault",
+        "rad",
+        "largest difference of angle of attack or pitch angle after the fault from reference + nominal",
+        Group.after_the_fault,
     ),
-    "attitude_from_nominal": Metric("rad", "the same over the whole flight"),
-    "elastic_rate_1_decay_time": Metric("s", "time after the fault from which |rate| stays within 5 % of its peak"),
-    "elastic_rate_2_decay_time": Metric("s", "the same for the second mode"),
-    "elastic_decay_time": Metric("s", "the slower of the two"),
-    "fuel_equivalence_ratio_minimum": Metric("1", "least command"),
-    "fuel_equivalence_ratio_maximum": Metric("1", "largest command"),
-    "elevator_deflection_minimum": Metric("rad", "least command"),
-    "elevator_deflection_maximum": Metric("rad", "largest command"),
-    "saturated_steps": Metric("1", "steps in which a command was limited"),
+    "attitude_from_nominal": Metric(
+        "attitude from nominal",
+        "rad",
+        "largest difference of angle of attack or pitch angle from reference + nominal, over the whole flight",
+        Group.tracking,
+    ),
+    "elastic_rate_1_decay_time": Metric(
+        "first mode's decay time",
+        "s",
+        "time after the fault from which |rate| stays within 5 % of its peak",
+        Group.modes,
+    ),
+    "elastic_rate_2_decay_time": Metric("second mode's decay time", "s", "the same for the second mode", Group.modes),
+    "elastic_decay_time": Metric("elastic decay time", "s", "the slower of the two", Group.modes),
+    "fuel_equivalence_ratio_minimum": Metric("fuel equivalence ratio, least", "1", "least command", Group.inputs),
+    "fuel_equivalence_ratio_maximum": Metric("fuel equivalence ratio, largest", "1", "largest command", Group.inputs),
+    "elevator_deflection_minimum": Metric("elevator deflection, least", "rad", "least command", Group.inputs),
+    "elevator_deflection_maximum": Metric("elevator deflection, largest", "rad", "largest command", Group.inputs),
+    "saturated_steps": Metric("saturated steps", "1", "steps in which a command was limited", Group.inputs),
 }
-"""Every metric, in the order in which they are printed."""
+"""Every metric, in the order in which files have them."""
+
+CRITERIA = (
+    "altitude_end_error",
+    "velocity_end_error",
+    "post_fault_attitude_deviation",
+    "post_fault_attitude_from_nominal",
+    "elastic_decay_time",
+    "saturated_steps",
+)
+"""The metrics that the paper judges a flight by: where a scenario has no limit for one of them, it is named."""
 
 
 @dataclass(frozen=True)
