@@ -50,6 +50,11 @@ _hsv_env() {
     . "$root/ros_ws/install/local_setup.$shell"
     [ -z "$nounset" ] || set -u
 
+    # Words are completed where somebody types them; zsh needs its own completion started for that.
+    case $- in
+        *i*) [ ! -f "$root/.venv/hsv-setup/completion.$shell" ] || _hsv_completion_of "$root/.venv/hsv-setup" ;;
+    esac
+
     export HSV_ROOT="$root"
     export HSV_DESIGN_PATH="${HSV_DESIGN_PATH:-$root/offline_design}"
     export ROS_AUTOMATIC_DISCOVERY_RANGE="${ROS_AUTOMATIC_DISCOVERY_RANGE:-LOCALHOST}"
@@ -59,6 +64,14 @@ _hsv_env() {
         # ROS nodes do not start without a place for their log files.
         export ROS_LOG_DIR="$root/ros_ws/log/nodes"
     fi
+}
+
+# Reads what the command line library completes the words of the hsv command by.
+_hsv_completion_of() {
+    if [ -n "${ZSH_VERSION:-}" ]; then
+        whence compdef >/dev/null || { autoload -Uz compinit && compinit; }
+    fi
+    . "$1/completion.$shell"
 }
 
 # Appends a directory to a search path that does not hold it yet.
@@ -77,6 +90,6 @@ else
     _hsv_env
 fi
 _hsv_status=$?
-unset -f _hsv_env _hsv_append
+unset -f _hsv_env _hsv_append _hsv_completion_of
 # The status is handed on without leaving a variable behind.
 eval "unset _hsv_status; (exit $_hsv_status)"

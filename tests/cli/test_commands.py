@@ -1,12 +1,15 @@
 import json
 import math
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hsv.cli.main import app
+import hsv as library
+from hsv.cli.main import EXIT_CODES, app
 from hsv.cli.output import UNIT_KEYS
 from hsv.control.design_file import find_design
 from hsv.simulation.metrics import METRICS
@@ -27,6 +30,35 @@ def test_help_of_every_command_has_an_example(hsv, command):
 @pytest.mark.parametrize("command", sorted({*COMMANDS} - PRINT_NO_NUMBERS))
 def test_every_command_that_prints_numbers_prints_json_if_asked(hsv, command):
     assert "--json" in hsv(command, "--help").out
+
+
+@pytest.mark.parametrize("words", [(), ("trim",), ("montecarlo",), ("montecarlo", "fly"), ("fault", "inject")])
+def test_help_in_short(hsv, words):
+    short, long = hsv(*words, "-h"), hsv(*words, "--help")
+    assert short.code == 0 and short.out == long.out
+
+
+def test_the_version_is_that_of_the_library(hsv):
+    assert hsv("--version").out == f"hsv {library.__version__}\n"
+
+
+def test_help_and_documentation_have_the_same_exit_codes(hsv):
+    page = (Path(__file__).parents[2] / "docs" / "exit_codes.md").read_text(encoding="utf-8")
+    table = page.split("\n\n")[1].splitlines()[2:]
+    assert table == [f"| {code} | {meaning} |" for code, meaning in EXIT_CODES.items()]
+    said = " ".join(hsv("--help").out.split())
+    assert all(f"{code} {meaning}" in said for code, meaning in EXIT_CODES.items())
+
+
+@pytest.mark.parametrize(
+    ("typed", "due"), [("hsv re", {"report", "replay", "recover", "resilience"}), ("hsv trim --un", {"--units"})]
+)
+def test_a_shell_is_told_the_words_that_may_come(tmp_path, typed, due):
+    asked = {"_HSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
+    ran = subprocess.run(
+        [sys.executable, "-m", "hsv.cli.main"], capture_output=True, text=True, cwd=tmp_path, env=os.environ | asked
+    )
+    assert ran.returncode == 0 and set(ran.stdout.split()) == due
 
 
 def test_the_list_of_commands_is_the_answer_to_no_command(hsv):

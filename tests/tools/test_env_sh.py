@@ -75,3 +75,17 @@ def test_the_wrong_shell_is_told():
     if Path("/bin/sh").resolve().name != "bash":
         assert result.returncode != 0
         assert "bash or zsh" in result.stderr
+
+
+@pytest.mark.parametrize("name", SHELLS)
+def test_an_interactive_shell_completes_the_words_of_the_command(name):
+    asked = "complete -p hsv" if name == "bash" else "echo $_comps[hsv]"
+    flags = ["--norc"] if name == "bash" else ["-f"]
+    result = subprocess.run(
+        [name, *flags, "-i", "-c", f"source '{ROOT}/env.sh'; {asked}"],
+        env={"PATH": "/usr/local/bin:/usr/bin:/bin"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+    )
+    assert "_hsv_completion" in result.stdout

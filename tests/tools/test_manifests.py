@@ -10,6 +10,8 @@ import pytest
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 
+import hsv
+
 ROOT = Path(__file__).parents[2]
 MANIFESTS = sorted([*ROOT.glob("src/*/package.xml"), *ROOT.glob("ros_ws/src/*/package.xml")])
 KEYS = {name: f"python3-{name}" for name in ("jinja2", "matplotlib", "numba", "numpy", "pydantic", "rich", "scipy")}
@@ -60,3 +62,17 @@ def test_a_package_has_a_changelog_of_its_name(manifest: Path) -> None:
 def test_modules_without_a_key_are_named_in_the_documentation() -> None:
     page = (ROOT / "docs" / "installation.md").read_text(encoding="utf-8")
     assert all(f"`{module.replace('_', '-')}`" in page for module in WITHOUT_KEY)
+
+
+def test_all_packages_have_one_version_which_the_library_and_the_command_say() -> None:
+    versions = {parse_package(str(manifest)).version for manifest in MANIFESTS}
+    written = {
+        keyword.value.value
+        for manifest in MANIFESTS
+        for setup in manifest.parent.glob("setup.py")
+        for call in ast.walk(ast.parse(setup.read_text(encoding="utf-8")))
+        if isinstance(call, ast.Call)
+        for keyword in call.keywords
+        if keyword.arg == "version" and isinstance(keyword.value, ast.Constant)
+    }
+    assert written == versions == {hsv.__version__}

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
-from hsv_setup import bytecode, checks, compiled, environment, interpreter, routes, workspace
+from hsv_setup import bytecode, checks, compiled, completion, environment, interpreter, routes, workspace
 from hsv_setup.console import SetupError, Stage
 from hsv_setup.paths import ROOT
 
@@ -62,6 +62,7 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
             stage.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
         if not (bytecode.sources_are_current() and compiled.is_current()):
             stage = Stage("[3/3] Compiled caches", "compile")
+            completion.write(environment.PYTHON, env, stage)
             bytecode.compile_sources(environment.PYTHON, env, stage)
             if not compiled.is_current():
                 compiled.warm(env, stage)

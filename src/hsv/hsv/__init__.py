@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from hsv.api import plot as plot
     from hsv.api import sweep as sweep
 
+    __version__: str
+
 # All matrices are small: threads in the linear algebra only wait for each other, and their number changes last bits.
 # Read once, when numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -23,6 +25,10 @@ __all__ = ["Flight", "Scenario", "compare", "fly", "load", "plot", "sweep"]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version(__name__)
     # Only where they are asked for: a node imports this package, and not the whole of the simulation.
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

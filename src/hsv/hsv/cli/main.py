@@ -6,10 +6,12 @@ import os
 import signal
 import sys
 from contextlib import suppress
-from typing import Any
+from typing import Annotated, Any
 
 import typer
+from typer.completion import completion_init
 
+import hsv
 from hsv.cli.bench import bench
 from hsv.cli.certify import certify
 from hsv.cli.check import check
@@ -27,7 +29,7 @@ from hsv.cli.include import include
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
 from hsv.cli.montecarlo import montecarlo
-from hsv.cli.output import Interrupted, report_error
+from hsv.cli.output import Interrupted, console, report_error
 from hsv.cli.play import play
 from hsv.cli.plot import plot
 from hsv.cli.prepare import prepare
@@ -49,16 +51,42 @@ from hsv.errors import HsvError, RunError, reason
 
 _INTERRUPTED = 130
 
+EXIT_CODES = {
+    0: "done",
+    1: "it failed, or found what it looks for: a flight lost, a claim or comparison that does not hold",
+    2: "refused: bad input, or a file that cannot be read or written",
+    _INTERRUPTED: "interrupted",
+}
+"""What each exit code of the command means."""
+
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Of an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
 app = typer.Typer(
     name="hsv",
-    help="Software-in-the-loop flight of a flexible air-breathing hypersonic vehicle under Tube-MPC.",
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
 )
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        console.print(f"hsv {hsv.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version, and end.")
+    ] = False,
+) -> None:
+    """Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."""
+
+
 for command in (
     trim,
     linearise,
@@ -102,6 +130,8 @@ def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
     # Asked to end, a command ends its processes and removes its temporary files as after Ctrl-C.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    if "_HSV_COMPLETE" in os.environ:
+        completion_init()  # a shell asks for the words that may come next
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         code = app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False)

@@ -19,7 +19,7 @@ class _FlyByDefault(TyperGroup):
     """Takes a first word that is no command of the group for the scenario to fly."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        if args and args[0] not in (*self.commands, "--help"):
+        if args and args[0] not in (*self.commands, *ctx.help_option_names):
             args = ["fly", *args]
         return super().parse_args(ctx, args)
 
