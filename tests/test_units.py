@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hsv.cli.output import UNIT_KEYS
 from hsv.errors import QuantityError
 from hsv.simulation.metrics import METRICS
-from hsv.units import PAPER_UNITS, factor, parse_quantity, rounded, to_paper
+from hsv.units import PAPER_UNITS, factor, parse_quantity, percent, rounded, to_paper
 from hsv.vehicle.dynamics import INPUT_UNITS, STATE_UNITS
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -111,3 +111,13 @@ def test_every_unit_that_is_printed_has_a_spelling_in_json_keys():
     shown = {*STATE_UNITS, *INPUT_UNITS, *(metric.unit for metric in METRICS.values()), *PAPER_UNITS}
     assert shown | {PAPER_UNITS.get(unit, unit) for unit in shown} <= set(UNIT_KEYS)
     assert len(set(UNIT_KEYS.values())) == len(UNIT_KEYS)
+
+
+@given(st.floats(-0.9, 10.0))
+def test_a_share_in_percent_loses_no_digit(share):
+    assert parse_quantity(percent(share), "1", "x") == share
+
+
+@pytest.mark.parametrize(("share", "text"), [(0.05, "5 %"), (-0.1, "-10 %"), (1e-9, "0.0000001 %"), (0.0, "0 %")])
+def test_percent_as_people_write_it(share, text):
+    assert percent(share) == text

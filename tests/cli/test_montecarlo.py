@@ -39,6 +39,8 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
     [
         (("--samples", "0"), "samples = 0"),
         (("--factor", "fault[0].start=1 m..2 s"), "uniform = '1 m': wrong unit"),
+        (("--corners", "--samples", "4"), "samples = 4: expected no --samples with --corners"),
+        (("--corners", "--sampling", "sobol"), "sampling = sobol: expected no --sampling with --corners"),
         (("--factor", "fault[0].start"), "factor = 'fault[0].start': expected FIELD=LEAST..LARGEST"),
         (("--factor", "initial.altitude=10 km..11 km"), "initial.altitude"),
         (("--scale", "0"), "varies"),

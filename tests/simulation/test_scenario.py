@@ -124,6 +124,9 @@ def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
         ('mass = "-95 %"', "vehicle.perturbation.mass = '-95 %': expected -90 % to +1000 %"),
         ("mass = nan", "vehicle.perturbation.mass = nan: expected a finite quantity"),
         ("mass = true", "vehicle.perturbation.mass = True: expected a finite quantity"),
+        ("mass = 5", "vehicle.perturbation.mass = 5: the unit is missing, expected one such as '+5 %'"),
+        ('mass = "0.05"', "vehicle.perturbation.mass = '0.05': the unit is missing"),
+        ("mass = { uniform = [-0.1, 0.1] }", "vehicle.perturbation.mass = -0.1: the unit is missing"),
     ],
 )
 def test_a_wrong_perturbation_is_named(line, message):
@@ -205,6 +208,7 @@ end = "1.1 s"
             r"robust_mpc\.gain_index = 40: expected -\d+ to \d+",
         ),
         ("[limits]", STEEP, r"command: reference at 1 s: altitude = .* no equilibrium"),
+        ('"200 s"', '"200.01 s"', r"duration = 200\.01 s: expected a whole number of periods, 0\.02 s each"),
         ('"200 s"', '"0.009 s"', r"duration = 0\.009 s: expected at least a period, 0\.02 s"),
         ('title = "', 'design = "absent"\ntitle = "', r"design = 'absent': no such file"),
     ],
@@ -274,4 +278,6 @@ def test_tau_and_its_changes_become_parameters():
     assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
     assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))
     robust = 'controller = "robust_mpc"\n' + CASE1
+    assert "integral: robust_mpc does not read it" in refusal(robust + '[integral]\nrate = "0.1 / s"\n')
+    assert "robust_mpc: tube_mpc does not read it" in refusal(CASE1 + "[robust_mpc]\ngain_index = 1\n")
     assert "tube.tau: robust_mpc has no adjustable factor" in refusal(robust + "[tube]\ntau = 0.8\n")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
+from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache
@@ -145,6 +146,17 @@ def si_unit_of(text: object) -> str:
 def written(value: float, unit: str) -> float | str:
     """Return a number in ``unit`` as a file has it: a text, where it has a unit. No digit is lost."""
     return value if unit == "1" else f"{value!r} {unit}"
+
+
+def percent(share: float) -> str:
+    """Return a share as a file has it, in percent. No digit is lost."""
+    return f"{Decimal(repr(share)).scaleb(2).normalize():f} %"
+
+
+def has_unit(text: object) -> bool:
+    """Tell whether a quantity is written with a unit."""
+    found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+    return bool(found and found["unit"])
 
 
 def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:

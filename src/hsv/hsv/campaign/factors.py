@@ -10,7 +10,7 @@ from typing import Any
 from hsv.errors import CampaignError
 from hsv.simulation.distribution import KINDS, Distribution
 from hsv.simulation.scenario import scenario_at_means, set_field
-from hsv.units import rounded, written
+from hsv.units import percent, rounded, written
 from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
 _PERTURBATION = "vehicle.perturbation."
@@ -98,7 +98,8 @@ def flown_table(
     flown = copy.deepcopy(dict(table)) | {"seed": seed}
     starts = {}
     for factor, value in zip(factors, sample, strict=True):
-        set_field(flown, factor.field, written(float(value), factor.unit), name)
+        change = factor.field.startswith(_PERTURBATION)
+        set_field(flown, factor.field, percent(float(value)) if change else written(float(value), factor.unit), name)
         if factor.field.startswith("initial."):
             starts[factor.field.removeprefix("initial.")] = float(value)
     if starts:

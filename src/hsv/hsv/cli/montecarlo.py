@@ -24,6 +24,10 @@ class _FlyByDefault(TyperGroup):
         return super().parse_args(ctx, args)
 
 
+_SAMPLES = 1000
+"""Flights of a campaign that says no number."""
+
+
 class Sampling(StrEnum):
     """How samples are drawn."""
 
@@ -48,9 +52,9 @@ ResultArgument = Annotated[Path, typer.Argument(help="Result file of a campaign 
 @montecarlo.command()
 def fly(
     scenario: ScenarioArgument = "case1",
-    samples: Annotated[int, typer.Option(help="Number of flights.")] = 1000,
+    samples: Annotated[int | None, typer.Option(help=f"Number of flights; default: {_SAMPLES}.")] = None,
     seed: Annotated[int, typer.Option(help="Determines all samples.")] = 1,
-    sampling: Annotated[Sampling, typer.Option(help="How samples are drawn.")] = Sampling.uniform,
+    sampling: Annotated[Sampling | None, typer.Option(help="How samples are drawn; default: uniform.")] = None,
     corners: Annotated[bool, typer.Option("--corners", help="All combinations of least and largest value.")] = False,
     scale: Annotated[float, typer.Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
     factor: Annotated[
@@ -82,13 +86,18 @@ def fly(
     from hsv.errors import CampaignError, RunError
     from hsv.graph.preparation import commit
 
-    method = "corners" if corners else sampling.value
+    given = {"sampling": sampling, "samples": samples}
+    for name, value in given.items():
+        if corners and value is not None:
+            raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which says what is flown")
+    method = "corners" if corners else (sampling or Sampling.uniform).value
     factors = dict(map(_factor, factor or ()))
-    campaign = plan(scenario, method=method, samples=samples, seed=seed, scale=scale, commit=commit(), factors=factors)
+    count = _SAMPLES if samples is None else samples
+    campaign = plan(scenario, method=method, samples=count, seed=seed, scale=scale, commit=commit(), factors=factors)
     if out is None:
         Path("campaigns").mkdir(exist_ok=True)
-        count = "" if corners else f"_{campaign.samples}_seed{seed}"
-        out = Path("campaigns", f"{campaign.scenario_name}_{method}{count}.parquet")
+        counted = "" if corners else f"_{campaign.samples}_seed{seed}"
+        out = Path("campaigns", f"{campaign.scenario_name}_{method}{counted}.parquet")
     if out.suffix != ".parquet":
         raise CampaignError(f"out = {str(out)!r}: expected a file that ends in .parquet")
     check_target(out, "out")

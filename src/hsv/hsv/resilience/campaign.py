@@ -17,7 +17,7 @@ from hsv.design.region import screening_corners
 from hsv.errors import CampaignError
 from hsv.resilience.faults import OBSERVED, TRIED, Moment, TriedFault
 from hsv.simulation.assembly import blamed_on, design_parameters
-from hsv.simulation.scenario import Scenario, load_scenario, parse_scenario, scenario_table, scenario_text
+from hsv.simulation.scenario import PERIOD, Scenario, load_scenario, parse_scenario, scenario_table, scenario_text
 from hsv.units import rounded, written
 
 CONTROLLERS = ("case1", "case2", "case1_qp", "case1_integral_heavy", "case1_rmpc")
@@ -64,7 +64,9 @@ class Subject:
         """
         table = scenario_table(self.text, self.name)
         start = self.start(moment)
-        table["duration"] = written(rounded(start + OBSERVED * self.scenario.duration), "s")
+        period = self.design.get("period", PERIOD)
+        steps = round((start + OBSERVED * self.scenario.duration) / period)
+        table["duration"] = written(rounded(steps * period), "s")
         table.pop("limits", None)  # what is expected of another flight
         changes = {name: f"{100.0 * change!r} %" for name, change in self.vehicles[vehicle].items()}
         table["vehicle"] = {**table.get("vehicle", {}), "perturbation": changes}

@@ -12,7 +12,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationInfo
 
 from hsv.errors import QuantityError
 from hsv.simulation.distribution import Distribution, read_distribution
-from hsv.units import parse_quantity, to_paper
+from hsv.units import has_unit, parse_quantity, to_paper
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -24,6 +24,21 @@ class Reading:
     """The scenario's, whose envelope and sets of inertial coupling hold"""
     drawn: dict[int, Distribution] = field(default_factory=dict)
     """Distributions that were found, by the identity of the tables that they are written in"""
+
+
+def relative_change(low: float, high: float, shown: str) -> BeforeValidator:
+    """Return what reads a relative change from ``low`` to ``high``, in percent: 5 might be 5 %, and would be 500 %."""
+
+    def parse(text: object, info: ValidationInfo) -> float:
+        ends, value = _read(text, "1", info)
+        for given in next(iter(text.values())) if isinstance(text, dict) else (text,):
+            if not has_unit(given):
+                raise QuantityError(f"{info.field_name} = {given!r}: the unit is missing, expected one such as '+5 %'")
+        if ends[0] < low or ends[1] > high:
+            raise QuantityError(f"{info.field_name} = {text!r}: expected {shown}")
+        return value
+
+    return BeforeValidator(parse)
 
 
 def quantity(unit: str, low: float | None = None, high: float | None = None, shown: str = "") -> BeforeValidator:

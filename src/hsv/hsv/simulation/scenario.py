@@ -126,7 +126,7 @@ class Scenario(Table):
         return values | {"seed": self.seed} | self.equipment
 
 
-_PERIOD = 0.02
+PERIOD = 0.02
 """Of control, s, until a design says it: whether equipment fits together does not depend on it."""
 
 _EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *COMMAND_LINK_PARAMETERS, *ESTIMATOR_PARAMETERS)
@@ -387,6 +387,9 @@ def _check(scenario: Scenario) -> None:
     if scenario.controller != "tube_mpc" and (scenario.tube.tau or scenario.tube.change):
         field = "tube.tau" if scenario.tube.tau else "tube.change"
         raise ScenarioError(f"{field}: {scenario.controller} has no adjustable factor, expected controller tube_mpc")
+    for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc")):
+        if table in scenario.model_fields_set and scenario.controller in {*SHIPPED_CONTROLLERS} - {controller}:
+            raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
     for index, change in enumerate(scenario.tube.change):
         field = f"tube.change[{index}].tau"
         try:
@@ -400,7 +403,7 @@ def _check(scenario: Scenario) -> None:
             raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
     if scenario.equipment:
         try:
-            check_equipment(scenario.equipment, scenario.vehicle.described.decoupled, _PERIOD)
+            check_equipment(scenario.equipment, scenario.vehicle.described.decoupled, PERIOD)
         except ParameterError as error:
             raise ScenarioError(str(error).removeprefix("parameter ")) from error
     check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt
 
-from hsv.simulation.fields import Coupling, Frequencies, Numbers, Table, Time, enveloped, quantity
+from hsv.simulation.fields import Coupling, Frequencies, Numbers, Table, Time, enveloped, quantity, relative_change
 from hsv.vehicle.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehicle
 
-Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %")]
+Change = Annotated[float, relative_change(-0.9, 10.0, shown="-90 % to +1000 %")]
 
 
 class VehicleTable(Table):
