@@ -15,7 +15,7 @@ from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.run import capacity, run_campaign
 from hsv.campaign.store import ResultStore, read_campaign
 from hsv.campaign.summary import Results
-from hsv.campaign.table import CAMPAIGN
+from hsv.campaign.table import CAMPAIGN, fly_batch
 from hsv.errors import CampaignError
 
 
@@ -27,7 +27,8 @@ class Counting(SerialExecutor):
 
     def fly(self, job, text, batches):
         for batch, content in super().fly(job, text, batches):
-            self.flown.append(batch)
+            if job is fly_batch:
+                self.flown.append(batch)
             yield batch, content
 
 
@@ -234,7 +235,18 @@ def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):
             read_campaign(tmp_path / name)
 
 
-def test_capacity_grows_with_flights_and_shrinks_with_cores(planned):
-    one, many = capacity(planned(), 1000, 1), capacity(planned(), 1000, 1000)
-    assert one.wall_time > 20.0 * many.wall_time > 0.0
-    assert one.bytes > 1000 * 8 * 30
+def test_what_is_to_come_is_expected_from_flights_of_the_campaign(planned):
+    flown = []
+
+    class Watched(SerialExecutor):
+        def fly(self, job, text, batches):
+            flown.append((job.__name__, list(batches)))
+            return super().fly(job, text, flown[-1][1])
+
+    campaign = planned(samples=100)
+    one, all_ = (capacity(campaign, missing, Watched()) for missing in ([3], range(4)))
+    assert (one.flights, all_.flights, all_.cores) == (4, 100, 1)
+    # A batch is not divided, but the last one is smaller.
+    assert all_.wall_time > one.wall_time > 0.0
+    assert all_.bytes > 100 * 8 * 30
+    assert flown == [("time_flight", [96, 97, 98, 99]), ("time_flight", [0, 25, 50, 75])]

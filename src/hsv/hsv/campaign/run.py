@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from contextlib import suppress
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 from hsv.campaign.campaign import Campaign
+from hsv.campaign.capacity import Capacity, evenly, timed
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Executor
-from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
-from hsv.campaign.table import fly_batch, schema
-from hsv.errors import ControllerError
+from hsv.campaign.table import fly_batch, schema, time_flight
 
-
-@dataclass(frozen=True)
-class Capacity:
-    """The flights that are still to be flown, and their cost: wall time (s) on ``cores``, and bytes on the disk."""
-
-    flights: int
-    cores: int
-    wall_time: float
-    bytes: int
+_TIMED = 4
+"""Flights a core that are timed before the start."""
 
 
 def run_campaign(
@@ -42,7 +31,7 @@ def run_campaign(
         store: Where results are kept; batches that are there already are not flown again.
         executor: The back end that flies the batches.
         restart: Whether to discard existing results first.
-        expect: Called once, before the first flight, with the capacity that the run needs.
+        expect: Called once, after flights that are timed, with the capacity that the run needs.
         progress: Called with the number of finished flights, those found at the start included.
 
     Raises:
@@ -55,7 +44,7 @@ def run_campaign(
         missing = [batch for batch in range(campaign.batches) if batch not in finished]
         done = sum(len(campaign.flights(batch)) for batch in finished)
         if missing:
-            expect(capacity(campaign, campaign.samples - done, executor.cores))
+            expect(capacity(campaign, missing, executor))
         progress(done)
         for batch, content in executor.fly(fly_batch, campaign.text, missing):
             store.keep(batch, content)
@@ -65,18 +54,14 @@ def run_campaign(
     return flown
 
 
-def capacity(campaign: Campaign, flights: int, cores: int) -> Capacity:
-    """Return the cost of ``flights`` on so many cores as fast as this one, measured by flying the scenario."""
-    runner = sample_runner(campaign.text)
-    with suppress(ControllerError):
-        flown = runner.fly_unchanged()
-        runner.outcome(flown.data(), flown.fingerprint)
-    started = time.perf_counter()
-    with suppress(ControllerError):
-        flown = runner.fly(0, runner.sample(0))
-        runner.outcome(flown.data(), flown.fingerprint)
-    seconds = time.perf_counter() - started
+def capacity(campaign: Campaign, missing: Sequence[int], executor: Executor) -> Capacity:
+    """Return what flying the ``missing`` batches takes."""
+    cores = max(executor.cores, 1)
+    flights = [flight for batch in missing for flight in campaign.flights(batch)]
+    seconds = timed(executor, time_flight, campaign.text, evenly(flights, _TIMED * cores))
+    # Whole batches go to the cores in turn.
+    longest = min(-(-len(missing) // cores) * campaign.batch, len(flights))
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
-    rows = flights * 8 * len(schema(campaign))
+    rows = len(flights) * 8 * len(schema(campaign))
     envelopes = campaign.batches * len(Envelope.empty().encode())
-    return Capacity(flights, cores, flights * seconds / max(cores, 1), rows + envelopes)
+    return Capacity(len(flights), cores, longest * sum(seconds.values()) / len(seconds), rows + envelopes)

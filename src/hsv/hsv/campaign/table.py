@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from contextlib import suppress
+from functools import lru_cache
 from io import BytesIO
 from typing import Any
 
@@ -12,7 +14,8 @@ import pyarrow.parquet as pq
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
-from hsv.campaign.sample_runner import sample_runner
+from hsv.campaign.executors import Job
+from hsv.campaign.sample_runner import SampleRunner, sample_runner
 from hsv.control.library import LibraryController
 from hsv.errors import ControllerError, ScenarioError
 from hsv.simulation.closed_loop import watched
@@ -46,18 +49,47 @@ def fly_batch(text: str, batch: int) -> bytes:
     Raises:
         ScenarioError: The scenario does not admit the values of a flight together; it is named.
     """
+    return _fly(_flown_here, text, batch)
+
+
+def time_flight(text: str, flight: int) -> bytes:
+    """Fly one flight of the campaign written in ``text``; return how long it took (s), as a text.
+
+    Raises:
+        ScenarioError: The scenario does not admit the values of the flight together; it is named.
+    """
+    return _fly(_timed_here, text, flight)
+
+
+def _fly(job: Job, text: str, number: int) -> bytes:
     runner = sample_runner(text)
     if isinstance(runner.controller, LibraryController):
-        # Whole batches in the library's process, and one by one only where a flight makes it crash.
+        # All of it in the library's process, and flights one by one only where one makes it crash.
         with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
-            return bytes(request("call", _flown_here, text, batch))
-    return _flown_here(text, batch)
+            return bytes(request("call", job, text, number))
+    return job(text, number)
 
 
 def _flown_here(text: str, batch: int) -> bytes:
     runner = sample_runner(text)
+    return encode(runner.campaign, *_rows(runner, runner.campaign.flights(batch)))
+
+
+def _timed_here(text: str, flight: int) -> bytes:
+    _fly_once(text)
+    started = time.perf_counter()
+    _rows(sample_runner(text), range(flight, flight + 1))
+    return repr(time.perf_counter() - started).encode()
+
+
+@lru_cache(maxsize=1)
+def _fly_once(text: str) -> None:
+    """Fly the first flight: what is compiled and built once is there then."""
+    _rows(sample_runner(text), range(1))
+
+
+def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], Envelope]:
     campaign, envelope, rows = runner.campaign, Envelope.empty(), []
-    flights = campaign.flights(batch)
     for flight, sample, seed in zip(flights, *runner.sampler.draw(flights), strict=True):
         try:
             flown = runner.fly(flight, sample)
@@ -69,7 +101,7 @@ def _flown_here(text: str, batch: int) -> bytes:
         except ScenarioError as error:
             raise ScenarioError(f"flight {flight}: {error}") from error
         rows.append(row(sample, flight, int(seed), campaign, outcome))
-    return encode(campaign, rows, envelope)
+    return rows, envelope
 
 
 def row(sample: Sequence[float], flight: int, seed: int, campaign: Campaign, outcome: dict[str, Any]) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from rich.table import Table
 
+from hsv.campaign.capacity import Capacity
 from hsv.campaign.page import write_page
-from hsv.campaign.run import Capacity
 from hsv.campaign.summary import (
     CONFIDENCE,
     ENDED,

@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 from hsv.cli.options import JsonOption, ScenarioArgument, SchedulerOption, TrustOption, UnitsOption, WorkersOption
 from hsv.cli.output import console, errors, print_json, resumable, to_json
 from hsv.cli.targets import check_target
-from hsv.units import UnitSystem
+from hsv.units import UnitSystem, significant
 
 
 class _FlyByDefault(TyperGroup):
@@ -76,7 +76,10 @@ def fly(
 
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --factor "fault[0].start=90 s..110 s"
     """
+    import time
+
     from hsv.campaign.campaign import plan
+    from hsv.campaign.capacity import Capacity
     from hsv.campaign.executors import make_executor
     from hsv.campaign.run import run_campaign
     from hsv.campaign.store import ResultStore
@@ -102,15 +105,24 @@ def fly(
         raise CampaignError(f"out = {str(out)!r}: expected a file that ends in .parquet")
     check_target(out, "out")
     store = ResultStore(out, campaign)
+    begun: dict[str, float] = {}
+
+    def expect(needed: Capacity) -> None:
+        announce(needed)
+        begun.update(expected=needed.wall_time, at=time.perf_counter())
+
     with (
         resumable(store.folder),
         make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
         flights_bar(campaign.scenario_name, campaign.samples) as progress,
     ):
-        flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
+        flown = run_campaign(campaign, store, flying, restart=restart, expect=expect, progress=progress)
+        taken = time.perf_counter() - begun.get("at", time.perf_counter())
     # The campaign in the file is the one that was asked for: its code is that of the user's own scenario.
     results = Results(out, trust=True)
     show(results, units, json, page, flown)
+    if flown and not json:
+        console.print(f"flown in {significant(taken)} s, expected: {significant(begun['expected'])} s")
     if results.crashed.all():
         raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
 

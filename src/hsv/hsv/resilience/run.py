@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from hsv.campaign.capacity import Capacity, evenly, timed
 from hsv.campaign.executors import Executor
 from hsv.campaign.lock import locked
-from hsv.campaign.run import Capacity
 from hsv.campaign.store import write_whole
 from hsv.errors import CampaignError, reason
 from hsv.resilience.campaign import Case, ResilienceCampaign
@@ -122,29 +122,23 @@ def run_resilience(
 
 
 def capacity(campaign: ResilienceCampaign, missing: Sequence[int], executor: Executor) -> Capacity:
-    """Return what flying the ``missing`` cases takes, by flights that the executor flies as it is going to fly them.
-
-    All of its cores fly at the same time: what they take from each other, and other work from them, is in it.
-    """
+    """Return what flying the ``missing`` cases takes."""
     cores = max(executor.cores, 1)
     cases = {number: campaign.cases[number] for number in missing}
     own: dict[str, list[int]] = {}
     for number, case in cases.items():
         own.setdefault(case.subject.name, []).append(number)
-    timed = {
-        flight: name
+    chosen = {
+        name: _sample(numbers, max(_TIMED * len(cases[numbers[0]].subject.vehicles), -(-cores // len(own))))
         for name, numbers in own.items()
-        for flight in _sample(numbers, max(_TIMED * len(cases[numbers[0]].subject.vehicles), -(-cores // len(own))))
     }
-    spent: dict[str, list[float]] = {name: [] for name in own}
-    for flight, content in executor.fly(time_flight, campaign.text, list(timed)):
-        spent[timed[flight]].append(float(content))
+    spent = timed(executor, time_flight, campaign.text, [flight for flights in chosen.values() for flight in flights])
     seconds = 0.0
     for name, numbers in own.items():
         # Without a fault each core flies each vehicle but the nominal one, which it flew.
         others = len(cases[numbers[0]].subject.vehicles) - 1
         flown = sum(cases[number].flights for number in numbers) + len(Moment) * others * min(cores, len(numbers))
-        seconds += flown * sum(spent[name]) / len(spent[name])
+        seconds += flown * sum(spent[flight] for flight in chosen[name]) / len(chosen[name])
     flights = sum(case.flights for case in cases.values())
     return Capacity(flights, cores, seconds / min(cores, len(cases)), _BYTES * len(cases))
 
@@ -155,5 +149,5 @@ def _sample(cases: Sequence[int], count: int) -> list[int]:
     The severities come in turn: a flight that is lost early is soon over.
     """
     kinds = len(SEVERITIES)
-    count = min(count, kinds * len(cases))
-    return [kinds * cases[index * len(cases) // count] + index % kinds for index in range(count)]
+    several = [case for case in cases for _ in range(kinds)]
+    return [kinds * case + index % kinds for index, case in enumerate(evenly(several, count))]
