@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import mimetypes
 import struct
+import time
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,9 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
 from hsv.graph.description import (
+    ACTUATOR,
     LATCHED_TOPICS,
+    NOMINAL,
     NOMINAL_TRAJECTORY,
     OTHER_TOPICS,
     PLANT,
@@ -23,11 +26,13 @@ from hsv.graph.description import (
     RECORDER_PROGRESS,
     STATE,
     TOPICS,
+    TUBE_STATUS,
     controller_node,
     graph,
     step_topics,
 )
 from hsv.graph.infrastructure_parameters import RECORDER_PARAMETERS
+from hsv.graph.snapshot import Snapshot
 from hsv.noise import SEED_PARAMETER
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
@@ -43,6 +48,9 @@ from hsv_node.qos import LATCHED, STEP
 CONFIRMATION_INTERVAL = 50
 """Steps between confirmations: a confirmation of every step would halve the speed of the loop."""
 
+TOLD_EVERY = 0.2
+"""Seconds of the wall clock between two lines of numbers."""
+
 _STAMP = struct.Struct("<iI")
 _FRAME_LENGTH = slice(12, 16)
 """Where a message with a header carries the length of its frame_id, on which the places of all that follows depend."""
@@ -56,6 +64,9 @@ class RecorderNode(PeerNode):
         values = declare(self, RECORDER_PARAMETERS)
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y%m%dT%H%M%SZ")
         directory = Path(values["bag.directory"] or f"bags/run_{utc}")
+        self._tells = values["progress"]
+        self._told = 0.0
+        """When the last numbers of the flight were printed, of the wall clock."""
         self._last_step = 0
         self._now = 0
         self._complete = -1
@@ -180,6 +191,20 @@ class RecorderNode(PeerNode):
             self.bag.flush()
             self._progress_message.step = self._complete
             self._progress.publish(self._progress_message)
+            self._tell(messages, final)
+
+    def _tell(self, messages: dict[str, bytes], final: bool) -> None:
+        """Print numbers of a step that is written: nobody in the loop waits for it."""
+        now = time.monotonic()
+        if not self._tells or (now - self._told < TOLD_EVERY and not final):
+            return
+        self._told = now
+        read = {
+            topic: deserialize_message(messages[name], message_class(TOPICS[topic]))
+            for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR)
+            if (name := self._names.get(topic)) in messages
+        }
+        print(Snapshot.of(read[STATE], read[NOMINAL], read.get(TUBE_STATUS), read[ACTUATOR]).line, flush=True)
 
     def _is_last(self, state: bytes) -> bool:
         length = state[_FRAME_LENGTH]

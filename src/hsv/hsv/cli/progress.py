@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from hsv.cli.output import errors
+from hsv.graph.snapshot import Snapshot
+from hsv.units import UnitSystem
 
 
 def _bar() -> Progress:
@@ -37,23 +39,32 @@ def stages() -> Iterator[Callable[[str, int, int], None]]:
         yield report
 
 
+class FlightLine:
+    """A line that shows how far a flight is, and where."""
+
+    def __init__(self, bar: Progress, title: str, steps: int, units: UnitSystem) -> None:
+        self._bar, self._steps, self._units = bar, steps, units
+        self._task = bar.add_task(title, total=steps, note="starting the nodes")
+
+    def step(self, number: int) -> None:
+        """Show that a step is flown."""
+        self._bar.update(self._task, completed=number)
+
+    def snapshot(self, snapshot: Snapshot) -> None:
+        """Show numbers of the flight."""
+        self._bar.update(self._task, note=snapshot.in_words(self._units))
+
+
 @contextmanager
-def flight(title: str, duration: float, steps: int) -> Iterator[Callable[[int], None]]:
-    """Yield a callback (step) that shows the simulated time flown and the real-time factor."""
-    import time
-
-    with _bar() as bar:
-        task = bar.add_task(title, total=steps, note="starting the nodes")
-        started: list[float] = []
-
-        def report(step: int) -> None:
-            started[:1] = started[:1] or [time.monotonic()]
-            simulated = duration * step / steps
-            elapsed = time.monotonic() - started[0]
-            factor = f", {simulated / elapsed:.1f} x real time" if elapsed > 0.5 else ""
-            bar.update(task, completed=step, note=f"{simulated:.0f} of {duration:.0f} s{factor}")
-
-        yield report
+def flight(title: str, steps: int, units: UnitSystem = UnitSystem.metric) -> Iterator[FlightLine]:
+    """Yield the line of a flight of so many ``steps``."""
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TextColumn("{task.fields[note]}", markup=False),
+    )
+    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bar:
+        yield FlightLine(bar, title, steps, units)
 
 
 @contextmanager

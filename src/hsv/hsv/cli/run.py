@@ -72,12 +72,12 @@ def run(
         if verbose or WARNING in text or node == LIVE.label:
             report_line(node, text)
 
-    with flight_bar(loaded.name, loaded.duration, prepared.steps) as show:
+    with flight_bar(loaded.name, prepared.steps, units) as shown:
 
         def step(number: int) -> None:
             clock.setdefault("start", time.monotonic())
             clock["end"] = time.monotonic()
-            show(number)
+            shown.step(number)
 
-        fly_graph(prepared, namespace=namespace, on_step=step, on_line=line)
+        fly_graph(prepared, namespace=namespace, on_step=step, on_line=line, on_snapshot=shown.snapshot)
     conclude_flight(prepared.bag, report=report, units=units, json=json, wall_time=clock["end"] - clock["start"])

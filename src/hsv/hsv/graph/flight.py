@@ -11,6 +11,7 @@ from hsv.errors import RecordingError, RunError
 from hsv.graph.description import ROOT, TOPICS
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
+from hsv.graph.snapshot import Snapshot
 
 
 def fly_graph(
@@ -19,6 +20,7 @@ def fly_graph(
     namespace: str = ROOT,
     on_step: Callable[[int], None] = lambda step: None,
     on_line: Callable[[str, str], None] = lambda node, text: None,
+    on_snapshot: Callable[[Snapshot], None] = lambda snapshot: None,
 ) -> None:
     """Fly ``prepared`` with its processes, recorded to its bag; interrupted before the first step, it leaves no bag.
 
@@ -27,6 +29,7 @@ def fly_graph(
         namespace: Namespace of all nodes, as :func:`hsv.graph.description.checked_namespace` returns it.
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
+        on_snapshot: Called with what the recorder tells of the flight.
 
     Raises:
         RunError: A process failed or is not built, or the bag cannot be mended; last words are in the message.
@@ -34,7 +37,8 @@ def fly_graph(
     failures = []
     try:
         arguments = parameter_arguments(prepared.parameter_files)
-        with Launcher(prepared.nodes, arguments, on_step, on_line, prepared.step_timeout, namespace) as launcher:
+        given = (on_step, on_line, prepared.step_timeout, namespace, on_snapshot)
+        with Launcher(prepared.nodes, arguments, *given) as launcher:
             launcher.wait()
     except RunError as error:
         failures.append(str(error))

@@ -21,6 +21,7 @@ from hsv.graph.description import (
     LANDED,
     LIVE,
     PLANT,
+    RECORDER,
     ROOT,
     NodeDescription,
     checked_namespace,
@@ -29,6 +30,7 @@ from hsv.graph.description import (
 )
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
+from hsv.graph.snapshot import Snapshot
 
 GRACE = 20.0
 """Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
@@ -110,6 +112,7 @@ class Launcher:
         on_line: Callable[[str, str], None],
         wait_timeout: float = 10.0,
         namespace: str = ROOT,
+        on_snapshot: Callable[[Snapshot], None] = lambda snapshot: None,
     ) -> None:
         """Prepare to start processes.
 
@@ -120,12 +123,14 @@ class Launcher:
             on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
             wait_timeout: For how long (s) a process may do nothing at all, where no other node would end the run.
             namespace: Namespace of all nodes.
+            on_snapshot: Called with what the recorder tells of the flight.
         """
         self._nodes = list(nodes)
         self._arguments = [*arguments, *(["-r", f"__ns:={namespace}"] if namespace != ROOT else [])]
         self._namespace = namespace
         self._on_step = on_step
         self._on_line = on_line
+        self._on_snapshot = on_snapshot
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
         self._flying = False
         self._processes: list[_Process] = []
@@ -212,7 +217,7 @@ class Launcher:
 
     def _start(self, description: NodeDescription, path: Path) -> None:
         command = [str(path), "--ros-args", *self._arguments]
-        if description in _FLYING:
+        if description in (*_FLYING, RECORDER):
             command += ["-p", "progress:=true"]
         popen = subprocess.Popen(
             command,
@@ -237,6 +242,8 @@ class Launcher:
             self._flying |= text.startswith("step ")
             if process.description in _FLYING and text.startswith("step "):
                 self._on_step(int(text.split()[1]))
+            elif snapshot := Snapshot.read(text):
+                self._on_snapshot(snapshot)
             elif text:
                 # A crashed interpreter lists its extension modules: kilobytes that tell nothing.
                 if not text.startswith("Extension modules:"):
