@@ -25,6 +25,7 @@ setup(
             "player = hsv_bringup.player:main",
             "set_parameter = hsv_bringup.set_parameter:main",
             "topic = hsv_bringup.topic:main",
+            "watch = hsv_bringup.watch:main",
             "peer_emulator = hsv_bringup.peer_emulator:main",
         ],
     },

@@ -47,6 +47,7 @@ from hsv.cli.trim import trim
 from hsv.cli.vehicles import vehicles
 from hsv.cli.verify import verify
 from hsv.cli.view import view
+from hsv.cli.watch import watch
 from hsv.errors import HsvError, RunError, reason
 
 _INTERRUPTED = 130
@@ -120,6 +121,7 @@ for command in (
     resilience,
     set,
     topic,
+    watch,
 ):
     app.command()(command)
 app.add_typer(montecarlo, name="montecarlo")

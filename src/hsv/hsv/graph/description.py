@@ -199,8 +199,8 @@ PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
 """Not of the graph: shows a flight while it is flown. Nobody waits for it, and it ends with the others."""
 
-FAULT, SET_PARAMETER, TOPIC = (
-    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic")
+FAULT, SET_PARAMETER, TOPIC, WATCH = (
+    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic", "watch")
 )
 """Not of the graph: commands that ask a running one."""
 

@@ -1,0 +1,50 @@
+"""hsv watch beside a flight."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from node_processes import Processes, recorded_steps, short_scenario
+from ros_domain import own_environment
+from waiting import exit_code_of, wait_until
+
+from hsv.recording.flight import flight_fingerprint
+from hsv.recording.reader import Bag
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+
+pytestmark = pytest.mark.graph
+
+
+def test_a_flight_is_watched_to_its_end_and_its_bits_are_the_same(tmp_path: Path) -> None:
+    scenario = short_scenario(tmp_path, duration=16, fault=1)
+    bag = tmp_path / "bag"
+    with own_environment() as environment:
+        processes = Processes(environment, tmp_path)
+        flying = processes.start(
+            "hsv", "run", scenario, "--real-time-factor", "1", "--no-report", "--bag", bag, "--composed"
+        )
+        wait_until(lambda: recorded_steps(bag) > 50, [flying.pid])
+        watched = processes.run("hsv", "watch", "--json")
+        assert watched.returncode == 0, watched.stdout
+        assert exit_code_of(flying) == 0
+        processes.stop()
+    rows = [json.loads(line) for line in watched.stdout.splitlines() if line.startswith("{")]
+    times = [row["time"] for row in rows]
+    assert len(rows) > 2 and times == sorted(set(times)) and times[-1] <= 16.0
+    last = rows[-1]
+    assert last["faults"] == ["elevator_deflection loss_of_effectiveness"]
+    assert 0.0 <= last["tube_level"] <= 1.0 and 26000.0 < last["altitude"] < 26400.0 and last["velocity_error"] < 0.0
+    assert flight_fingerprint(Bag(bag)) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
+
+
+def test_where_nobody_flies_it_is_one_line(tmp_path: Path) -> None:
+    with own_environment() as environment:
+        processes = Processes(environment, tmp_path)
+        done = processes.run("hsv", "watch")
+        processes.stop()
+    assert done.returncode == 1
+    assert done.stdout.splitlines()[-1].startswith("hsv watch: error: no run in ROS_DOMAIN_ID=")
