@@ -77,10 +77,10 @@ def test_info_tells_what_happened(hsv: Hsv, bag: Path) -> None:
     assert "design.yaml (" in out and "scenario     short" in out
 
 
-def test_export_writes_beside_the_bag(hsv: Hsv, bag: Path) -> None:
+def test_export_writes_into_the_folder_of_the_bag(hsv: Hsv, bag: Path) -> None:
     done = hsv("export", str(bag), "--csv", "--topic", "/hsv/state")
     assert done.code == 0
-    header = (bag.parent / "flown_csv" / "hsv_state.csv").read_text().splitlines()[0]
+    header = (bag / "csv" / "hsv_state.csv").read_text().splitlines()[0]
     assert '"altitude [m]"' in header and '"elastic_rate[0] [kg^0.5 m/s]"' in header
     again = hsv("export", str(bag), "--csv")
     assert again.code == 2 and "exists already" in again.error
@@ -174,3 +174,12 @@ def test_a_wrong_attached_parameter_is_told_with_its_bag(hsv: Hsv, bag: Path, tm
     tracks = {topic: opened.track(topic) for topic in TOPICS}
     done = hsv("replay", str(write_bag(tmp_path / "wrong", tracks, design | {"period": "x"}, scenario)))
     assert done.code == 2 and "wrong_0.mcap: attached parameter period = 'x': expected double" in done.error
+
+
+def test_what_is_exported_is_in_the_way_of_no_command_on_all_bags(hsv, bag):
+    before = sorted(bag.parent.iterdir())
+    assert hsv("export", str(bag), "--parquet").code == hsv("export", str(bag), "--npz").code == 0
+    assert sorted(bag.parent.iterdir()) == before
+    several = hsv("info", str(bag), str(bag), "--json").json["bags"]
+    assert several == 2 * [hsv("info", str(bag), "--json").json]
+    assert hsv("info", str(bag), str(bag)).out.count("fingerprint") == 2

@@ -69,7 +69,7 @@ def test_steps_in_which_a_link_held_are_counted(tmp_path, capsys):
     }
     # In step 1 the command of step 0 is due; all others differ from those before.
     assert describe(bag)["equipment"]["held_steps"] == lost
-    info(bag.path, UnitSystem.si, False)
+    info([bag.path], UnitSystem.si, False)
     said = f"links        held measurement in {lost['measurement']} steps, command in {lost['command']} steps\n"
     assert said in capsys.readouterr().out
 
@@ -85,7 +85,7 @@ def test_nothing_is_said_of_an_ideal_flight(ideal, capsys):
     }
     page = render(reported_runs([ideal]))
     assert "less true" not in page and "filtered, effector" not in page and 'id="air"' not in page
-    info(ideal.path, UnitSystem.si, False)
+    info([ideal.path], UnitSystem.si, False)
     out = capsys.readouterr().out
     assert not any(line.startswith(("sensors", "links", "effectors", "air")) for line in out.splitlines())
 
@@ -113,7 +113,7 @@ def test_faults_have_all_parameters_with_units(equipped, capsys):
     assert text.startswith("elevator deflection: oscillation amplitude ")
     assert '<span class="paper">0.5&nbsp;deg</span>' in text and "frequency 2&nbsp;Hz" in text
     assert '<span class="paper">0.5&nbsp;deg</span>' in render(reported_runs([equipped]))
-    info(equipped.path, UnitSystem.paper, False)
+    info([equipped.path], UnitSystem.paper, False)
     out = capsys.readouterr().out
     assert "oscillation amplitude 0.5 deg, frequency 2 Hz of elevator_deflection, from 2 s to 3 s" in out
     assert "sensors      rms error pitch_rate 0.0" in out and " deg/s\n" in out

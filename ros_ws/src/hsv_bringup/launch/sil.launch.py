@@ -41,7 +41,10 @@ ARGUMENTS = {
     "live_port": ("8765", "port for Foxglove, the page has the next one; 0: any two that are free"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),
-    "units": ("si", "units of the summary and the report: si, or paper for ft, ft/s, deg"),
+    "units": (
+        "metric",
+        "units of the summary and the report: metric (SI with degrees), si, or paper for ft, ft/s, deg",
+    ),
     "log_level": ("info", "what the nodes log: debug, info, warn, error or fatal"),
     "namespace": ("/", "namespace of all nodes and topics, such as /veh1: several graphs fly in one domain"),
 }
@@ -52,7 +55,7 @@ CHOICES = {
     "external": ("true", "false"),
     "live": ("true", "false"),
     "report": ("true", "false"),
-    "units": ("si", "paper"),
+    "units": ("metric", "si", "paper"),
     "log_level": ("debug", "info", "warn", "error", "fatal"),
 }
 

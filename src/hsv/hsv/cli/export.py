@@ -27,7 +27,9 @@ def export(
     topic: Annotated[
         list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="What to write; default: beside the bag, named after it.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="What to write; default: in the bag's folder, named after the format.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Write the topics of a bag as tables with field names and units in the header (SI), or the bag with pictures.
@@ -61,7 +63,8 @@ def export(
         raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")
     if out is None:
         home = opened.folder.absolute()
-        out = home.with_name(f"{home.name}.npz") if npz else home.with_name(f"{home.name}_{chosen[0]}")
+        # Not among the bags: bags/* stays a list of bags.
+        out = home / (f"{home.name}.npz" if npz else str(chosen[0]))
     topics = topic or [name for name in TOPICS if name in opened.roles]
     print_written(tables.export(opened, topics, chosen[0], out), json)
     print_bag_warnings(opened)

@@ -4,35 +4,58 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from hsv.cli.bag_warnings import print_bag_warnings
-from hsv.cli.options import BagArgument, JsonOption, UnitsOption
+from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import console, print_json, to_json
 from hsv.units import UnitSystem, in_system, significant
+
+if TYPE_CHECKING:
+    from hsv.errors import RecordingError
+    from hsv.recording.reader import Bag
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
 
 
 def info(
-    bag: BagArgument,
+    bags: Annotated[list[Path], typer.Argument(help="Bag directories, or their .mcap files.")],
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """What a bag holds: duration, topics, scenario, design, faults, metrics.
+    """What bags hold: duration, topics, scenario, design, faults, metrics. With --json: of several, a list.
 
     Example: hsv info bags/case1_20260101T000000Z
     """
+    from hsv.recording.reader import Bag
+
+    described = []
+    for number, opened in enumerate([Bag(bag) for bag in bags]):
+        if number and not json:
+            console.print()
+        description, problem = _described(opened, units, json)
+        described.append(description)
+        if problem:
+            break
+    if json:
+        print_json(described[0] if len(bags) == 1 else {"bags": described})
+    if problem:
+        raise problem
+
+
+def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
+    """Return what a bag holds, and why its metrics are missing if they are; print it unless as ``json``."""
     from hsv.cli.summary import print_metrics
     from hsv.errors import RecordingError
     from hsv.recording.bag_warnings import completeness
     from hsv.recording.flight import flight_data
     from hsv.recording.info import describe
-    from hsv.recording.reader import Bag
     from hsv.simulation.metrics import METRICS, flight_metrics
 
-    opened = Bag(bag)
     description = describe(opened)
     problem, remark = None, ""
     try:
@@ -41,16 +64,14 @@ def info(
         # What else the bag holds is still worth knowing, to see what is wrong with it.
         metrics, problem = {}, error
     quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
-    if json:
-        measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
-        print_json(description | ({"metrics": None} if problem else measured))
-    else:
+    if not json:
         _print(description, units)
         if not problem:
             print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
-    if problem:
-        raise problem
-    print_bag_warnings(opened)
+    if not problem:
+        print_bag_warnings(opened)
+    measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
+    return description | ({"metrics": None} if problem else measured), problem
 
 
 def _print(description: dict[str, Any], units: UnitSystem) -> None:
