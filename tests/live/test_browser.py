@@ -3,7 +3,6 @@
 import time
 
 import pytest
-from browser import Browser
 from live_clients import FoxgloveClient, addresses, assert_without_gap
 from node_processes import Processes, recorded_steps, short_scenario
 from ros_domain import own_environment
@@ -12,13 +11,6 @@ from waiting import wait_until
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.viewer
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    browser = Browser(tmp_path_factory.mktemp("profile"))
-    yield browser
-    browser.driver.quit()
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from itertools import groupby
 from typing import Any
 
@@ -13,12 +12,11 @@ from hsv.faults.table import CHANNELS, FAULT_KINDS
 from hsv.live.addresses import origins
 from hsv.live.hub import Hub
 from hsv.parameters import Parameter
-from hsv.recording.report import text
 from hsv.recording.report.page import LIBRARY
-from hsv.recording.report.panels import GROUPS, Panel
-from hsv.recording.report.templates import environment_of
-from hsv.recording.report.text import unit_html
-from hsv.units import to_paper
+from hsv.recording.report.panels import GROUPS
+from hsv.recording.report.templates import asset, environment_of
+from hsv.recording.report.text import units_of
+from hsv.units import UnitSystem
 
 
 def render(hub: Hub, port: int) -> str:
@@ -33,13 +31,13 @@ def render(hub: Hub, port: int) -> str:
         panels=panels,
         kinds=_kinds(),
         sockets=" ".join(origin.replace("http", "ws", 1) for origin in origins(port)),
-        unit=text.unit,
-        styles=[_asset("hsv.recording.report", "style.css"), _asset("hsv.live", "live.css")],
+        units=UnitSystem.metric,
+        styles=[asset("style.css"), asset("live.css", "hsv.live")],
         scripts=[
             Markup(LIBRARY.read_text(encoding="utf-8")),
-            _asset("hsv.recording.report", "charts.js"),
+            asset("charts.js"),
             Markup(side_view.script()),
-            _asset("hsv.live", "live.js"),
+            asset("live.js", "hsv.live"),
         ],
         plots={"panels": _panels(hub)},
         airframe=side_view.geometry(),
@@ -53,7 +51,7 @@ def _panels(hub: Hub) -> list[dict[str, Any]]:
         described.append(
             {
                 "name": panel.name,
-                "units": _units(panel),
+                "units": units_of(panel.unit),
                 "curves": [
                     {"kind": column.kind, "label": column.label, "run": 0, "x": 0, "y": number}
                     for number, column in columns
@@ -63,14 +61,6 @@ def _panels(hub: Hub) -> list[dict[str, Any]]:
             }
         )
     return described
-
-
-def _units(panel: Panel) -> dict[str, dict[str, Any]]:
-    factor, unit = to_paper(1.0, panel.unit)
-    return {
-        "si": {"unit": unit_html(panel.unit), "factor": 1.0},
-        "paper": {"unit": unit_html(unit), "factor": factor},
-    }
 
 
 def _kinds() -> dict[str, dict[str, Any]]:
@@ -97,7 +87,3 @@ def _kinds() -> dict[str, dict[str, Any]]:
 
 def _range(parameter: Parameter) -> str:
     return f"{parameter.minimum:.4g} to {parameter.maximum:.4g} {parameter.unit}".strip()
-
-
-def _asset(package: str, name: str) -> Markup:
-    return Markup(files(package).joinpath("template", name).read_text(encoding="utf-8"))
