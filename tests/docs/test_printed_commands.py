@@ -111,6 +111,7 @@ ELSEWHERE = {
     "ros2 run hsv_ctrl tube_mpc --ros-args -r hsv/command:=wish": "tests/graph/test_names.py",
     "hsv run case2 --real-time-factor 1": "the flight of IN_FLIGHT",
     "hsv watch": "tests/graph/test_watch.py",
+    "hsv run case1 --live": "tests/graph/test_live.py",
     "hsv topic /hsv/state --every 50": "tests/graph/test_by_hand.py",
     "ros2 run hsv_bringup airframe": "tests/graph/test_airframe.py",
     "ros2 bag record -s mcap": "a form",
