@@ -51,7 +51,7 @@ _ROUNDS = 10
 _TO_UNIT = 1.0 / 2.0**53
 _TWO_PI = 6.283185307179586
 
-LARGEST = (106.0 * 0.6931471805599453) ** 0.5
+LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
 """No normal number is larger: Box and Muller take the logarithm of 2^-53 at least. 8.57."""
 
 

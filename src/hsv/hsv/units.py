@@ -123,7 +123,7 @@ def to_paper(value: float, unit: str) -> tuple[float, str]:
 
 def significant(value: float, digits: int = 3) -> str:
     """Return ``value`` with so many significant digits, and all that it has before the decimal point up to 999999."""
-    return f"{value:.0f}" if 10.0 ** (digits - 1) <= abs(value) < 999999.5 else f"{value:.{digits}g}"
+    return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
 def si_unit_of(text: object) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from math import isclose
 from typing import Any
 
 from hsv.control.adjustable import TAU
@@ -98,7 +97,7 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
         plant = components.plant
         if plant.steps < 1:
             raise ScenarioError(f"duration = {scenario.duration:g} s: expected at least a period, {plant.period:g} s")
-        if not isclose(plant.steps * plant.period, scenario.duration, rel_tol=1e-9):
+        if abs(plant.steps * plant.period - scenario.duration) > 1e-9 * scenario.duration:
             raise ScenarioError(
                 f"duration = {scenario.duration:g} s: expected a whole number of periods, {plant.period:g} s each"
             )

@@ -85,7 +85,7 @@ def strip(title: str, unit: str, end: float, lines: Sequence[Line], bands: Seque
     """Return a strip of a quantity of an SI ``unit`` over 0 ... ``end`` (s); its axis holds all that is finite."""
     values = [line.y for line in lines] + [edge for band in bands for edge in (band.low, band.high)]
     finite = np.concatenate([value[np.isfinite(value)] for value in values])
-    low, high = float(finite.min()), float(finite.max())
+    low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
     margin = 0.06 * (high - low) or 1e-3 * abs(high) or 1e-6
     low, high = low - margin, high + margin
 
