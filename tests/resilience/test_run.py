@@ -48,6 +48,7 @@ def test_interrupted_it_goes_on_where_it_was(campaign, whole, tmp_path):
     assert first.stat().st_mtime_ns == written and kept(store) == whole
 
 
+@pytest.mark.long
 def test_a_killed_worker_loses_nothing_and_two_bring_what_one_does(campaign, whole, tmp_path):
     store, killed = CaseStore(tmp_path), []
     with make_executor(2) as workers:

@@ -75,6 +75,7 @@ def test_what_is_bounded_by_zero_adds_no_channel(problem, subject):
     assert_allclose(gust.disturbance.half_width, [1.0] * 7 + [2.0])
 
 
+@pytest.mark.long
 def test_noise_counts_with_its_reach_and_bias_once(problem, subject):
     models, unbounded = described(
         subject, sensor_set="fine", bias=["pitch_angle = -0.1 deg"], turbulence="2 ft/s", density="1 %"
