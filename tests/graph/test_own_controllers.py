@@ -77,7 +77,7 @@ def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: s
     path = scenario(processes.folder, example, f'controller = "{place}"')
     simulated = processes.run("hsv", "simulate", path)
     assert simulated.returncode == 0, simulated.stdout
-    [fingerprint] = [line.split()[1] for line in simulated.stdout.splitlines() if line.startswith("fingerprint")]
+    [fingerprint] = [word for word in simulated.stdout.split() if word.startswith("v1:")]
     for words in ((), ("--composed",)):
         bag = flown(processes, path, f"flown{''.join(words)}", *words)
         assert f"{flight_fingerprint(bag)}" == fingerprint
