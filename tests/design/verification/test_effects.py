@@ -5,34 +5,17 @@ from numpy.testing import assert_allclose
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.region import record
-from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.design.verification import effects
-from hsv.design.verification.effects import (
-    REACH,
-    Measured,
-    air,
-    declared,
-    delayed,
-    described,
-    sensors,
-    with_models,
-)
-from hsv.design.verification.plan import Plan
-from hsv.errors import DesignError
+from hsv.design.tube_problem import channel_model
+from hsv.design.verification.declared import declared
+from hsv.design.verification.effects import Measured, air, delayed, with_models
 from hsv.lpv.polytope import schedule
 from hsv.noise import LARGEST
-from hsv.sensors import sensor_data
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.trim import trim
-
-
-@pytest.fixture(scope="module")
-def problem(subject):
-    return tube_problem(subject.design, subject.vehicle, DisturbanceSet(-np.ones(7), np.ones(7)))
 
 
 @pytest.mark.parametrize("state", range(N_RIGID))
@@ -73,40 +56,6 @@ def test_what_is_bounded_by_zero_adds_no_channel(problem, subject):
     gust = with_models(problem, [still, air(subject.vehicle, subject.design.period, up=2.0)])
     assert gust.system.G.shape[2] == 8
     assert_allclose(gust.disturbance.half_width, [1.0] * 7 + [2.0])
-
-
-@pytest.mark.long
-def test_noise_counts_with_its_reach_and_bias_once(problem, subject):
-    models, unbounded = described(
-        subject, sensor_set="fine", bias=["pitch_angle = -0.1 deg"], turbulence="2 ft/s", density="1 %"
-    )
-    assert not unbounded
-    unexplained = models.pop("model errors under sensors")(problem.system)
-    assert unexplained.half_width.size == 0 and unexplained.widening.min() >= 0.0 < unexplained.widening[6]
-    assert list(models) == [
-        "fine sensors: noise",
-        "bias of pitch_angle = -0.1 deg",
-        "turbulence 2 ft/s",
-        "density 1 %",
-    ]
-    noise, bias, turbulence, density = (model(problem.system).half_width for model in models.values())
-    assert noise[0] == pytest.approx(REACH * 0.3048)
-    assert_allclose(bias, [0.0, 0.0, 0.0, np.radians(0.1), 0.0])
-    assert_allclose(turbulence, [REACH * 0.6096, REACH * 0.6096, 0.0])
-    assert_allclose(density, [0.0, 0.0, 0.01])
-
-
-def test_an_inertial_angle_of_attack_has_the_error_of_the_pitch_angle(problem, subject):
-    """Equal errors of both angles are one of the path angle less: the feedback on one takes from that on the other."""
-    noise = sensors(sensor_data({"sensors.set": "inertial"}, subject.design.period), Plan.of(subject))["sensor noise"]
-    seen, F = noise(problem.system).feedthrough, problem.system.F
-    assert_allclose(seen[:, 3], F[:, 3] + F[:, 2])
-    assert abs(seen[1, 3]) < 0.2 * abs(F[1, 3])
-
-
-@pytest.fixture(scope="module")
-def plan(subject):
-    return Plan.of(subject)
 
 
 DECLARED = {
@@ -190,59 +139,3 @@ def problem_at(design, model, altitude, velocity):
     schedule(design.polytope.data(), altitude, velocity, S)
     A, B = np.split(S.reshape(N_STATES, -1), [N_STATES], axis=1)
     return error_system(A[None], B[None], design.feedback_gain, model.notch, model.columns)
-
-
-def test_less_than_the_largest_noise_is_passed_now_and_then(subject, plan):
-    scenario = load_scenario("case1", DECLARED["fine"])
-    history = fly(assemble_flight(scenario, subject.design)).history
-    bound = sensors(sensor_data(scenario.parameters(), subject.design.period), plan)["sensor noise"].error
-    beyond = np.abs(history.estimate - history.state)[:, :N_RIGID] > bound
-    assert 0.5 / 370 < beyond.mean() < 2.0 / 370
-
-
-def test_what_has_no_bound_is_said(subject):
-    scenario = load_scenario("case1", {"sensors.altitude.drop_out": "1 %", "estimator.enabled": True})
-    assert declared(subject, scenario) == ({}, ["drop-out of a sensor", "estimator"])
-
-
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        ({"link.measurement.delay": 1}, "link of the measurement"),
-        ({"link.command.loss": "1 %"}, "link of the command"),
-        ({"link.computational_delay": "5 ms"}, "link of the command"),
-        (
-            {"actuator.elevator_deflection": {"set": "elevator_50", "natural_frequency": "5 rad/s"}},
-            "actuator.elevator_deflection.natural_frequency",
-        ),
-    ],
-)
-def test_links_and_actuators_of_ones_own_have_no_bound(subject, change, named):
-    assert declared(subject, load_scenario("case1", change)) == ({}, [named])
-
-
-def test_air_of_a_scenario_counts_with_its_reach(problem, subject):
-    changes = {
-        "wind": {"up": "-3 ft/s"},
-        "turbulence": {"sigma_up": "1 ft/s"},
-        "gust": {"starts": ["10 s", "20 s"], "up": ["5 ft/s", "-2 ft/s"], "lengths": ["700 ft", "700 ft"]},
-        "density": {"offset": "-2 %", "sigma": "1 %"},
-    }
-    models, _ = declared(subject, load_scenario("case1", changes))
-    found = {name: model(problem.system).half_width.tolist() for name, model in models.items()}
-    assert found["wind"] == pytest.approx([0.0, 3 * 0.3048, 0.0])
-    assert found["gusts"] == pytest.approx([0.0, 7 * 0.3048, 0.0])
-    assert found["turbulence"] == pytest.approx([0.0, REACH * 0.3048, 0.0])
-    assert found["density"] == pytest.approx([0.0, 0.0, 0.05])
-
-
-def test_the_reach_that_is_written_as_the_bound_of_all_noise_is_taken(subject):
-    assert "turbulence 2 ft/s" in described(subject, turbulence="2 ft/s", reach=8.572)[0]
-
-
-def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeypatch):
-    def none(*_):
-        raise DesignError("no set")
-
-    monkeypatch.setattr(effects, "ellipsoid", none)
-    assert effects.verdict("x", subject.design, subject).said == "no set"

@@ -5,10 +5,10 @@ import pytest
 from scipy.linalg import expm
 
 from hsv.design.tube_problem import known_actuators
-from hsv.design.verification.effects import Verdict
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
+from hsv.design.verification.verdict import Verdict
 from hsv.design.verification.verifier import load_subject
 from hsv.lpv.actuated import actuator_system
 from hsv.vehicle.actuators import SUBSTEPS

@@ -12,7 +12,7 @@ from hsv.cli.options import JsonOption
 from hsv.cli.output import console, print_json, report_error
 
 if TYPE_CHECKING:
-    from hsv.design.verification.effects import Verdict
+    from hsv.design.verification.verdict import Verdict
 
 
 def certify(
@@ -44,7 +44,8 @@ def certify(
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
     from hsv.cli.progress import stages
-    from hsv.design.verification.effects import certified_with, declared, declared_actuators, described
+    from hsv.design.verification.declared import declared, declared_actuators, described
+    from hsv.design.verification.verdict import certified_with
     from hsv.design.verification.verifier import load_subject
     from hsv.simulation.coverage import uncovered_of
     from hsv.simulation.scenario import load_scenario

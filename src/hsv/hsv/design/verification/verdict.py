@@ -1,0 +1,220 @@
+"""Whether a design stays certified with models of hardware and air beside the disturbances of its certificate.
+
+Actuators add states. The invariant set is sought as a design seeks its own, under all vertices, and the nominal plan of
+the certificate has to fit into what it leaves of the inputs. Whether limits of actuators act in that set is said by
+:mod:`hsv.design.verification.limits`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hsv.control.design import ControlDesign
+from hsv.design.disturbance import DisturbanceSet, widened
+from hsv.design.region import Region, incomplete_share, record
+from hsv.design.sets.ellipsoid import ellipsoid
+from hsv.design.sets.ellipsoid_set import EllipsoidSet
+from hsv.design.sets.invariant_set import TubeProblem
+from hsv.design.tightening import left_by
+from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.design.verification.claims import Subject
+from hsv.design.verification.effects import N_SCHEDULING, Measured, Model, with_models
+from hsv.design.verification.invariant_set import lag_feedback
+from hsv.design.verification.limits import Reach, reaches
+from hsv.design.verification.plan import Plan
+from hsv.errors import DesignError
+from hsv.units import to_paper
+from hsv.vehicle.actuators import ACTUATOR_SETS
+from hsv.vehicle.dynamics import (
+    INPUT_NAMES,
+    INPUT_UNITS,
+    N_RIGID,
+)
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a design is certified with some models: ``half_width`` (5) of the rigid states, ``feedback`` (2), SI.
+
+    ``room`` (2, 2): what the nominal plan leaves of each input, lower and upper side; below zero it does not fit.
+    ``reason``: why there is no set at all.
+    """
+
+    name: str
+    reason: str = ""
+    half_width: np.ndarray | None = None
+    feedback: np.ndarray | None = None
+    room: np.ndarray | None = None
+    shares: np.ndarray | None = None
+    """The room (2, 2) as a share of the input's range."""
+    start: float = 0.0
+    """Largest level at which a flight may start: x_n takes errors of the first measurement for the truth"""
+    reaches: tuple[Reach, ...] = ()
+    """Of the actuators, over the set"""
+
+    @property
+    def said(self) -> str:
+        """By how much, in words."""
+        if self.room is None or self.shares is None:
+            return self.reason
+        if self.start > 1.0:
+            return f"flights may start outside the set, at level {self.start:.3g}"
+        input, side = np.unravel_index(int(np.argmin(self.shares)), self.room.shape)
+        value, unit = to_paper(abs(float(self.room[input, side])), INPUT_UNITS[input])
+        amount = f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+        where = f"{INPUT_NAMES[input]}, {('lower', 'upper')[side]} side"
+        return f"room of {amount} ({where})" if self.certified else f"the plan lacks {amount} ({where})"
+
+    @property
+    def certified(self) -> bool:
+        """Whether the set is found and the plan fits."""
+        return self.room is not None and bool(self.room.min() > 0.0) and self.start <= 1.0
+
+    def limited(self) -> Verdict:
+        """Return the verdict on the same actuators with their limits: certified where no limit is reached."""
+        reason = "; ".join(reach.said for reach in self.reaches)
+        inactive = self.certified and all(reach.inactive for reach in self.reaches)
+        name = f"{self.name}, limits of actuators"
+        return replace(self, name=name, reason=reason) if inactive else Verdict(name, reason or self.said)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the verdict for JSON."""
+        arrays = {name: value.tolist() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        reach = [one.as_dict() for one in self.reaches]
+        numbers = {"start_level": self.start, **arrays, "actuators": reach}
+        return {"name": self.name, "certified": self.certified, "reason": self.reason, **numbers}
+
+
+def certified_with(
+    subject: Subject,
+    models: Mapping[str, Model],
+    actuators: str = "",
+    progress: Progress = lambda *_: None,
+    unbounded: Sequence[str] = (),
+) -> list[Verdict]:
+    """Return a verdict for the design as it is, with its ``actuators``, with each model alone, and with all.
+
+    Where actuators are known and all is certified without their limits, a last verdict is on these.
+
+    Args:
+        subject: The design with its certificate.
+        models: By name.
+        actuators: Names with commas between; none: those that the design knows.
+        progress: Told of every verdict.
+        unbounded: What else there is, for which no bound is known: with that nothing is certified.
+
+    Raises:
+        DesignError: Unknown actuators, two of one channel, or a design without an ellipsoid.
+    """
+    design, tube = subject.design, subject.certificate["tube"]
+    if tube["invariant_set"]["kind"] != EllipsoidSet.kind:
+        raise DesignError(
+            f"design {design.name!r}: set of kind {tube['invariant_set']['kind']!r}, expected an ellipsoid"
+        )
+    names = tuple(name.strip() for name in actuators.split(",")) if actuators else design.actuators
+    for name in names:
+        if name not in ACTUATOR_SETS:
+            raise DesignError(f"actuators = {actuators!r}: expected names from {', '.join(ACTUATOR_SETS)}")
+    if len({ACTUATOR_SETS[name].channel for name in names}) < len(names):
+        raise DesignError(f"actuators = {actuators!r}: expected at most one a channel")
+    behind = replace(design, actuators=names)
+    lag = lag_feedback(tube["tightening"])
+    if names != design.actuators:
+        lag = _lag_of_the_plan(subject, behind)
+    cases: list[tuple[str, ControlDesign, list[Model]]] = [("as certified", design, [])]
+    if names != design.actuators:
+        cases.append((f"actuators {', '.join(names)}", behind, []))
+    cases += [(name, behind, [model]) for name, model in models.items()]
+    if len(cases) > 2:
+        cases.append(("all", behind, list(models.values())))
+    verdicts = []
+    for done, (name, flown, added) in enumerate(cases):
+        progress("invariant sets", done, len(cases))
+        bounds = lag if flown.actuators else None
+        verdicts.append(verdict(name, flown, subject, added, bounds))
+    progress("invariant sets", len(cases), len(cases))
+    if verdicts[-1].reaches:
+        verdicts.append(verdicts[-1].limited())
+    return [*verdicts, *(Verdict(name, "no bound is known for its effect") for name in unbounded)]
+
+
+def _lag_of_the_plan(subject: Subject, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
+    """Return least and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as a design's."""
+    inputs = subject.inputs
+    flight = Region(subject.design, inputs, incomplete_share(inputs)).fly({})
+    feedback = channel_model(design, subject.vehicle).errors(record(flight))[1]
+    return widened(feedback.min(axis=0), feedback.max(axis=0), inputs.disturbance.inflation)
+
+
+def verdict(
+    name: str,
+    design: ControlDesign,
+    subject: Subject,
+    models: Sequence[Model] = (),
+    lag: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Verdict:
+    """Return whether ``design`` is certified with ``models`` beside the disturbances of its certificate.
+
+    Args:
+        name: Of the verdict.
+        design: That of ``subject``, with the actuators that are to be known.
+        subject: The design with its certificate.
+        models: Beside those disturbances.
+        lag: Least and largest feedback (2 each) to the lag of the plan.
+    """
+    tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
+    disturbance = DisturbanceSet.from_report(tube["disturbance"]["channels"])
+    problem = with_models(tube_problem(design, subject.vehicle, disturbance), models)
+    own = tube["invariant_set"]["contraction"]
+    others = [value for value in inputs.contraction if value != own]
+    measured = [model for model in models if isinstance(model, Measured)]
+    error = np.sum([model.error for model in measured] or [np.zeros(N_RIGID)], axis=0)
+    late = np.sum([model.late for model in measured] or [np.zeros(N_RIGID)], axis=0) > 0.0
+    best = Verdict(name, "no contraction to try")
+    for contractions in ([own], others):
+        # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
+        if not best.certified and contractions:
+            found = _with_contractions(name, design, subject, problem, contractions, lag, error, late)
+            best = max(found, best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
+    return best
+
+
+def _with_contractions(
+    name: str,
+    design: ControlDesign,
+    subject: Subject,
+    problem: TubeProblem,
+    contractions: list[float],
+    lag: tuple[np.ndarray, np.ndarray] | None,
+    error: np.ndarray,
+    late: np.ndarray,
+) -> Verdict:
+    inputs, plan = subject.inputs.invariant_set, subject.certificate["tube"]["tightening"]["plan"]
+    try:
+        found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), contractions)
+    except DesignError as failure:
+        return Verdict(name, str(failure))
+    scheduling = late & (np.arange(N_RIGID) < N_SCHEDULING)
+    if np.any(found.half_width[:N_RIGID][scheduling] > Plan.of(subject).half_width[scheduling]):
+        # Measured took them to be as far from the truth as the design's own set is wide.
+        return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
+    bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
+    room = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
+    limits = design.input_maximum - design.input_minimum
+    feedback = 0.5 * (limits - bounds.upper + bounds.lower)
+    reach = tuple(reaches(found, design, Plan.of(subject))) if design.actuators else ()
+    start = _start(found, error)
+    return Verdict(name, "", found.half_width[:N_RIGID], feedback, room, room / limits[:, None], start, reach)
+
+
+def _start(found: EllipsoidSet, error: np.ndarray) -> float:
+    """Return the largest level of the error with which a flight starts that is measured with an ``error`` (5)."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
+    return float(found.level(np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))).max())
