@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from hsv_msgs.msg import RecorderProgress, Run, VehicleState
-from rclpy.serialization import deserialize_message, serialize_message
 
 from hsv.errors import ParameterError
 from hsv.graph.description import (
@@ -39,6 +38,7 @@ from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
+from hsv_node.codec import codec
 from hsv_node.lockstep import SAID_EVERY, PeerNode
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
@@ -52,8 +52,6 @@ TOLD_EVERY = 0.2
 """Seconds of the wall clock between two lines of numbers."""
 
 _STAMP = struct.Struct("<iI")
-_FRAME_LENGTH = slice(12, 16)
-"""Where a message with a header carries the length of its frame_id, on which the places of all that follows depend."""
 
 
 class RecorderNode(PeerNode):
@@ -91,8 +89,6 @@ class RecorderNode(PeerNode):
             self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self._order = tuple(self._names[topic] for topic in recorded)
         self._state_name = self._names[STATE]
-        self._status_at: dict[bytes, int] = {}
-        """Where the state carries its status, by the length of its frame_id."""
         for topic, name in zip(recorded, self._order, strict=True):
             self.create_step_subscription(topic, partial(self._on_step_message, name), raw=True)
         for topic, kind in OTHER_TOPICS.items():
@@ -185,7 +181,10 @@ class RecorderNode(PeerNode):
             self.bag.write(topic, stamp, messages[topic])
         self._now = stamp
         self._complete = round(stamp / self._nanoseconds_per_step)
-        final = self._complete >= self._last_step or self._is_last(messages[self._state_name])
+        final = (
+            self._complete >= self._last_step
+            or codec(TOPICS[STATE]).decode(messages[self._state_name]).status != VehicleState.RUNNING
+        )
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
             # What is confirmed is on its way to the disk, whatever happens to this process.
             self.bag.flush()
@@ -200,17 +199,11 @@ class RecorderNode(PeerNode):
             return
         self._told = now
         read = {
-            topic: deserialize_message(messages[name], message_class(TOPICS[topic]))
+            topic: codec(TOPICS[topic]).decode(messages[name])
             for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR)
             if (name := self._names.get(topic)) in messages
         }
         print(Snapshot.of(read[STATE], read[NOMINAL], read.get(TUBE_STATUS), read[ACTUATOR]).line, flush=True)
-
-    def _is_last(self, state: bytes) -> bool:
-        length = state[_FRAME_LENGTH]
-        if length not in self._status_at:
-            self._status_at[length] = _status_place(state)
-        return state[self._status_at[length]] != 0
 
     def _on_other_message(self, topic: str, data: bytes) -> None:
         self.bag.write(topic, self._now, data)
@@ -222,15 +215,6 @@ class RecorderNode(PeerNode):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])
         self.bag.close()
         self.get_logger().info(f"closed the bag {self.bag.directory}: {self._complete + 1} steps")
-
-
-def _status_place(state: bytes) -> int:
-    """Return the offset at which a VehicleState as long as ``state`` carries its status."""
-    message = deserialize_message(state, VehicleState)
-    serialized = []
-    for message.status in (0, 255):
-        serialized.append(serialize_message(message))
-    return next(place for place, (a, b) in enumerate(zip(*serialized, strict=True)) if a != b)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -38,7 +38,8 @@ class ControllerNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell whether its command is limited."""
-        self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.saturated.any()))
+        if self.diagnosis_due(signals.header.stamp):
+            self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.saturated.any()))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -41,14 +41,15 @@ class NominalTrajectoryNode(BlockNode):
         status = NominalStatus(signals.nominal_status)
         failed = NominalStatus.SOLVER_FAILED in status
         fails, self._failed = failed and not self._failed, failed
-        self.diagnose(
-            signals.header.stamp,
-            "running" if status is NominalStatus.OK else str(status.name),
-            warning=fails,
-            step=signals.step,
-            gain_index=signals.gain_index,
-            step_time_p99_ms=self._times,
-        )
+        if fails or self.diagnosis_due(signals.header.stamp):
+            self.diagnose(
+                signals.header.stamp,
+                "running" if status is NominalStatus.OK else str(status.name),
+                warning=fails,
+                step=signals.step,
+                gain_index=signals.gain_index,
+                step_time_p99_ms=self._times,
+            )
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -26,7 +26,8 @@ class NotchFilterNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell that it goes on."""
-        self.diagnose(signals.header.stamp, step=signals.step)
+        if self.diagnosis_due(signals.header.stamp):
+            self.diagnose(signals.header.stamp, step=signals.step)
 
 
 def main(args: Sequence[str] | None = None) -> int:

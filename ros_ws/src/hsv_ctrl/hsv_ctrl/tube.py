@@ -42,12 +42,13 @@ class TubeNode(BlockNode):
         if left:
             time = stamp.sec + 1e-9 * stamp.nanosec
             self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
-        self.diagnose(
-            stamp,
-            result.status.name,
-            warning=left,
-            step=signals.step,
-            saturated=bool(result.saturated.any()),
-            level=result.level,
-            component=result.component,
-        )
+        if left or self.diagnosis_due(stamp):
+            self.diagnose(
+                stamp,
+                result.status.name,
+                warning=left,
+                step=signals.step,
+                saturated=bool(result.saturated.any()),
+                level=result.level,
+                component=result.component,
+            )

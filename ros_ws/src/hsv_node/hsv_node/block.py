@@ -11,8 +11,8 @@ from hsv.errors import RunError
 from hsv.graph.description import TOPICS, NodeDescription
 from hsv.graph.exchange import FILL, READ
 from hsv.simulation.blocks import Signals
+from hsv_node.codec import plain_class
 from hsv_node.lockstep import PeerNode
-from hsv_node.messages import message_class
 
 
 class BlockNode(PeerNode):
@@ -29,7 +29,7 @@ class BlockNode(PeerNode):
         self._given: dict[str, Any] = {}
         # In the order of the role: others wait for the first, and work on it while the rest is published.
         self._answers = [
-            (FILL[topic], message_class(TOPICS[topic])(), self.create_step_publisher(topic)) for topic in role.publishes
+            (FILL[topic], plain_class(TOPICS[topic])(), self.create_step_publisher(topic)) for topic in role.publishes
         ]
         delayed = self.role.delayed
         self._delays = {topic: int(topic in delayed) for topic in self.role.subscribes}
@@ -49,10 +49,13 @@ class BlockNode(PeerNode):
         given, delays = self._given, self._delays
         given[topic] = message
         step = message.step + delays[topic]
-        # Before the first step there is none.
-        due = [name for name in delays if step > 0 or not delays[name]]
-        if any(name not in given or given[name].step + delays[name] != step for name in due):
-            return
+        due = []
+        for name, delay in delays.items():
+            # Before the first step there is none.
+            if step > 0 or not delay:
+                if name not in given or given[name].step + delay != step:
+                    return
+                due.append(name)
         signals = self.signals
         for name in due:
             READ[name](given[name], signals)
@@ -63,9 +66,9 @@ class BlockNode(PeerNode):
             self.get_logger().fatal(str(error))
             self.finish(1)
             return
-        for fill, answer, publisher in self._answers:
-            fill(signals, answer, message_class)
-            publisher.publish(answer)
+        for fill, answer, publish in self._answers:
+            fill(signals, answer, plain_class)
+            publish(answer)
         self.stepped(signals)
 
     def advance(self, signals: Signals) -> None:

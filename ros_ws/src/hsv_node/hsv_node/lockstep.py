@@ -16,9 +16,11 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.errors import RunError
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv_node.codec import codec
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
@@ -87,14 +89,29 @@ class LockstepNode(ProcessNode):
                 self._links.setdefault(topic, []).append(peer)
 
     def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe a step topic of the graph description."""
-        kind = message_class(description.TOPICS[topic])
-        self._inputs[topic] = self.create_subscription(kind, topic, callback, STEP, raw=raw)
+        """Subscribe a step topic of the graph description; ``callback`` takes messages, or bytes if it is ``raw``."""
+        kind = description.TOPICS[topic]
+        decode = codec(kind).decode
 
-    def create_step_publisher(self, topic: str) -> Any:
-        """Return the publisher of a step topic of the graph description."""
-        self._outputs[topic] = self.create_publisher(message_class(description.TOPICS[topic]), topic, STEP)
-        return self._outputs[topic]
+        def take(data: bytes) -> None:
+            try:
+                message = decode(data)
+            except RunError as error:
+                # Not raised: the executor would print a traceback.
+                self.get_logger().fatal(f"{self.resolve_topic_name(topic)}: {error}")
+                self.finish(1)
+                return
+            callback(message)
+
+        taken = callback if raw else take
+        self._inputs[topic] = self.create_subscription(message_class(kind), topic, taken, STEP, raw=True)
+
+    def create_step_publisher(self, topic: str) -> Callable[[Any], None]:
+        """Return what publishes a message on a step topic of the graph description."""
+        kind = description.TOPICS[topic]
+        self._outputs[topic] = publisher = self.create_publisher(message_class(kind), topic, STEP)
+        encode, publish = codec(kind).encode, publisher.publish
+        return lambda message: publish(encode(message))
 
     def links_are_counted(self) -> bool:
         """Tell whether as many are matched as there are links, which costs next to nothing; not who they are."""
@@ -188,10 +205,12 @@ class LockstepNode(ProcessNode):
         self._changed = words
         self.get_logger().info(words)
 
+    def diagnosis_due(self, step_stamp: Any) -> bool:
+        """Tell whether a simulated second has begun since the last diagnosis."""
+        return bool(step_stamp.sec != self._diagnosed_second)
+
     def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
-        """Publish this node's diagnostics, once a simulated second and whenever there is a warning."""
-        if step_stamp.sec == self._diagnosed_second and not warning:
-            return
+        """Publish this node's diagnostics: once a simulated second, see :meth:`diagnosis_due`, and as a warning."""
         self._diagnosed_second = step_stamp.sec
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
@@ -201,7 +220,7 @@ class LockstepNode(ProcessNode):
             values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp = step_stamp
+        message.header.stamp.sec, message.header.stamp.nanosec = step_stamp.sec, step_stamp.nanosec
         self._diagnostics.publish(message)
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
@@ -314,6 +333,6 @@ def run_in_words(run: Run) -> str:
     return f"run {short_id(run)}: {run.last_step + 1} steps, {run.last_step * run.period:g} s"
 
 
-def step_in_words(state: VehicleState) -> str:
-    """Return at which time and step a state is."""
+def step_in_words(state: Any) -> str:
+    """Return at which time and step a state is, a VehicleState as rclpy or the codec makes it."""
     return f"t = {state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec:.2f} s, step {state.step}"

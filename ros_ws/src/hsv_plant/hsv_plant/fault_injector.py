@@ -84,7 +84,9 @@ class FaultInjectorNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell whether a fault acts."""
-        self.diagnose(signals.header.stamp, "faults act" if signals.active_faults else "no fault", step=signals.step)
+        if self.diagnosis_due(signals.header.stamp):
+            said = "faults act" if signals.active_faults else "no fault"
+            self.diagnose(signals.header.stamp, said, step=signals.step)
 
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:

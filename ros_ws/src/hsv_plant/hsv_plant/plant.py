@@ -7,9 +7,10 @@ import signal
 import time
 import uuid
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from hsv_msgs.msg import Actuator, Ready, RecorderProgress, Run, VehicleState
+from hsv_msgs.msg import Ready, RecorderProgress, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
@@ -36,9 +37,9 @@ from hsv.graph.progress import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.plant import FlightStatus, Plant
+from hsv_node.codec import codec, plain_class
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
-from hsv_node.messages import message_class
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
 from hsv_plant.liveness import unresponsive
@@ -66,8 +67,8 @@ class PlantNode(LockstepNode):
         self._foreign_controller = ""
         """Full name of the controller where it is a node that is not of this bench."""
         self._ready: set[str] = set()
-        messages = {topic: message_class(TOPICS[topic])() for topic in PLANT.publishes}
-        self._state_message: VehicleState = messages[STATE]
+        messages = {topic: plain_class(TOPICS[topic])() for topic in PLANT.publishes}
+        self._state_message = messages[STATE]
         # The measurement first: the other nodes work on it while the rest is published.
         self._answers = [
             (FILL[topic], message, self.create_step_publisher(topic)) for topic, message in messages.items()
@@ -120,7 +121,7 @@ class PlantNode(LockstepNode):
         self._messages += 1
         self._continue()
 
-    def _on_actuator(self, message: Actuator) -> None:
+    def _on_actuator(self, message: Any) -> None:
         signals = self._signals
         if not self._started or message.step != signals.step:
             self.say_foreign(ACTUATOR, message.step, signals.step)
@@ -169,13 +170,14 @@ class PlantNode(LockstepNode):
 
     def _publish(self) -> None:
         signals = self._signals
-        for fill, message, publisher in self._answers:
-            fill(signals, message, message_class)
-            publisher.publish(message)
+        for fill, message, publish in self._answers:
+            fill(signals, message, plain_class)
+            publish(message)
         status = FlightStatus(signals.status)
         if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
             print(f"step {signals.step} of {self.plant.steps}", flush=True)
-        self.diagnose(self._state_message.header.stamp, step=signals.step, status=status.name)
+        if self.diagnosis_due(stamp := self._state_message.header.stamp):
+            self.diagnose(stamp, step=signals.step, status=status.name)
 
     def poll(self) -> None:
         """Start when everybody is ready, keep the pace, and name whoever is silent for too long."""
@@ -218,7 +220,7 @@ class PlantNode(LockstepNode):
                 self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
             case FlightStatus.FINISHED:
                 self.get_logger().info(f"{run} finished at {where}")
-        self._last_state.publish(self._state_message)
+        self._last_state.publish(codec(TOPICS[STATE]).encode(self._state_message))
         self._last_state.wait_for_all_acked(Duration(seconds=LAST_WORDS))
 
     def _try_start(self) -> None:
