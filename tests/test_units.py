@@ -1,4 +1,6 @@
 import math
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,16 @@ from hypothesis import strategies as st
 from hsv.cli.output import UNIT_KEYS
 from hsv.errors import QuantityError
 from hsv.simulation.metrics import METRICS
-from hsv.units import PAPER_UNITS, factor, parse_quantity, percent, rounded, to_paper
+from hsv.units import (
+    PAPER_UNITS,
+    _known,
+    factor,
+    parse_quantity,
+    percent,
+    rounded,
+    square_by_pint,
+    to_paper,
+)
 from hsv.vehicle.dynamics import INPUT_UNITS, STATE_UNITS
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -121,3 +132,25 @@ def test_a_share_in_percent_loses_no_digit(share):
 @pytest.mark.parametrize(("share", "text"), [(0.05, "5 %"), (-0.1, "-10 %"), (1e-9, "0.0000001 %"), (0.0, "0 %")])
 def test_percent_as_people_write_it(share, text):
     assert percent(share) == text
+
+
+def test_known_units_are_those_of_the_units_library():
+    assert {unit: square_by_pint(unit) for unit in _known()} == _known()
+
+
+def test_shipped_scenarios_need_no_units_library():
+    script = """
+import sys
+from hsv.simulation.scenario import load_scenario, scenario_names
+for name in scenario_names():
+    load_scenario(name)
+sys.exit("pint" in sys.modules)
+"""
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("3 ft / s", "m/s"), ("3 ft  /s", "m/s"), ("3 ft/s", "m/s"), ("3 foot/second", "m/s")]
+)
+def test_spaces_and_long_names_make_no_difference(text, unit):
+    assert parse_quantity(text, unit, "field") == 0.9144

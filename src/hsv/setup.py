@@ -8,6 +8,7 @@ setup(
         "hsv": [
             "py.typed",
             "**/*.toml",
+            "known_units.json",
             "bench/*.c",
             "campaign/template/*",
             "control/include/*.h",

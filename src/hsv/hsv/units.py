@@ -6,6 +6,7 @@ numbers on every machine and under every version of the units library.
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Sequence
@@ -13,7 +14,8 @@ from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING, Any
+from importlib import resources
+from typing import TYPE_CHECKING
 
 from hsv.errors import QuantityError
 
@@ -64,7 +66,7 @@ _ROOT_BITS = 80
 
 @cache
 def registry() -> pint.UnitRegistry:
-    """Return the one unit registry, whose factors are fractions (built on first use: it takes a while)."""
+    """Return the registry of units, whose factors are fractions; made for a unit that is not known: it takes long."""
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
@@ -128,16 +130,12 @@ def significant(value: float, digits: int = 3) -> str:
 
 def si_unit_of(text: object) -> str:
     """Return the SI unit of what a quantity is written in, ``"1"`` where there is no unit or no such quantity."""
-    import pint
-
     try:
-        unit = _number_and_unit(text)[1] if isinstance(text, str) else ""
-        base = registry().Quantity(Fraction(1), unit).to_base_units()._units
-    except (ValueError, pint.UndefinedUnitError):
+        base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
+    except ValueError:
         return "1"
-    powers = {registry().get_symbol(name): float(exponent) for name, exponent in base.items()}  # type: ignore[arg-type]
     factors, divisors = (
-        [name + (f"^{abs(e):g}" if abs(e) != 1.0 else "") for name, e in powers.items() if sign * e > 0.0]
+        [name + (f"^{abs(power) / 2:g}" if abs(power) != 2 else "") for name, power in base if sign * power > 0]
         for sign in (1, -1)
     )
     return "/".join((" ".join(factors) or "1", *divisors))
@@ -181,8 +179,6 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Angles are
             no bare numbers, nor frequencies angular frequencies: "15 Hz" is refused where rad/s are due.
     """
-    import pint
-
     expected = f"expected a finite quantity such as {_EXAMPLES.get(unit, f'1.0 {unit}')!r}"
     if isinstance(text, bool) or not isinstance(text, str | int | float):
         raise QuantityError(f"{field} = {text!r}: {expected}")
@@ -204,7 +200,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
         raise
     except OverflowError as error:
         raise QuantityError(f"{field} = {text!r}: {expected}") from error
-    except pint.UndefinedUnitError as error:
+    except _UnknownUnitError as error:
         raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
     except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
         raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
@@ -222,25 +218,54 @@ def _number_and_unit(text: str) -> tuple[Fraction, str]:
     found = _QUANTITY.fullmatch(text.strip())
     if not found:
         raise ValueError(f"{text!r}: expected a number and a unit")
-    unit = (found["unit"] or "").replace("%", "percent")
+    unit = re.sub(r"\s*([*/^ ])\s*", r"\1", found["unit"] or "").replace("%", "percent")
     return Fraction(found["number"]), f"1{unit}" if unit.startswith("/") else unit
 
 
-@cache
-def _squared(unit: str) -> tuple[Fraction, Any]:
-    """Return the square of the factor from ``unit`` to base units, a fraction, and the base units of the square.
+class _UnknownUnitError(ValueError):
+    """There is no such unit."""
 
-    The literature gives elastic modes in roots of a mass: squares have whole exponents.
+
+Square = tuple[Fraction, tuple[tuple[str, int], ...]]
+"""Square of the factor from a unit to base units, and the base units of the square by symbol, with their exponents.
+
+The literature gives elastic modes in roots of a mass: squares have whole exponents.
+"""
+
+
+@cache
+def _squared(unit: str) -> Square:
+    known = _known()
+    return known[unit] if unit in known else square_by_pint(unit)
+
+
+@cache
+def _known() -> dict[str, Square]:
+    """Return the units that scenarios and tables are written in: to import pint takes longer than a flight."""
+    rows = json.loads((resources.files("hsv") / "known_units.json").read_text(encoding="utf-8"))
+    return {unit: (Fraction(factor), tuple(map(tuple, base))) for unit, (factor, base) in rows.items()}
+
+
+def square_by_pint(unit: str) -> Square:
+    """Return what the units library says of the square of ``unit``.
+
+    Raises:
+        ValueError: It knows no such unit, or its exponents are neither whole nor halves.
     """
-    from pint.util import UnitsContainer
+    import pint
 
     square = {}
-    for name, exponent in registry().parse_units("" if unit == "1" else unit)._units.items():
+    try:
+        units = registry().parse_units("" if unit == "1" else unit)._units
+    except pint.UndefinedUnitError as error:
+        raise _UnknownUnitError(str(error)) from None
+    for name, exponent in units.items():
         square[name] = round(2 * float(exponent))  # type: ignore[arg-type]
         if square[name] != 2 * exponent:
             raise ValueError(f"{unit!r}: expected exponents that are whole or halves")
-    base = registry().Quantity(Fraction(1), UnitsContainer(square)).to_base_units()
-    return Fraction(base.magnitude), base._units
+    base = registry().Quantity(Fraction(1), pint.util.UnitsContainer(square)).to_base_units()
+    exponents = {registry().get_symbol(name): int(exponent) for name, exponent in base._units.items()}  # type: ignore[arg-type]
+    return Fraction(base.magnitude), tuple(sorted(exponents.items()))
 
 
 def _scaled(number: Fraction, square: Fraction) -> float:
