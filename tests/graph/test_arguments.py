@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from marking import long
 from node_processes import Processes
 
 pytestmark = pytest.mark.graph
@@ -24,29 +25,31 @@ COMPOSED, RECORDER = ("hsv_bringup", "composed"), ("hsv_bringup", "recorder")
     ("node", "arguments", "words"),
     [
         (PLANT, "-p nosuch:=1", ["parameter nosuch", "plant has none", "nearest is"]),
-        (PLANT, "-p durations:=200.0", ["parameter durations", "nearest is duration"]),
+        long(PLANT, "-p durations:=200.0", ["parameter durations", "nearest is duration"]),
         (PLANT, "-p duration:=200", ["duration = 200", "expected double", "(write 200.0)"]),
         (PLANT, "-p bag.directory:=here", ["parameter bag.directory", "recorder has"]),
-        (TUBE_MPC, "-p feedback.tau:=[1]", ["feedback.tau = [1]", "expected double array", "(write [1.0])"]),
+        long(TUBE_MPC, "-p feedback.tau:=[1]", ["feedback.tau = [1]", "expected double array", "(write [1.0])"]),
         (TUBE_MPC, "--params-file own.yaml", ["parameter duration", "plant has"]),
-        (TUBE_MPC, "-r __ns:=/veh1 --params-file full.yaml", ["feedback.tua", "nearest is feedback.tau"]),
-        (TUBE_MPC, "--params-file all.yaml", ["feedback.tua", "nearest is feedback.tau"]),
+        long(TUBE_MPC, "-r __ns:=/veh1 --params-file full.yaml", ["feedback.tua", "nearest is feedback.tau"]),
+        long(TUBE_MPC, "--params-file all.yaml", ["feedback.tua", "nearest is feedback.tau"]),
         (TUBE_MPC, "--params-file broken.yaml", ["broken.yaml"]),
         (COMPOSED, "-p nosuch:=1", ["parameter nosuch"]),
-        (COMPOSED, "-r __node:=x", ["__node:=x", "expected NODE:__node:=x"]),
-        (RECORDER, "-p bag.attachments:=[1]", ["bag.attachments = [1]", "expected string array"]),
-        (PLANT, "-p use_sim_time:=true", ["use_sim_time", "makes the clock itself"]),
+        long(COMPOSED, "-r __node:=x", ["__node:=x", "expected NODE:__node:=x"]),
+        long(RECORDER, "-p bag.attachments:=[1]", ["bag.attachments = [1]", "expected string array"]),
+        long(PLANT, "-p use_sim_time:=true", ["use_sim_time", "makes the clock itself"]),
         (PLANT, "-r __ns:=//veh", ["namespace = '//veh'", "/veh1"]),
-        (PLANT, "-r __ns:=veh1", ["__ns:=veh1", "leading slash"]),
-        (PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
-        (PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
-        (TUBE_MPC, "-p controller:=robust_mpc", ["controller = 'robust_mpc'", "expected tube_mpc"]),
-        (PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, stiffened"]),
-        (PLANT, "-p vehicle.coupling:=strong", ["vehicle.coupling = 'strong'", "expected one of paper_like, derived"]),
-        (PLANT, "-r hsv/state", ["'-r hsv/state'"]),
-        (PLANT, "-p duration", ["'-p duration'"]),
-        (PLANT, "--nosuch", ["unknown ROS arguments", "--nosuch"]),
-        (PLANT, "--log-level nosuch", ["'--log-level nosuch'"]),
+        long(PLANT, "-r __ns:=veh1", ["__ns:=veh1", "leading slash"]),
+        long(PLANT, "-r __node:=9x", ["__node:=9x", "no digit first"]),
+        long(PLANT, "-p controller:=nosuch", ["controller = 'nosuch'", "expected one of robust_mpc, tube_mpc"]),
+        long(TUBE_MPC, "-p controller:=robust_mpc", ["controller = 'robust_mpc'", "expected tube_mpc"]),
+        long(PLANT, "-p vehicle.name:=nosuch", ["vehicle 'nosuch'", "expected one of parker, stiffened"]),
+        long(
+            PLANT, "-p vehicle.coupling:=strong", ["vehicle.coupling = 'strong'", "expected one of paper_like, derived"]
+        ),
+        long(PLANT, "-r hsv/state", ["'-r hsv/state'"]),
+        long(PLANT, "-p duration", ["'-p duration'"]),
+        long(PLANT, "--nosuch", ["unknown ROS arguments", "--nosuch"]),
+        long(PLANT, "--log-level nosuch", ["'--log-level nosuch'"]),
         (PLANT, "-- duration=10", ["argument 'duration=10'"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

@@ -10,6 +10,7 @@ import time
 
 import pytest
 from injected_fault import LONG, inject_and_land, last_line
+from marking import long
 from node_processes import Processes, recorded_steps
 from ros_domain import own_domain
 from waiting import exit_code_of, output_of, used, wait_until
@@ -93,18 +94,18 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     ("words", "code", "expected"),
     [
         (("fault", "list"), 1, "hsv fault: error: no run in ROS_DOMAIN_ID="),
-        (("topic",), 1, "hsv topic: error: no node of the graph in ROS_DOMAIN_ID="),
+        long(("topic",), 1, "hsv topic: error: no node of the graph in ROS_DOMAIN_ID="),
         (
             ("set", "tua", "0.8"),
             2,
             "hsv set: error: name = 'tua': expected a parameter that may change in flight, feedback.tau",
         ),
-        (("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
+        long(("set", "tau", "0.8 m"), 2, "feedback.tau = '0.8 m': wrong unit"),
         (("topic", "--every", "0"), 2, "--every"),
-        (("topic", "bad name"), 2, "hsv topic: error: name = 'bad name': expected the name of a topic"),
+        long(("topic", "bad name"), 2, "hsv topic: error: name = 'bad name': expected the name of a topic"),
         (("topic", "/hsv//state"), 2, "(topic name must not contain repeated '/')"),
-        (("topic", "hsv/9x"), 2, "(topic name token must not start with a number)"),
-        (("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
+        long(("topic", "hsv/9x"), 2, "(topic name token must not start with a number)"),
+        long(("fault", "list", "--namespace", "a b"), 2, "namespace = 'a b'"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
@@ -113,8 +114,10 @@ def test_commands_refuse_in_one_line(processes: Processes, words: tuple[str, ...
     assert done.returncode == code and expected in last_line(done), done.stdout
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("after", [0.2, 2.0])
+@pytest.mark.parametrize(
+    ("number", "after"),
+    [(signal.SIGINT, 0.2), (signal.SIGTERM, 2.0), long(signal.SIGINT, 2.0), long(signal.SIGTERM, 0.2)],
+)
 def test_a_command_is_interrupted_in_one_line(processes: Processes, number: int, after: float) -> None:
     # However early it comes: on a fast machine 2 s is in the middle of the waiting, on a slow one in the imports.
     # Somebody is there and silent, or the command might end by itself before it has used so much.
@@ -189,7 +192,7 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
             ["-p", "initial.altitude:=30000.0"],
             ["initial.altitude = 30000.0", "25908 to 26365.2 m"],
         ),
-        (
+        long(
             "hsv_plant",
             "plant",
             ["-p", "vehicle.coupling:=strong"],
@@ -202,17 +205,19 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
             ["fault."],
         ),
         ("hsv_ctrl", "tube_mpc", ["-p", "feedback.gain:=[1.0, 2.0]"], ["feedback.gain", "2 values, expected 18"]),
-        ("hsv_ctrl", "tube_mpc", ["-p", "input.minimum:=[.nan, 0.0]"], ["input.minimum[0] = nan"]),
+        long("hsv_ctrl", "tube_mpc", ["-p", "input.minimum:=[.nan, 0.0]"], ["input.minimum[0] = nan"]),
         (
             "hsv_ctrl",
             "tube_mpc",
             ["-p", "tube.centre:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"],
             ["design 'baseline': claim fails: tube.centre["],
         ),
-        ("hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]),
+        long(
+            "hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]
+        ),
         ("hsv_ctrl", "nominal_trajectory", ["-p", "reference.velocities:=[1.0]"], ["reference.velocities[0] = 1.0"]),
-        ("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),
-        ("hsv_bringup", "recorder", ["-p", "bag.attachments:=[nowhere.txt]"], ["bag.attachments = 'nowhere.txt'"]),
+        long("hsv_ctrl", "nominal_trajectory", ["--params-file", "missing.yaml"], ["missing.yaml"]),
+        long("hsv_bringup", "recorder", ["-p", "bag.attachments:=[nowhere.txt]"], ["bag.attachments = 'nowhere.txt'"]),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(

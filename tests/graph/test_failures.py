@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
+from marking import long
 from node_processes import Processes, children, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
@@ -80,7 +81,7 @@ def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes
     assert recorded_steps(bag) >= ON_DISK
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize("number", [signal.SIGINT, long(signal.SIGTERM)])
 def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int) -> None:
     bag, temporary = processes.folder / "interrupted", processes.folder / "temporary"
     temporary.mkdir()
@@ -129,7 +130,7 @@ def test_nodes_do_not_outlive_a_killed_launcher(processes: Processes) -> None:
     wait_until(lambda: not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()), nodes.values())
 
 
-@pytest.mark.parametrize("name", ["notch_filter", pytest.param("plant", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["notch_filter", long("plant")])
 def test_a_hung_node_is_named_and_ends_the_run(processes: Processes, name: str) -> None:
     bag = processes.folder / "hung"
     # Longer than it takes to call a process hung: that is said before.

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from flown_bags import flown_bag
 from injected_fault import last_line
+from marking import long
 from node_processes import Processes
 from ros_domain import own_environment
 from waiting import exit_code_of, output_of, wait_until
@@ -71,7 +72,7 @@ def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
 
 @pytest.mark.parametrize(
     ("example", "place"),
-    [pytest.param("lqr", "hsv_lqr:Lqr", marks=pytest.mark.long), ("compiled", "hsv_scheduled:Scheduled")],
+    [long("lqr", "hsv_lqr:Lqr"), ("compiled", "hsv_scheduled:Scheduled")],
 )
 def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: str, place: str) -> None:
     path = scenario(processes.folder, example, f'controller = "{place}"')
@@ -117,8 +118,8 @@ def test_a_node_flies_started_by_the_bench_or_by_hand_for_many_runs(processes: P
     ("how", "words"),
     [
         ("killed", "; no answer from /regulator\n"),
-        ("hung", "; no answer from /regulator\n"),
-        (
+        long("hung", "; no answer from /regulator\n"),
+        long(
             "wrong_step",
             f"/regulator answered step {WRONG_STEP - 1} at 2.00 s on /hsv/command, expected step {WRONG_STEP}",
         ),
@@ -142,8 +143,8 @@ def test_a_node_that_goes_wrong_is_named_and_the_bag_is_whole(processes: Process
     [
         ('controller = "node:hsv_example_node"', "expected node:package/executable, or node: alone"),
         ('controller = "node:nowhere/regulator"', "no executable regulator of package nowhere"),
-        ('controller = "hsv_lqr:Nothing"', "cannot be loaded, AttributeError"),
-        ("[regulator]\ngain = 1.0", "regulator: unknown table, expected none: a node brings its own parameters"),
+        long('controller = "hsv_lqr:Nothing"', "cannot be loaded, AttributeError"),
+        long("[regulator]\ngain = 1.0", "regulator: unknown table, expected none: a node brings its own parameters"),
     ],
 )
 def test_what_cannot_fly_is_refused_in_a_line(processes: Processes, more: str, words: str) -> None:
