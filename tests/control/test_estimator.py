@@ -99,7 +99,7 @@ def test_it_is_a_function_of_what_it_is_given(estimator):
 @pytest.mark.parametrize(
     ("values", "noise", "message"),
     [
-        ({}, np.zeros(9), "estimator.noise.altitude = 0: expected above 0, its sensor has no noise"),
+        ({}, np.zeros(9), "estimator.enabled = true: no noise of altitude, velocity, angle_of_attack, "),
         ({"estimator.noise.pitch_rate": -1.0}, np.ones(9), "estimator.noise.pitch_rate = -1.0: expected"),
         ({"estimator.process.altitude": 0.0}, np.ones(9), "estimator.process.altitude = 0.0: expected"),
     ],

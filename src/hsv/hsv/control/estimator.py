@@ -18,7 +18,12 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
-from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS, NOISE_PARAMETERS, PROCESS_PARAMETERS
+from hsv.control.estimator_parameters import (
+    ESTIMATOR_ENABLED,
+    ESTIMATOR_PARAMETERS,
+    NOISE_PARAMETERS,
+    PROCESS_PARAMETERS,
+)
 from hsv.elimination import solve
 from hsv.errors import DesignError, ParameterError
 from hsv.parameters import check_all
@@ -69,9 +74,12 @@ def estimator_data(
     """
     v = check_all(ESTIMATOR_PARAMETERS, values)
     deviations = np.array([v[p.name] or sensed for p, sensed in zip(NOISE_PARAMETERS, noise[:N_RIGID], strict=True)])
-    for parameter, deviation in zip(NOISE_PARAMETERS, deviations, strict=True):
-        if not deviation > 0.0:
-            raise ParameterError(f"parameter {parameter.name} = 0: expected above 0, its sensor has no noise")
+    lacking = [name for name, deviation in zip(STATE_NAMES[:N_RIGID], deviations, strict=True) if not deviation > 0.0]
+    if lacking:
+        raise ParameterError(
+            f"parameter {ESTIMATOR_ENABLED.name} = true: no noise of {', '.join(lacking)}, expected estimator.noise "
+            "of each, or sensors with noise, such as sensors.set = 'fine'"
+        )
     process = np.array([v[p.name] for p in PROCESS_PARAMETERS])
     A, B = jacobian(start.state, start.input, vehicle)
     gain, iterations = steady_gain(A, B, period, process * np.sqrt(period), deviations)
