@@ -27,7 +27,8 @@ _EVERY = 8
 """Of the screening corners, each so many-th is flown: two and their mirror images."""
 
 BISECTION = 5
-"""Flights in which the largest severity survived is typically found, of which an estimate is made."""
+"""Flights that the bisection of a case is expected to take, beside those with its severities. The estimate of a
+campaign's time alone counts with it: the bisection itself ends where its resolution is reached."""
 
 
 @dataclass(frozen=True)
