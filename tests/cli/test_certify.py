@@ -47,7 +47,7 @@ def test_the_sensors_of_a_scenario_are_added_and_what_is_not_covered_is_named(hs
         (("--reach", "9"), "reach = 9: expected more than 0, up to 8.572, beyond which no noise is"),
         (("--scenario", "nowhere"), "scenario 'nowhere': expected a path or one of case1, "),
         (("--density", "2 ft"), "density = '2 ft': wrong unit"),
-        (("--actuators", "servo"), "actuators = 'servo': expected names from elevator_50, "),
+        (("--actuators", "servo"), "actuators = 'servo': expected ideal, or names from elevator_50, "),
         (("--actuators", "elevator_50,elevator_20"), "actuators = 'elevator_50,elevator_20': expected at most one a"),
     ],
 )

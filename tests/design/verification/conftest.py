@@ -1,9 +1,12 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.plan import Plan
+from hsv.design.verification.verifier import load_subject
 
 
 @pytest.fixture(scope="session")
@@ -14,3 +17,8 @@ def problem(subject):
 @pytest.fixture(scope="session")
 def plan(subject):
     return Plan.of(subject)
+
+
+@pytest.fixture(scope="session")
+def realistic():
+    return load_subject(Path(__file__).parents[3] / "offline_design" / "realistic.yaml")

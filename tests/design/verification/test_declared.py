@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.design.verification.declared import REACH, declared, described, sensors
+from hsv.design.verification.declared import REACH, declared, declared_actuators, described, sensors
 from hsv.design.verification.plan import Plan
 from hsv.sensors import sensor_data
 from hsv.simulation.assembly import assemble_flight
@@ -67,6 +67,11 @@ def test_what_has_no_bound_is_said(subject):
 )
 def test_links_and_actuators_of_ones_own_have_no_bound(subject, change, named):
     assert declared(subject, load_scenario("case1", change)) == ({}, [named])
+
+
+def test_a_scenario_without_actuators_flies_ideal_ones():
+    assert declared_actuators(load_scenario("case1")) == "ideal"
+    assert declared_actuators(load_scenario("case1_realistic")) == "fuel_10,elevator_50"
 
 
 def test_air_of_a_scenario_counts_with_its_reach(problem, subject):

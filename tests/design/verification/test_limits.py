@@ -1,7 +1,4 @@
-from pathlib import Path
-
 import numpy as np
-import pytest
 from scipy.linalg import expm
 
 from hsv.design.tube_problem import known_actuators
@@ -9,16 +6,10 @@ from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.design.verification.verdict import Verdict
-from hsv.design.verification.verifier import load_subject
 from hsv.lpv.actuated import actuator_system
 from hsv.vehicle.actuators import SUBSTEPS
 from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.trim import trim
-
-
-@pytest.fixture(scope="module")
-def realistic():
-    return load_subject(Path(__file__).parents[3] / "offline_design" / "realistic.yaml")
 
 
 def test_no_error_in_the_set_moves_actuators_farther_or_faster(realistic):

@@ -22,7 +22,11 @@ def certify(
         list[str], typer.Option(help="Constant bias of a rigid state, as 'angle_of_attack=0.05 deg'; may be repeated.")
     ] = [],  # noqa: B006
     actuators: Annotated[
-        str, typer.Option(help="Published actuators by name, with commas between; default: those the design knows.")
+        str,
+        typer.Option(
+            help="Published actuators by name, with commas between, or ideal; "
+            "default: the scenario's, without a scenario those the design knows."
+        ),
     ] = "",
     gust: Annotated[str, typer.Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
     turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",

@@ -29,7 +29,7 @@ from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.errors import DesignError
 from hsv.units import to_paper
-from hsv.vehicle.actuators import ACTUATOR_SETS
+from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
 from hsv.vehicle.dynamics import (
     INPUT_NAMES,
     INPUT_UNITS,
@@ -37,6 +37,9 @@ from hsv.vehicle.dynamics import (
 )
 
 Progress = Callable[[str, int, int], None]
+
+Lag = tuple[np.ndarray, np.ndarray] | None
+"""Least and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +109,7 @@ def certified_with(
     Args:
         subject: The design with its certificate.
         models: By name.
-        actuators: Names with commas between; none: those that the design knows.
+        actuators: Names with commas between, or "ideal"; empty: those that the design knows.
         progress: Told of every verdict.
         unbounded: What else there is, for which no bound is known: with that nothing is certified.
 
@@ -118,31 +121,42 @@ def certified_with(
         raise DesignError(
             f"design {design.name!r}: set of kind {tube['invariant_set']['kind']!r}, expected an ellipsoid"
         )
-    names = tuple(name.strip() for name in actuators.split(",")) if actuators else design.actuators
-    for name in names:
-        if name not in ACTUATOR_SETS:
-            raise DesignError(f"actuators = {actuators!r}: expected names from {', '.join(ACTUATOR_SETS)}")
-    if len({ACTUATOR_SETS[name].channel for name in names}) < len(names):
-        raise DesignError(f"actuators = {actuators!r}: expected at most one a channel")
-    behind = replace(design, actuators=names)
+    names = _named(actuators) if actuators else design.actuators
     lag = lag_feedback(tube["tightening"])
-    if names != design.actuators:
-        lag = _lag_of_the_plan(subject, behind)
-    cases: list[tuple[str, ControlDesign, list[Model]]] = [("as certified", design, [])]
-    if names != design.actuators:
-        cases.append((f"actuators {', '.join(names)}", behind, []))
-    cases += [(name, behind, [model]) for name, model in models.items()]
-    if len(cases) > 2:
-        cases.append(("all", behind, list(models.values())))
+    cases: list[tuple[str, ControlDesign, list[Model], Lag]] = [("as certified", design, [], lag)]
+    behind = design
+    if set(names) != set(design.actuators):
+        behind = replace(design, actuators=names)
+        lag = _lag_of_the_plan(subject, behind) if names else None
+        cases.append((f"actuators {', '.join(names)}" if names else "ideal actuators", behind, [], lag))
+    cases += [(name, behind, [model], lag) for name, model in models.items()]
+    if len(models) > 1:
+        cases.append(("all", behind, list(models.values()), lag))
     verdicts = []
-    for done, (name, flown, added) in enumerate(cases):
+    for done, (name, flown, added, bounds) in enumerate(cases):
         progress("invariant sets", done, len(cases))
-        bounds = lag if flown.actuators else None
         verdicts.append(verdict(name, flown, subject, added, bounds))
     progress("invariant sets", len(cases), len(cases))
     if verdicts[-1].reaches:
         verdicts.append(verdicts[-1].limited())
     return [*verdicts, *(Verdict(name, "no bound is known for its effect") for name in unbounded)]
+
+
+def _named(actuators: str) -> tuple[str, ...]:
+    """Return the names in a text of ``actuators``, none of ideal ones.
+
+    Raises:
+        DesignError: Unknown actuators, or two of one channel.
+    """
+    if actuators.strip() == IDEAL:
+        return ()
+    names = tuple(name.strip() for name in actuators.split(","))
+    for name in names:
+        if name not in ACTUATOR_SETS:
+            raise DesignError(f"actuators = {actuators!r}: expected {IDEAL}, or names from {', '.join(ACTUATOR_SETS)}")
+    if len({ACTUATOR_SETS[name].channel for name in names}) < len(names):
+        raise DesignError(f"actuators = {actuators!r}: expected at most one a channel")
+    return names
 
 
 def _lag_of_the_plan(subject: Subject, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
@@ -158,7 +172,7 @@ def verdict(
     design: ControlDesign,
     subject: Subject,
     models: Sequence[Model] = (),
-    lag: tuple[np.ndarray, np.ndarray] | None = None,
+    lag: Lag = None,
 ) -> Verdict:
     """Return whether ``design`` is certified with ``models`` beside the disturbances of its certificate.
 
@@ -167,7 +181,7 @@ def verdict(
         design: That of ``subject``, with the actuators that are to be known.
         subject: The design with its certificate.
         models: Beside those disturbances.
-        lag: Least and largest feedback (2 each) to the lag of the plan.
+        lag: Of the plan.
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
     disturbance = DisturbanceSet.from_report(tube["disturbance"]["channels"])
@@ -192,7 +206,7 @@ def _with_contractions(
     subject: Subject,
     problem: TubeProblem,
     contractions: list[float],
-    lag: tuple[np.ndarray, np.ndarray] | None,
+    lag: Lag,
     error: np.ndarray,
     late: np.ndarray,
 ) -> Verdict:
