@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from hsv.errors import ParameterError
 from hsv.faults.laws import fault_memory, fault_rows
 from hsv.faults.table import SENSOR, Fault
-from hsv.sensors import AGE, SENSOR_PARAMETERS, SENSOR_SETS, measure, sensor_data, sensor_state
+from hsv.sensors import SENSOR_PARAMETERS, SENSOR_SETS, measure, sensor_data, sensor_state
 from hsv.vehicle.dynamics import STATE_NAMES
 from hsv.vehicle.envelope import FOOT
 
@@ -104,13 +104,8 @@ def test_lost_samples_are_held():
     assert_array_equal(result, STATES[last, Q])
 
 
-def test_age_counts_the_samples_that_were_lost():
-    data, state = sensor_data({"sensors.pitch_rate.drop_out": [1.0]}, T), sensor_state()
-    rows = fault_rows([SENSOR], [], T)
-    memory, out = fault_memory(rows), np.empty(9)
-    for k in range(5):
-        measure(data, state, rows, memory, k, 0, STATES[k], out)
-    assert state[Q, AGE] == 4.0 and out[Q] == STATES[0, Q]
+def test_a_sensor_that_loses_all_samples_holds_the_first():
+    assert_array_equal(of_pitch_rate(drop_out=1.0), STATES[0, Q])
 
 
 def test_quantisation_rounds_to_the_nearest_step():

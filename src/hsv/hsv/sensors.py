@@ -129,10 +129,9 @@ SENSOR_PARAMETERS = (
 )
 """Empty: as the set has it."""
 
-LAGGED, DRIFT, WALK, BIAS, SCALE, HELD, AGE, GIVEN, QUEUE = range(9)
+LAGGED, DRIFT, WALK, BIAS, SCALE, HELD, GIVEN, QUEUE = range(8)
 """Columns of the state: the lagged signal; the Gauss-Markov bias and the random walk; bias and scale that were drawn;
-the last sample that was not lost and its age in steps; the last measurement; from the last one on, samples on their
-way."""
+the last sample that was not lost; the last measurement; from the last one on, samples on their way."""
 
 SENSOR_STATE = QUEUE + LONGEST_LATENCY + 1
 """Numbers in the state of a channel."""
@@ -322,9 +321,7 @@ def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: floa
     if data.drop_out[i] > 0.0 and step > 0:
         drawn, _ = uniforms(seed, step, _DROP_OUT + i)
         if drawn < data.drop_out[i]:
-            state[i, AGE] += 1.0
             return state[i, HELD]
-        state[i, AGE] = 0.0
     if data.quantum[i] > 0.0:
         value = data.quantum[i] * float(math.floor(value / data.quantum[i] + 0.5))
     state[i, HELD] = min(max(value, data.minimum[i]), data.maximum[i])
