@@ -147,8 +147,8 @@ def test_each_link_has_draws_of_its_own():
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("delay", 0.5, "link.command.delay = 0.5: expected a whole number"),
-        ("jitter", 1.5, "link.command.jitter = 1.5: expected a whole number"),
+        ("delay", 0.5, "link.command.delay = 0.5: expected double from 0 to 50, whole"),
+        ("jitter", 1.5, "link.command.jitter = 1.5: expected double from 0 to 50, whole"),
         ("burst", 0.5, "link.command.burst = 0.5: expected 0, or at least 1"),
         ("loss", 1.5, "link.command.loss = 1.5: expected double from 0 to 1"),
         ("corruption", math.nan, "link.command.corruption = nan: expected double from 0 to 1"),

@@ -187,8 +187,18 @@ def test_fault_of_noise_and_drop_out():
         ({"sensors.set": "good"}, "sensors.set = 'good': expected one of ideal, fine, ghv"),
         ({"sensors.pitch_rate.noise": [-1.0]}, r"sensors.pitch_rate.noise\[0\] = -1.0: expected"),
         ({"sensors.pitch_rate.noise": [1.0, 2.0]}, "sensors.pitch_rate.noise: 2 values, expected one"),
-        ({"sensors.altitude.latency": [1.5]}, "sensors.altitude.latency = 1.5: expected a whole number"),
-        ({"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]}, "minimum = 2.0: expected less than"),
+        (
+            {"sensors.altitude.latency": [1.5]},
+            r"altitude.latency\[0\] = 1.5: expected double array from 0 to 50, whole",
+        ),
+        (
+            {"sensors.pitch_angle.minimum": [np.radians(25.0)], "sensors.pitch_angle.maximum": [np.radians(20.0)]},
+            "minimum = 25 deg: expected less than maximum, 20 deg",
+        ),
+        (
+            {"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]},
+            "minimum = 2 m: expected less than maximum, 1 m",
+        ),
     ],
 )
 def test_what_is_no_sensor_is_refused(values, message):

@@ -123,6 +123,36 @@ def test_ends_that_a_scenario_does_not_admit_are_refused_before_anything_flies(t
         plan(str(path))
 
 
+WHOLE = """
+extends = "case1"
+title = "Steps"
+duration = "3 s"
+[link.command]
+delay = { uniform = [0, 2] }
+[[fault]]
+channel = "elevator_deflection"
+type = "delay"
+start = "2 s"
+steps = { uniform = [1, 3] }
+[limits]
+"""
+
+
+def test_of_numbers_of_steps_whole_ones_are_drawn(tmp_path):
+    path = tmp_path / "drawn.toml"
+    path.write_text(WHOLE)
+    ranges = {"sensors.altitude.latency": ("0", "2")}
+    campaign = plan(str(path), samples=40, scale=0.0, factors=ranges)
+    drawn = Sampler(campaign).draw(range(40))[0]
+    flown = [campaign.flown(flight, sample) for flight, sample in enumerate(drawn)]
+    assert {scenario.equipment["link.command.delay"] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.equipment["sensors.altitude.latency"][0] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.fault[0].parameters["steps"] for scenario in flown} == {1.0, 2.0, 3.0}
+    assert Campaign.from_text(campaign.text) == campaign
+    corners = plan(str(path), method="corners", scale=0.0, factors=ranges)
+    assert set(Sampler(corners).draw(range(8))[0].ravel().tolist()) == {0.0, 1.0, 2.0, 3.0}
+
+
 def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out):
     path = tmp_path / "drawn.toml"
     ends = 'end = { uniform = ["0.8 s", "1.4 s"] }\naltitude_change'

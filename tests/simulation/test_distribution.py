@@ -48,6 +48,14 @@ def test_a_uniform_distribution_lies_evenly_between_its_ends():
     assert drawn.middle == 1.0
 
 
+def test_of_whole_numbers_each_between_the_ends_is_drawn_as_often():
+    drawn = Distribution(unit="1", low=1.0, high=4.0, whole=True)
+    assert drawn.quantiles(np.array([0.0, 0.24, 0.26, 0.74, 0.76, 1.0])).tolist() == [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]
+    values, counts = np.unique(drawn.quantiles(np.linspace(0.0, 1.0, 4000, endpoint=False)), return_counts=True)
+    assert values.tolist() == [1.0, 2.0, 3.0, 4.0] and np.ptp(counts) <= 1
+    assert drawn.middle == 2.0
+
+
 @pytest.mark.parametrize(
     ("table", "field", "unit", "low", "high"),
     [
@@ -71,6 +79,8 @@ def test_a_uniform_distribution_lies_evenly_between_its_ends():
         ),
         ({"controller": "mine", "mine": {"time": {"uniform": ["1 min", "90 s"]}}}, "mine.time", "s", 60.0, 90.0),
         ({"controller": "mine", "mine": {"gain": {"normal": [2.0, 0.5]}}}, "mine.gain", "1", 0.5, 3.5),
+        ({"link": {"command": {"delay": {"uniform": [0, 5]}}}}, "link.command.delay", "1", 0.0, 5.0),
+        ({"sensors": {"altitude": {"latency": {"uniform": [1, 2]}}}}, "sensors.altitude.latency", "1", 1.0, 2.0),
     ],
 )
 def test_any_number_may_be_a_distribution_which_stands_for_its_mean(table, field, unit, low, high):

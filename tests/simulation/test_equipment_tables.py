@@ -50,14 +50,26 @@ WRONG = [
         "fault[0].offset = {'uniform': ['0 deg', '90 deg']}: expected all values from -30 to 30 deg",
     ),
     (FAULT + "type = { uniform = [0, 1] }", "fault[0].type = {'uniform': [0, 1]}: expected a text"),
-    (FAULT + 'type = "delay"\nsteps = 1.5', "fault[0].steps = 1.5: expected a whole number"),
     (
-        FAULT + 'type = "stop_limit"\nlower = "0.1 rad"\nupper = "-0.1 rad"',
-        "fault[0].lower = 0.1: expected at most upper, -0.1",
+        FAULT + 'type = "delay"\nsteps = { uniform = [1.5, 4] }',
+        "fault[0].steps = {'uniform': [1.5, 4]}: expected uniform = [least, largest], both whole numbers",
+    ),
+    (
+        "[link.command]\ndelay = { normal = [5, 1] }",
+        "link.command.delay = {'normal': [5, 1]}: expected uniform = [least, largest], both whole numbers",
+    ),
+    (
+        PITCH_RATE + "latency = { uniform = [0, 60] }",
+        "sensors.pitch_rate.latency = {'uniform': [0, 60]}: expected all values from 0 to 50",
+    ),
+    (FAULT + 'type = "delay"\nsteps = 1.5', "fault[0].steps = 1.5: expected a whole number from 1 to 50"),
+    (
+        FAULT + 'type = "stop_limit"\nlower = "10 deg"\nupper = "-10 deg"',
+        "fault[0].lower = 10 deg: expected at most upper, -10 deg",
     ),
     (
         FAULT + 'type = "lock_in_place"\nrandom_on = "1 s"',
-        "fault[0].random_off = 0.0: expected above 0 where random_on is, and only there",
+        "fault[0].random_off = 0 s: expected above 0 s where random_on is, and only there",
     ),
     (FAULT + 'type = "lock_in_place"\nstop = "5 s"', "fault[0].stop = 5 s: expected a time after its start, 10 s"),
     ('[fault]\ntype = "lock_in_place"', "fault = {'type': 'lock_in_place'}: expected a list of tables"),
@@ -83,8 +95,8 @@ WRONG = [
         ELEVATOR + "set = { uniform = [0, 1] }",
         "actuator.elevator_deflection.set = {'uniform': [0, 1]}: expected one of ideal, elevator_50",
     ),
-    (ELEVATOR + "order = 3", "actuator.elevator_deflection.order = 3: expected from 0 to 2"),
-    (ELEVATOR + "order = 1.5", "actuator.elevator_deflection.order = 1.5: expected 0, 1 or 2"),
+    (ELEVATOR + "order = 3", "actuator.elevator_deflection.order = 3: expected a whole number from 0 to 2"),
+    (ELEVATOR + "order = 1.5", "actuator.elevator_deflection.order = 1.5: expected a whole number from 0 to 2"),
     (
         ELEVATOR + "order = 1",
         "actuator.elevator_deflection.natural_frequency: none given, expected one for an order of 1",
@@ -114,7 +126,10 @@ WRONG = [
     (GUST + 'up = "1 m/s"\nlengths = "500 m"', "gust.up: 1 values, expected as many as gust.starts, 2"),
     (GUST, "gust.lengths: 0 values, expected as many as gust.starts, 2"),
     (GUST + 'lengths = ["500 m", "1 s"]', "gust.lengths[1] = '1 s': wrong unit, expected a finite quantity"),
-    (GUST + 'lengths = ["500 m", "500 m"]\nstays = [0, 0.5]', "gust.stays = 0.5: expected 0 or 1"),
+    (
+        GUST + 'lengths = ["500 m", "500 m"]\nstays = [0, 0.5]',
+        "gust.stays[1] = 0.5: expected a whole number from 0 to 1",
+    ),
     ('[density]\noffset = "5 kg/m^3"', "density.offset = '5 kg/m^3': wrong unit, expected a finite quantity"),
     ('[density]\noffset = "200 %"', "density.offset = '200 %': expected from -50 to 100 %"),
     (
@@ -127,16 +142,19 @@ WRONG = [
     (PITCH_RATE + "latency = 1.5", "sensors.pitch_rate.latency = 1.5: expected a whole number"),
     (PITCH_RATE + "drop_out = 2", "sensors.pitch_rate.drop_out = 2: expected from 0 to 1"),
     (
-        PITCH_RATE + 'minimum = "1 rad/s"\nmaximum = "0 rad/s"',
-        "sensors.pitch_rate.minimum = 1.0: expected less than maximum, 0.0",
+        PITCH_RATE + 'minimum = "25 deg/s"\nmaximum = "20 deg/s"',
+        "sensors.pitch_rate.minimum = 25 deg/s: expected less than maximum, 20 deg/s",
     ),
-    ("[sensors]\ninertial_angle_of_attack = 0.5", "sensors.inertial_angle_of_attack = 0.5: expected 0 or 1"),
+    (
+        "[sensors]\ninertial_angle_of_attack = 0.5",
+        "sensors.inertial_angle_of_attack = 0.5: expected a whole number from 0 to 1",
+    ),
     ("[link]\ncommand = 1", "link.command = 1: expected a table of delay, jitter, loss, burst, corruption, checksum"),
     ("[link.comand]\ndelay = 1", "expected one of measurement, computational_delay, command (did you mean 'command'?)"),
     ("[link.command]\nlost = 0.1", "link.command.lost: unknown key, expected one of delay, jitter, loss, burst, "),
     ("[link.command]\ndelay = 1.5", "link.command.delay = 1.5: expected a whole number"),
     ('[link.command]\ndelay = "20 ms"', "link.command.delay = '20 ms': wrong unit, expected a finite quantity"),
-    ("[link.command]\ndelay = 51", "link.command.delay = 51: expected from 0 to 50"),
+    ("[link.command]\ndelay = 51", "link.command.delay = 51: expected a whole number from 0 to 50"),
     ("[link.measurement]\nloss = 2", "link.measurement.loss = 2: expected from 0 to 1"),
     (
         '[link.measurement]\nloss = "90 %"\nburst = 2',

@@ -178,7 +178,7 @@ def test_fields_replace_those_of_the_set():
     ("values", "message"),
     [
         ({f"{ELEVATOR}.set": "fuel_10"}, "elevator_deflection.set = 'fuel_10': expected one of ideal, elevator_50"),
-        ({f"{ELEVATOR}.order": [1.5]}, r"order = 1.5: expected 0, 1 or 2"),
+        ({f"{ELEVATOR}.order": [1.5]}, r"order\[0\] = 1.5: expected double array from 0 to 2, whole"),
         ({f"{ELEVATOR}.order": [2.0]}, "natural_frequency: none given, expected one for an order of 2"),
         ({f"{ELEVATOR}.natural_frequency": [20.0]}, "order: 0, expected 1 or 2"),
         ({f"{ELEVATOR}.rate_limit": [1.0, 2.0]}, "rate_limit: 2 values, expected one"),

@@ -38,10 +38,10 @@ _CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
 
 
 def _parameters(link: str) -> tuple[Parameter, ...]:
-    where = f"link.{link}"
+    where, longest = f"link.{link}", float(LONGEST_DELAY)
     return (
-        Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, float(LONGEST_DELAY)),
-        Parameter(f"{where}.jitter", 0.0, "it is late by up to so many more, drawn", "", 0.0, float(LONGEST_DELAY)),
+        Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, longest, whole=True),
+        Parameter(f"{where}.jitter", 0.0, "it is late by up to so many more, drawn", "", 0.0, longest, whole=True),
         Parameter(f"{where}.loss", 0.0, "probability that a payload is lost: the last one is held", "", 0.0, 1.0),
         Parameter(f"{where}.burst", 0.0, "mean number lost in a row; 0: each is lost on its own", "", 0.0, 1e6),
         Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is turned over", "", 0.0, 1.0),
@@ -112,11 +112,6 @@ def command_link(values: Mapping[str, object], period: float) -> LinkData:
 def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
     v = check_all(_parameters(name), values)
     delay, jitter, loss, burst, corruption, checksum = v.values()
-    for field in ("delay", "jitter"):
-        if not v[f"link.{name}.{field}"].is_integer():
-            raise ParameterError(
-                f"parameter link.{name}.{field} = {v[f'link.{name}.{field}']}: expected a whole number"
-            )
     # Of a chain that is lossy for so long on average, and as often as is said (Gilbert 1960).
     least = max(1.0, loss / (1.0 - loss)) if loss < 1.0 else 1.0
     if burst and burst < least:

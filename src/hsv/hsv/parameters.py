@@ -33,6 +33,8 @@ class Parameter:
     """Admissible words; empty: any."""
     read_only: bool = True
     """Whether it is fixed once the node has started."""
+    whole: bool = False
+    """Whether only whole numbers are admissible, of steps or of an order, though they are written as doubles."""
 
     @property
     def kind(self) -> str:
@@ -49,13 +51,15 @@ class Parameter:
         words = _range(self.minimum, self.maximum)
         if self.kind == "double_array":
             words = words or " of finite numbers"
-        return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}"
+        whole = ", whole" if self.whole else ""
+        return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}{whole}"
 
     def check(self, value: object) -> Any:
         """Return ``value`` if it is admissible.
 
         Raises:
-            ParameterError: Wrong type (an integer is not a double), not finite, outside the range or the choices.
+            ParameterError: Wrong type (an integer is not a double), not finite, not whole, outside the range or the
+                choices.
         """
         if self.kind.endswith("_array"):
             if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
@@ -63,7 +67,7 @@ class Parameter:
             element = str if self.kind == "string_array" else float
             values = list(cast(Iterable[Any], value))
             for index, entry in enumerate(values):
-                if not isinstance(entry, element) or (element is float and not self._in_range(entry)):
+                if not isinstance(entry, element) or (element is float and not self.admits(entry)):
                     raise ParameterError(
                         f"parameter {self.name}[{index}] = {_shown(entry)}: expected {self.constraint}"
                     )
@@ -74,7 +78,7 @@ class Parameter:
         if isinstance(value, str):
             if self.choices and value not in self.choices:
                 raise self.refusal(value)
-        elif not isinstance(value, bool) and not self._in_range(value):
+        elif not isinstance(value, bool) and not self.admits(value):
             raise self.refusal(value)
         return value
 
@@ -90,8 +94,11 @@ class Parameter:
         shown = value.tolist() if hasattr(value, "tolist") else value
         return ParameterError(f"parameter {self.name} = {_shown(shown)}: expected {self.constraint}{hint}")
 
-    def _in_range(self, value: object) -> bool:
-        return isinstance(value, int | float) and math.isfinite(value) and self.minimum <= value <= self.maximum
+    def admits(self, value: object) -> bool:
+        """Tell whether a number is finite, within the range, and whole where it has to be."""
+        if not isinstance(value, int | float) or not math.isfinite(value):
+            return False
+        return self.minimum <= value <= self.maximum and (not self.whole or float(value).is_integer())
 
 
 def _range(low: float, high: float) -> str:
@@ -125,11 +132,13 @@ def read_number(parameter: Parameter, text: object, field: str) -> float:
     """Return the number that a file has in ``text`` for a ``parameter``, or for an element of it, SI.
 
     Raises:
-        ParameterError, QuantityError: No quantity in its unit, or out of its range, which is told in the unit given.
+        ParameterError, QuantityError: No quantity in its unit, not whole, or out of its range, which is told in the
+            unit given.
     """
     value = parse_quantity(text, parameter.unit or "1", field)
-    if not parameter.minimum <= value <= parameter.maximum:
-        raise ParameterError(f"{field} = {_shown(text)}: expected{limits_in_words(parameter, text)}")
+    if not parameter.admits(value):
+        whole = " a whole number" if parameter.whole else ""
+        raise ParameterError(f"{field} = {_shown(text)}: expected{whole}{limits_in_words(parameter, text)}")
     return value
 
 

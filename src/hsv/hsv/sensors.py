@@ -28,6 +28,7 @@ from hsv.faults.table import (
 )
 from hsv.noise import STREAMS, normals, uniforms
 from hsv.parameters import Parameter, check_all
+from hsv.units import readable
 from hsv.vehicle.dynamics import N_STATES, STATE_NAMES, STATE_UNITS
 from hsv.vehicle.envelope import FOOT
 
@@ -46,6 +47,7 @@ class Field(NamedTuple):
     minimum: float
     maximum: float
     standard: float
+    whole: bool = False
 
 
 FIELDS = (
@@ -58,7 +60,7 @@ FIELDS = (
     Field("scale", "relative error of the scale", "", -0.9, 10.0, 0.0),
     Field("scale_sigma", "standard deviation of one that is drawn once a flight", "", 0.0, 1.0, 0.0),
     Field("lag", "bandwidth of a lag of first order; 0: none", "rad/s", 0.0, 1e4, 0.0),
-    Field("latency", "age of a sample, control periods", "", 0.0, float(LONGEST_LATENCY), 0.0),
+    Field("latency", "age of a sample, control periods", "", 0.0, float(LONGEST_LATENCY), 0.0, whole=True),
     Field("drop_out", "probability that a sample is lost", "", 0.0, 1.0, 0.0),
     Field("quantum", "step of the quantisation; 0: none", "{}", 0.0, 1e6, 0.0),
     Field("minimum", "least measurement; none unless given", "{}", -1e6, 1e6, -math.inf),
@@ -120,9 +122,11 @@ def _unit(pattern: str, unit: str) -> str:
 
 SENSOR_PARAMETERS = (
     Parameter("sensors.set", "ideal", "published sensors", choices=tuple(SENSOR_SETS)),
-    Parameter("sensors.inertial_angle_of_attack", [], "1: with the error of the pitch angle, too", "", 0.0, 1.0),
+    Parameter(
+        "sensors.inertial_angle_of_attack", [], "1: with the error of the pitch angle, too", "", 0.0, 1.0, whole=True
+    ),
     *(
-        Parameter(f"sensors.{c}.{f.name}", [], f.description, _unit(f.unit, unit), f.minimum, f.maximum)
+        Parameter(f"sensors.{c}.{f.name}", [], f.description, _unit(f.unit, unit), f.minimum, f.maximum, whole=f.whole)
         for c, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
         for f in FIELDS
     ),
@@ -179,23 +183,17 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
             name = f"sensors.{channel}.{field.name}"
             standard = chosen.channels.get(channel, {}).get(field.name, field.standard)
             table[field.name][i] = _one(name, v[name], standard)
-    for i, channel in enumerate(STATE_NAMES):
-        if not table["latency"][i].is_integer():
+    for channel, unit, low, high in zip(STATE_NAMES, STATE_UNITS, table["minimum"], table["maximum"], strict=True):
+        if not low < high:
             raise ParameterError(
-                f"parameter sensors.{channel}.latency = {float(table['latency'][i])}: expected a whole number"
-            )
-        if not table["minimum"][i] < table["maximum"][i]:
-            raise ParameterError(
-                f"parameter sensors.{channel}.minimum = {float(table['minimum'][i])}: "
-                f"expected less than maximum, {float(table['maximum'][i])}"
+                f"parameter sensors.{channel}.minimum = {readable(low, unit)}: "
+                f"expected less than maximum, {readable(high, unit)}"
             )
     inertial = _one(
         "sensors.inertial_angle_of_attack",
         v["sensors.inertial_angle_of_attack"],
         float(chosen.inertial_angle_of_attack),
     )
-    if inertial not in (0.0, 1.0):
-        raise ParameterError(f"parameter sensors.inertial_angle_of_attack = {inertial!r}: expected 0 or 1")
     on = np.zeros(N_STATES, np.bool_)
     for field in FIELDS:
         if field.name != "drift_time":

@@ -123,6 +123,12 @@ def to_paper(value: float, unit: str) -> tuple[float, str]:
     return in_system(value, unit, UnitSystem.paper)
 
 
+def readable(value: float, unit: str) -> str:
+    """Return ``value``, given in the SI ``unit``, as people read it, angles in degrees, with its unit."""
+    number, shown = in_system(value, unit, UnitSystem.metric)
+    return f"{number:.10g}" + ("" if shown == "1" else f" {shown}")
+
+
 def significant(value: float, digits: int = 3) -> str:
     """Return ``value`` with so many significant digits, and all that it has before the decimal point up to 999999."""
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"

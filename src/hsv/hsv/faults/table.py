@@ -15,7 +15,7 @@ from typing import Self
 
 from hsv.errors import ParameterError, did_you_mean
 from hsv.parameters import Parameter, read_number
-from hsv.units import parse_quantity
+from hsv.units import parse_quantity, readable
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -113,6 +113,7 @@ class FaultParameter:
             "" if unit == "1" else unit,
             self.minimum * scale,
             self.maximum * scale,
+            whole=self.whole,
         )
 
 
@@ -364,16 +365,15 @@ class Fault:
                 described.check(given)
             except ParameterError as error:
                 raise ParameterError(str(error).replace("parameter ", "fault.", 1)) from error
-            if parameter.whole and not float(given).is_integer():
-                raise ParameterError(f"fault.{parameter.name} = {value!r}: expected a whole number")
         named = dict(zip((p.name for p in table), self.values, strict=True))
         if named.get("lower", 0.0) > named.get("upper", math.inf):
-            raise ParameterError(f"fault.lower = {named['lower']!r}: expected at most upper, {named['upper']!r}")
+            lower, upper = (readable(named[end], CHANNELS[self.channel].unit or "1") for end in ("lower", "upper"))
+            raise ParameterError(f"fault.lower = {lower}: expected at most upper, {upper}")
         cycle, on, off = (named[name] for name in ("intermittent_period", "random_on", "random_off"))
         if cycle and (on or off):
-            raise ParameterError(f"fault.intermittent_period = {cycle!r}: expected 0 with random_on or random_off")
+            raise ParameterError(f"fault.intermittent_period = {cycle:g} s: expected 0 s with random_on or random_off")
         if bool(on) != bool(off):
-            raise ParameterError(f"fault.random_off = {off!r}: expected above 0 where random_on is, and only there")
+            raise ParameterError(f"fault.random_off = {off:g} s: expected above 0 s where random_on is, and only there")
 
     @classmethod
     def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:

@@ -78,11 +78,14 @@ class Distribution:
     high: float
     kind: str = "uniform"
     """One of :data:`KINDS`; the mean of each is half-way"""
+    whole: bool = False
+    """Whether whole numbers are drawn, all between the ends, both included, with equal chances"""
 
     @property
     def middle(self) -> float:
-        """The mean, which stands for the number where nothing is drawn."""
-        return rounded((self.low + self.high) / 2.0)
+        """The mean, rounded down where numbers are whole, which stands for the number where nothing is drawn."""
+        mean = (self.low + self.high) / 2.0
+        return float(np.floor(mean)) if self.whole else rounded(mean)
 
     def quantiles(self, shares: np.ndarray) -> np.ndarray:
         """Return the values below which these ``shares`` (0 to 1) of the distribution lie, to 15 digits."""
@@ -92,22 +95,25 @@ class Distribution:
                 _BELOW + (1.0 - 2.0 * _BELOW) * shares
             )
             values = np.where(shares == 0.0, self.low, values)
+        elif self.whole:
+            values = np.floor(self.low + (self.high - self.low + 1.0) * shares)
         else:
             values = self.low + (self.high - self.low) * shares
         # As many digits as a scenario file keeps: a flight is then the same whichever way it is asked for.
         return np.array([rounded(value) for value in np.where(shares == 1.0, self.high, values).tolist()])
 
 
-def read_distribution(given: Mapping[str, Any], unit: str, field: str) -> Distribution:
+def read_distribution(given: Mapping[str, Any], unit: str, field: str, *, whole: bool = False) -> Distribution:
     """Return the distribution written in an inline table of a scenario.
 
     Args:
         given: The table, as read.
         unit: Unit of the number whose place it takes.
         field: Name used in the error message.
+        whole: Whether the number is a whole one: then a distribution is uniform.
 
     Raises:
-        QuantityError: Another kind, no pair of quantities in this unit, or one that is out of order.
+        QuantityError: Another kind, no pair of quantities in this unit, or one that is out of order or not whole.
     """
     forms = " or ".join(f"{{ {kind} = {pair} }}" for kind, pair in KINDS.items())
     if len(given) != 1 or next(iter(given)) not in KINDS:
@@ -119,10 +125,12 @@ def read_distribution(given: Mapping[str, Any], unit: str, field: str) -> Distri
         first, second = (parse_quantity(value, unit, kind) for value in pair)
     except QuantityError as error:
         raise QuantityError(f"{field} = {given!r}: {error}") from error
+    if whole and (kind != "uniform" or not (first.is_integer() and second.is_integer())):
+        raise QuantityError(f"{field} = {given!r}: expected uniform = {KINDS['uniform']}, both whole numbers")
     if kind == "normal":
         if not second > 0.0:
             raise QuantityError(f"{field} = {given!r}: expected a standard deviation above zero")
         first, second = first - TRUNCATION * second, first + TRUNCATION * second
     if not first < second:
         raise QuantityError(f"{field} = {given!r}: expected a least value below the largest")
-    return Distribution(unit=unit, low=rounded(first), high=rounded(second), kind=kind)
+    return Distribution(unit=unit, low=rounded(first), high=rounded(second), kind=kind, whole=whole)

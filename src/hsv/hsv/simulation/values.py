@@ -35,7 +35,7 @@ def number(found: dict[int, Distribution], parameter: Parameter, value: object, 
     """
     if not isinstance(value, dict):
         return read_number(parameter, value, field)
-    drawn = found[id(value)] = read_distribution(value, parameter.unit or "1", field)
+    drawn = found[id(value)] = read_distribution(value, parameter.unit or "1", field, whole=parameter.whole)
     if not parameter.minimum <= drawn.low < drawn.high <= parameter.maximum:
         limits = limits_in_words(parameter, next(iter(value.values()))[0])
         raise ScenarioError(f"{field} = {value!r}: expected all values{limits}")

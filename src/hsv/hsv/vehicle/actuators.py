@@ -92,7 +92,9 @@ def _parameters() -> tuple[Parameter, ...]:
         per_second = f"{unit or '1'}/s"
         table += [
             Parameter(f"{where}.set", IDEAL, "published actuator of this channel", choices=(IDEAL, *names)),
-            Parameter(f"{where}.order", [], "order of the dynamics, 0 ideal, instead of the set's", "", 0.0, 2.0),
+            Parameter(
+                f"{where}.order", [], "order of the dynamics, 0 ideal, instead of the set's", "", 0.0, 2.0, whole=True
+            ),
             Parameter(f"{where}.natural_frequency", [], "instead of the set's", "rad/s", 0.1, 1e4),
             Parameter(f"{where}.damping_ratio", [], "instead of the set's", "", 0.05, 1.0),
             Parameter(f"{where}.stop", [], "largest magnitude, instead of the set's", unit, 0.0, 1e3),
@@ -235,8 +237,6 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
                 ("acceleration_limit", math.inf),
             )
         }
-        if given["order"] not in (0.0, 1.0, 2.0):
-            raise ParameterError(f"parameter {where}.order = {given['order']:g}: expected 0, 1 or 2")
         order[i] = int(given["order"])
         frequency[i], damping[i] = given["natural_frequency"], given["damping_ratio"]
         rate[i], acceleration[i] = given["rate_limit"], given["acceleration_limit"]

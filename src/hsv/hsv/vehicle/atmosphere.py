@@ -41,7 +41,15 @@ ATMOSPHERE_PARAMETERS = (
     Parameter("gust.forward", [], "largest velocity of each gust from behind", "m/s", -100.0, 100.0),
     Parameter("gust.up", [], "largest velocity of each gust from below", "m/s", -100.0, 100.0),
     Parameter("gust.lengths", [], "distance over which each gust builds up", "m", 1.0, 1e6),
-    Parameter("gust.stays", [], "1: the gust stays (MIL-F-8785C), 0: it falls as it rose (CS-25.341)", "", 0.0, 1.0),
+    Parameter(
+        "gust.stays",
+        [],
+        "1: the gust stays (MIL-F-8785C), 0: it falls as it rose (CS-25.341)",
+        "",
+        0.0,
+        1.0,
+        whole=True,
+    ),
     Parameter("density.offset", 0.0, "relative difference of the density from the model's", "", -0.5, 1.0),
     Parameter("density.sigma", 0.0, "standard deviation of what varies along the path", "", 0.0, 0.5),
     Parameter("density.length", 1e5, "distance over which it varies", "m", 1e3, 1e8),
@@ -92,9 +100,6 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereDa
                 f"parameter gust.{name}: {len(given)} values, expected as many as gust.starts, {len(starts)}"
             )
         columns[name] = np.array(given, np.float64)
-    for stays in v["gust.stays"]:
-        if stays not in (0.0, 1.0):
-            raise ParameterError(f"parameter gust.stays = {stays!r}: expected 0 or 1")
     wind = np.array([v["wind.forward"], v["wind.up"]])
     sigma = np.array([v["turbulence.sigma_forward"], v["turbulence.sigma_up"]])
     changed = (v["wind.shear"], v["density.offset"], v["density.sigma"])
