@@ -10,7 +10,8 @@ from hsv.simulation.coverage import uncovered_of
 from hsv.simulation.scenario import load_scenario
 
 BASELINE, REALISTIC = (read_design(find_design(name)) for name in ("baseline", "realistic"))
-LOSS = ("elevator_deflection", "loss_of_effectiveness", {"effectiveness": 0.9})
+ELEVATOR = "elevator_deflection"
+LOSS = (ELEVATOR, "loss_of_effectiveness", {"effectiveness": 0.9})
 
 
 def of(changes, design=BASELINE, scenario="case1"):
@@ -41,6 +42,14 @@ def test_the_flight_of_the_certificate_is_covered():
             ["fault: loss_of_effectiveness of elevator_deflection (effectiveness 0.8)"],
         ),
         ({"fault[0].effectiveness": 0.95}, []),
+        (
+            {"fault": [{"channel": ELEVATOR, "type": "bias", "start": "1 s", "offset": "-0.5 deg"}]},
+            ["fault: bias of elevator_deflection (offset -0.5 deg); the certificate is for a loss of"],
+        ),
+        (
+            {"fault": [{"channel": ELEVATOR, "type": "bandwidth", "start": "1 s", "natural_frequency": "5 rad/s"}]},
+            ["fault: bandwidth of elevator_deflection (natural_frequency 5 rad/s); "],
+        ),
         ({"actuator.elevator_deflection.stop": "29 deg"}, []),
         ({"actuator.elevator_deflection.stop": "28 deg"}, ["actuator.elevator_deflection.stop: 28 deg; "]),
         (

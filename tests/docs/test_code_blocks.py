@@ -85,7 +85,9 @@ def test_faults_that_the_page_on_hardware_injects_are_faults():
 @pytest.mark.long
 def test_commands_of_the_page_on_hardware_run(tmp_path):
     write_files("hardware.md", tmp_path)
-    commands = re.findall(r"^    (hsv (?!fault ).*)$", (DOCS / "hardware.md").read_text(encoding="utf-8"), re.MULTILINE)
+    # Those of hsv certify take minutes each, and end with 1 where they say "not certified".
+    page = (DOCS / "hardware.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^    (hsv (?!fault |certify ).*)$", page, re.MULTILINE)
     assert [command.split()[1] for command in commands] == ["faults", "equipment", *["montecarlo"] * 3]
     for command in commands:
         ran = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)

@@ -230,6 +230,12 @@ def test_flights_in_threads_share_no_state():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"controller": "7"}, r"controller = '7': expected one of .*package.module:Class or path/lib.so:symbol"),
+        ({"controller": "7:lqr"}, r"controller = '7:lqr': '7' is no module, expected package.module:Class or path/"),
+        ({"controller": ":lqr"}, r"controller = ':lqr': '' is no module, expected package.module:Class or path/"),
+        ({"controller": "./build/lqr"}, r"controller = './build/lqr': no symbol, expected path/lib.so:symbol"),
+        ({"controller": "lqr.so"}, r"controller = 'lqr.so': no symbol, expected path/lib.so:symbol"),
+        ({"controller": "./7:lqr"}, r"controller = '\./7:lqr': cannot be read \(No such .*expected a shared library"),
         ({"controller": "tube_mcp"}, r"controller = 'tube_mcp': expected one of .*did you mean 'tube_mpc'"),
         ({"controller": "nowhere:Class"}, r"cannot be loaded, ModuleNotFoundError: No module named 'nowhere'"),
         ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),

@@ -94,11 +94,18 @@ def class_place(name: str) -> str:
         ParameterError: There is none of that name.
     """
     place = SHIPPED_CONTROLLERS.get(name, name)
-    if ":" in place:
+    module, colon, _ = place.partition(":")
+    if colon:
+        if not (library_place(place) or all(map(str.isidentifier, module.split(".")))):
+            raise ParameterError(
+                f"controller = {name!r}: {module!r} is no module, expected package.module:Class or path/lib.so:symbol"
+            )
         return place
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             return entry.value
+    if "/" in name or name.endswith(".so"):
+        raise ParameterError(f"controller = {name!r}: no symbol, expected path/lib.so:symbol, the path of a library")
     hint = did_you_mean(name, controller_names())
     raise ParameterError(
         f"controller = {name!r}: expected one of {', '.join(controller_names())}, package.module:Class or "

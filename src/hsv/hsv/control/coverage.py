@@ -17,6 +17,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import flown_sections
+from hsv.faults.table import FaultParameter, fault_parameters
 from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.parameters import Parameter, check_all
 from hsv.sensors import FIELDS, SENSOR_PARAMETERS, sensor_data
@@ -111,7 +112,8 @@ def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], eff
             why = f"a loss to {effectiveness:g} at most"
         else:
             continue
-        said = ", ".join(f"{name} {value:g}" for name, value in parameters)
+        known = {parameter.name: parameter for parameter in fault_parameters(channel, kind)}
+        said = ", ".join(f"{name} {_of_a_fault(known[name], channel, value)}" for name, value in parameters)
         found.append(f"fault: {kind} of {channel}{f' ({said})' if said else ''}; the certificate is for {why}")
     return found
 
@@ -228,6 +230,11 @@ def _quantity(parameter: Parameter, value: float) -> str:
         return f"natural frequency {value:g} rad/s"
     named = f"{name.replace('_', ' ')} " if parameter in ACTUATOR_PARAMETERS else ""
     return named + _written(value, parameter.unit)
+
+
+def _of_a_fault(parameter: FaultParameter, channel: str, value: float) -> str:
+    # The paper has angles in degrees, but natural frequencies in rad/s.
+    return f"{value:g} rad/s" if parameter.unit == "rad/s" else _written(value, parameter.of(channel).unit)
 
 
 def _written(value: float, pattern: str, unit: str = "") -> str:
