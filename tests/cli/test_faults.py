@@ -2,7 +2,6 @@ import pytest
 
 from hsv.faults.injector import FaultInjector
 from hsv.faults.table import FAULT_KINDS, read_fault
-from hsv.simulation.scenario import scenario_text
 
 
 def test_every_type_of_fault_is_listed(hsv):
@@ -51,18 +50,3 @@ def test_an_unknown_type_is_refused_with_the_nearest(hsv):
     assert ran.code == 2
     assert ran.error.startswith("type = 'oscilation': expected one of loss_of_effectiveness, ")
     assert ran.error.endswith("(did you mean 'oscillation'?)")
-
-
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ('[[fault]]\nchannel = "elevator_deflection"\ntype = "bias"\nstart = "1 s"', "fault[1].offset: missing, "),
-        ("[wind]\nforward = 10", "wind.forward = 10: the unit is missing, "),
-        ('[sensors]\nset = "fin"', "sensors.set = 'fin': expected one of ideal, fine, ghv, inertial "),
-    ],
-)
-def test_a_scenario_with_a_wrong_table_ends_a_command_with_one_line(hsv, tmp_path, table, message):
-    (tmp_path / "wrong.toml").write_text(f"{scenario_text('case1')}\n{table}\n")
-    ran = hsv("simulate", "wrong.toml")
-    assert ran.code == 2
-    assert ran.error.startswith(f"scenario 'wrong': {message}")
