@@ -123,9 +123,9 @@ def to_paper(value: float, unit: str) -> tuple[float, str]:
     return in_system(value, unit, UnitSystem.paper)
 
 
-def readable(value: float, unit: str) -> str:
-    """Return ``value``, given in the SI ``unit``, as people read it, angles in degrees, with its unit."""
-    number, shown = in_system(value, unit, UnitSystem.metric)
+def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) -> str:
+    """Return ``value``, given in the SI ``unit``, in that of ``system``, with its name; angles in degrees."""
+    number, shown = in_system(value, unit, system)
     return f"{number:.10g}" + ("" if shown == "1" else f" {shown}")
 
 

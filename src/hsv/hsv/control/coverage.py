@@ -17,11 +17,11 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import flown_sections
-from hsv.faults.table import FaultParameter, fault_parameters
+from hsv.faults.table import fault_parameters
 from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.parameters import Parameter, check_all
 from hsv.sensors import FIELDS, SENSOR_PARAMETERS, sensor_data
-from hsv.units import to_paper
+from hsv.units import UnitSystem, to_paper
 from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, ACTUATOR_SETS, IDEAL
 from hsv.vehicle.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
@@ -113,7 +113,9 @@ def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], eff
         else:
             continue
         known = {parameter.name: parameter for parameter in fault_parameters(channel, kind)}
-        said = ", ".join(f"{name} {_of_a_fault(known[name], channel, value)}" for name, value in parameters)
+        said = ", ".join(
+            f"{name} {known[name].written(channel, value, UnitSystem.paper)}" for name, value in parameters
+        )
         found.append(f"fault: {kind} of {channel}{f' ({said})' if said else ''}; the certificate is for {why}")
     return found
 
@@ -230,11 +232,6 @@ def _quantity(parameter: Parameter, value: float) -> str:
         return f"natural frequency {value:g} rad/s"
     named = f"{name.replace('_', ' ')} " if parameter in ACTUATOR_PARAMETERS else ""
     return named + _written(value, parameter.unit)
-
-
-def _of_a_fault(parameter: FaultParameter, channel: str, value: float) -> str:
-    # The paper has angles in degrees, but natural frequencies in rad/s.
-    return f"{value:g} rad/s" if parameter.unit == "rad/s" else _written(value, parameter.of(channel).unit)
 
 
 def _written(value: float, pattern: str, unit: str = "") -> str:

@@ -15,7 +15,7 @@ from typing import Self
 
 from hsv.errors import ParameterError, did_you_mean
 from hsv.parameters import Parameter, read_number
-from hsv.units import parse_quantity, readable
+from hsv.units import UnitSystem, parse_quantity, readable
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
@@ -115,6 +115,12 @@ class FaultParameter:
             self.maximum * scale,
             whole=self.whole,
         )
+
+    def written(self, channel: str, value: float, system: UnitSystem = UnitSystem.metric) -> str:
+        """Return a ``value``, SI, of a fault of ``channel`` in the units of ``system``."""
+        # Everybody has angles in degrees, but natural frequencies in rad/s.
+        given = UnitSystem.si if self.unit == "rad/s" else system
+        return readable(value, self.of(channel).unit or "1", given)
 
 
 @dataclass(frozen=True)
@@ -367,7 +373,8 @@ class Fault:
                 raise ParameterError(str(error).replace("parameter ", "fault.", 1)) from error
         named = dict(zip((p.name for p in table), self.values, strict=True))
         if named.get("lower", 0.0) > named.get("upper", math.inf):
-            lower, upper = (readable(named[end], CHANNELS[self.channel].unit or "1") for end in ("lower", "upper"))
+            known = {parameter.name: parameter for parameter in table}
+            lower, upper = (known[end].written(self.channel, named[end]) for end in ("lower", "upper"))
             raise ParameterError(f"fault.lower = {lower}: expected at most upper, {upper}")
         cycle, on, off = (named[name] for name in ("intermittent_period", "random_on", "random_off"))
         if cycle and (on or off):
@@ -398,7 +405,9 @@ class Fault:
         return cls(channel, kind, tuple(given[p.name] for p in table))
 
     def __str__(self) -> str:
-        said = " ".join(f"{name} {value:g}" for name, value in self.parameters.items())
+        known = {parameter.name: parameter for parameter in fault_parameters(self.channel, self.type)}
+        values = [f"{name} {known[name].written(self.channel, value)}" for name, value in self.parameters.items()]
+        said = ", ".join(values)
         return f"{self.type} {said + ' ' if said else ''}of {self.channel}"
 
     @property
