@@ -21,11 +21,11 @@ from hsv.study.sensitivity.controllers import (
     growth,
     said_corners,
 )
-from hsv.study.sensitivity.flights_strip import finding
 from hsv.study.sensitivity.notch import Limits
-from hsv.study.sensitivity.strip import strip
 from hsv.study.sensitivity.study import grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_figures import finding
+from hsv.study.sensitivity.sweep_result import sweep_result
 from hsv.study.sensitivity.variations import BOUNDS, ELEVATOR, WEIGHTS, baseline_variations
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -70,13 +70,13 @@ def test_where_flights_are_lost_is_put_between_points():
     )
 
 
-def test_a_strip_leaves_out_what_a_lost_flight_shows():
+def test_a_sweep_leaves_out_what_a_lost_flight_shows():
     table = {
         "diverged": np.array([0.0, 1.0]),
         "saturated_steps": np.array([0.0, 400.0]),
         "altitude_end_error": np.array([-2.0, 9.0]),
     }
-    columns = strip([table])
+    columns = sweep_result([table])
     assert columns["finished"] == columns["without_limits"] == [0.5]
     assert columns["altitude_end_error_nominal"] == [2.0]
     assert np.isnan(columns["altitude_end_error_worst"]).all()
@@ -123,7 +123,7 @@ def test_robust_mpc_is_lost_without_a_notch_and_would_not_be_with_one():
     assert limits.said().startswith(f"linear loop stable up to κ = {COUPLING_SCALES[-1]} at least (nominal vehicle)")
 
 
-def test_a_strip_is_flown_once_and_found_again(tmp_path):
+def test_a_sweep_is_flown_once_and_found_again(tmp_path):
     told = []
     values = [WITH_NOTCH.parameters() | {"vehicle.coupling": kappa} for kappa in ("0.0", "0.25")]
     points = {WITH_NOTCH: [Point(value, corners_of(1.0, 32.0)) for value in values]}
@@ -168,13 +168,13 @@ def test_a_coarse_study_has_a_page_with_its_findings(tmp_path):
     study = STUDIES["coupling"]
     outcome = study.run(25.0, tmp_path, quiet)
     assert outcome.figure.axes
-    assert outcome.strips["kappa"] == [0.0, 1.25]
+    assert outcome.numbers["kappa"] == [0.0, 1.25]
     text = page(study, outcome)
     assert "coupling.png" in text
     assert all(f"{finding[1:]}." in text for finding in outcome.findings)
     assert "the worst of 1 of the 1024 corners" in outcome.shows
     for controller, found in zip(ALL, outcome.findings, strict=False):
-        limit = outcome.strips["unstable_from"][controller.label]["nominal"]
+        limit = outcome.numbers["unstable_from"][controller.label]["nominal"]
         assert found.startswith(controller.label)
         said = re.search(r"stable up to κ = (\S+)( at least)? \(nominal", found)
         assert float(said[1]) == pytest.approx(COUPLING_SCALES[-1] if limit is None else limit, abs=0.005)

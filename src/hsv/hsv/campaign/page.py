@@ -18,7 +18,7 @@ from hsv.campaign.summary import ENDED, Results, Share, distributions, limits, s
 from hsv.errors import CampaignError, ControllerError, reason
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import Numbers, compressed
-from hsv.recording.report.picture import Band, Line, Picture, picture, strip
+from hsv.recording.report.picture import Band, Line, Picture, picture, time_plot
 from hsv.recording.report.templates import environment_of
 from hsv.recording.report.text import units_of, words
 from hsv.simulation.closed_loop import Flight
@@ -220,7 +220,7 @@ def _plots(results: Results, flights: Mapping[str, Flight]) -> tuple[dict[str, A
 def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
     windows, time, reached, end = _windows(results)
     envelope = results.envelope
-    strips = []
+    plots = []
     for index, signal in enumerate(SIGNALS):
         if signal.name in PICTURED:
             lines = [Line("mean", time[reached], envelope.mean[reached, index])]
@@ -229,9 +229,9 @@ def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
                 look = f"run{run} nominal" if run else "run0"
                 lines.append(Line(look, time[: len(curve)], curve, run))
             band = Band(time[reached], envelope.low[reached, index], envelope.high[reached, index])
-            strips.append(strip(words(signal.name).capitalize(), signal.unit, end, lines, [band]))
+            plots.append(time_plot(words(signal.name).capitalize(), signal.unit, end, lines, [band]))
     starts = [fault.start for fault in results.campaign.scenario.fault]
-    return picture(strips, end, [(start, end) for start in starts if start < end])
+    return picture(plots, end, [(start, end) for start in starts if start < end])
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:

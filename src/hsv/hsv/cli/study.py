@@ -55,7 +55,7 @@ def study(
     target = out / f"{name}.md"
     target.write_text(page(chosen, outcome), encoding="utf-8")
     if json:
-        print_json({"study": name, "findings": list(outcome.findings), "strips": outcome.strips})
+        print_json({"study": name, "findings": list(outcome.findings), "numbers": outcome.numbers})
         return
     for finding in outcome.findings:
         console.print(f"- {finding}", soft_wrap=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hsv.recording.report.differences import NEARLY, Difference
 from hsv.recording.report.panels import Kind
-from hsv.recording.report.picture import Line, Picture, Strip, picture, strip
+from hsv.recording.report.picture import Line, Picture, TimePlot, picture, time_plot
 from hsv.recording.report.run import ReportedRun
 from hsv.recording.report.text import number, percent, words
 
@@ -89,14 +89,14 @@ def flight_picture(runs: Sequence[ReportedRun]) -> Picture:
         for event in run.events
         if event.kind == "fault"
     }
-    return picture(list(_strips(runs, end)), end, sorted(faults))
+    return picture(list(_time_plots(runs, end)), end, sorted(faults))
 
 
-def _strips(runs: Sequence[ReportedRun], end: float) -> Iterator[Strip]:
+def _time_plots(runs: Sequence[ReportedRun], end: float) -> Iterator[TimePlot]:
     for name in PICTURED:
         panel = next((panel for run in runs for panel in run.curves.panels if panel.name == name), None)
         if panel is not None:
-            yield strip(panel.title, panel.unit, end, list(_lines(name, runs)))
+            yield time_plot(panel.title, panel.unit, end, list(_lines(name, runs)))
 
 
 def _lines(name: str, runs: Sequence[ReportedRun]) -> Iterator[Line]:

@@ -14,7 +14,7 @@ BUCKETS = 400
 """Stretches of time of which a curve keeps its least and its largest value, so that no peak is lost."""
 
 WIDTH, HEIGHT = 1000.0, 100.0
-"""Of the drawing of a strip; the page stretches it."""
+"""Of the drawing of a plot; the page stretches it."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Strip:
+class TimePlot:
     """A quantity over time as the page draws it."""
 
     title: str
@@ -68,21 +68,21 @@ class Strip:
 
 @dataclass(frozen=True)
 class Picture:
-    """Strips over one time axis; shades are stretches of it, percent."""
+    """Plots over one time axis; shades are stretches of it, percent."""
 
-    strips: tuple[Strip, ...]
+    plots: tuple[TimePlot, ...]
     time: tuple[Tick, ...]
     shades: tuple[tuple[float, float], ...]
 
 
-def picture(strips: Sequence[Strip], end: float, shades: Sequence[tuple[float, float]] = ()) -> Picture:
-    """Return the picture of ``strips``, all drawn over 0 ... ``end`` (s), with stretches of time shaded."""
+def picture(plots: Sequence[TimePlot], end: float, shades: Sequence[tuple[float, float]] = ()) -> Picture:
+    """Return the picture of ``plots``, all drawn over 0 ... ``end`` (s), with stretches of time shaded."""
     marked = tuple((100.0 * start / end, 100.0 * (stop - start) / end) for start, stop in shades)
-    return Picture(tuple(strips), _ticks(0.0, end, 1.0, 8), marked)
+    return Picture(tuple(plots), _ticks(0.0, end, 1.0, 8), marked)
 
 
-def strip(title: str, unit: str, end: float, lines: Sequence[Line], bands: Sequence[Band] = ()) -> Strip:
-    """Return a strip of a quantity of an SI ``unit`` over 0 ... ``end`` (s); its axis holds all that is finite."""
+def time_plot(title: str, unit: str, end: float, lines: Sequence[Line], bands: Sequence[Band] = ()) -> TimePlot:
+    """Return the plot of a quantity of an SI ``unit`` over 0 ... ``end`` (s); its axis holds all that is finite."""
     values = [line.y for line in lines] + [edge for band in bands for edge in (band.low, band.high)]
     finite = np.concatenate([value[np.isfinite(value)] for value in values])
     low, high = (float(finite.min()), float(finite.max())) if len(finite) else (0.0, 0.0)
@@ -101,7 +101,7 @@ def strip(title: str, unit: str, end: float, lines: Sequence[Line], bands: Seque
     for system in UnitSystem:
         scale, _ = in_system(1.0, unit, system)
         ticks[str(system)] = _ticks(low, high, scale, 4)
-    return Strip(title, unit, tuple(paths), ticks)
+    return TimePlot(title, unit, tuple(paths), ticks)
 
 
 def _thinned(time: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -111,9 +111,9 @@ def _thinned(time: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     starts = np.linspace(0, len(y), BUCKETS, endpoint=False).astype(int)
     kept = {len(y) - 1}
     for first, over in zip(starts, [*starts[1:], len(y)], strict=True):
-        part = y[first:over]
-        if np.isfinite(part).any():
-            kept |= {first + int(np.nanargmin(part)), first + int(np.nanargmax(part))}
+        stretch = y[first:over]
+        if np.isfinite(stretch).any():
+            kept |= {first + int(np.nanargmin(stretch)), first + int(np.nanargmax(stretch))}
     rows = sorted(kept)
     return time[rows], y[rows]
 

@@ -1,1 +1,1 @@
-"""How far the results carry: strips over what the paper leaves open, until each controller is lost."""
+"""How far the results carry: sweeps over what the paper leaves open, until each controller is lost."""

@@ -1,4 +1,4 @@
-"""The controllers that the strips compare, the vehicles they fly with, and their linear loops."""
+"""The controllers that the sweeps compare, the vehicles they fly with, and their linear loops."""
 
 from __future__ import annotations
 

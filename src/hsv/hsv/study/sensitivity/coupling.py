@@ -1,4 +1,4 @@
-"""The strip over the inertial coupling, kappa times the derived set."""
+"""The sweep over the inertial coupling, kappa times the derived set."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from hsv.study.sensitivity.controllers import (
     growth,
     said_corners,
 )
-from hsv.study.sensitivity.flights_strip import draw_metric, legend, lost_where, widths
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_figures import draw_metric, legend, lost_where, widths
 from hsv.vehicle.vehicle import load_vehicle
 
 PAPER_LIKE = load_vehicle().coupling_scale("paper_like")
@@ -35,7 +35,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Fly and linearise every controller from kappa = 0, the decoupled model, on."""
     kappas = grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05, coarseness)
     over = corners_of(1.0, coarseness)
-    strips = sweep("coupling", {c: [_point(c, float(k), over) for k in kappas] for c in ALL}, folder, progress)
+    results = sweep("coupling", {c: [_point(c, float(k), over) for k in kappas] for c in ALL}, folder, progress)
     growths: dict[Controller, np.ndarray] = {}
     limits: dict[Controller, CouplingLimits] = {}
     for number, controller in enumerate(ALL):
@@ -52,8 +52,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     axes[0].axhline(0.0, color="black", linewidth=0.6)
     axes[0].set_ylim(-0.5, 1.5)
     axes[0].set_ylabel("largest real part (1/s)")
-    draw_metric(axes[1], kappas, strips, "elastic_decay_time", "s", "elastic decay (s)")
-    draw_metric(axes[2], kappas, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
+    draw_metric(axes[1], kappas, results, "elastic_decay_time", "s", "elastic decay (s)")
+    draw_metric(axes[2], kappas, results, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
     plain_log(axes[2])
     axes[2].set_xlabel(r"coupling $\kappa$ (0: decoupled, 1: derived from a beam model)")
     for axis in axes:
@@ -63,7 +63,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     axes[0].text(0.995, 1.32, "derived", color=GREY, fontsize=8, ha="right")
     letter(axes)
     legend(figure, shares=False)
-    findings = [f"{c.label}: {limits[c].said()}; {lost_where(kappas, strips[c], 'κ = {}')}" for c in ALL]
+    findings = [f"{c.label}: {limits[c].said()}; {lost_where(kappas, results[c], 'κ = {}')}" for c in ALL]
     return Outcome(
         figure,
         f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {said_corners(over)} of the "
@@ -76,7 +76,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
             "kappa": kappas.tolist(),
             "growth_per_s": {c.label: rows.tolist() for c, rows in growths.items()},
             "unstable_from": {c.label: {"nominal": found.nominal, "worst": found.worst} for c, found in limits.items()},
-            "flights": {c.label: columns for c, columns in strips.items()},
+            "flights": {c.label: columns for c, columns in results.items()},
         },
     )
 

@@ -1,4 +1,4 @@
-"""The strip over the depth of the elevator fault."""
+"""The sweep over the depth of the elevator fault."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 from hsv.errors import ScenarioError
 from hsv.study.figures.style import GREY, new_figure
 from hsv.study.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, of_scenarios, said_corners
-from hsv.study.sensitivity.flights_strip import LOSSES, draw_losses, finding
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_figures import LOSSES, draw_losses, finding
 
 FLOWN = (*ALL, RMPC_DECOUPLED)
 
@@ -40,11 +40,11 @@ def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: S
         c: [Point(c.parameters() | {"fault.parameters": [f"effectiveness={float(left)!r}"]}, over) for left in shares]
         for c in flown
     }
-    strips = sweep("fault", along, folder, progress)
+    results = sweep("fault", along, folder, progress)
 
     figure = new_figure(7.2)
     label = "elevator effectiveness after the fault (0.9: the paper's)"
-    axes = draw_losses(figure, shares, {c: strips[c] for c in (*ALL, *others)}, label)
+    axes = draw_losses(figure, shares, {c: results[c] for c in (*ALL, *others)}, label)
     # Without a fault hardly anything moves: that end of the curves would take most of the axis.
     axes[1].set_ylim(bottom=0.05)
     axes[2].set_ylim(bottom=1.0)
@@ -55,8 +55,10 @@ def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: S
         figure,
         f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {said_corners(over)} of the parameter "
         f"bounds. {LOSSES} {SAID_RMPC}.",
-        tuple(finding(c, shares, columns, "effectiveness {}", digits=3, rising=False) for c, columns in strips.items()),
-        {"effectiveness": shares.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
+        tuple(
+            finding(c, shares, columns, "effectiveness {}", digits=3, rising=False) for c, columns in results.items()
+        ),
+        {"effectiveness": shares.tolist(), "flights": {c.label: columns for c, columns in results.items()}},
     )
 
 

@@ -18,9 +18,9 @@ from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure, plain_log
 from hsv.study.linear_loop import stability_limit
 from hsv.study.sensitivity.controllers import Controller, corners_of, growth, said_corners
-from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.vehicle.vehicle import load_vehicle
 
 SETS = (
@@ -61,7 +61,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         limits[coupled] = (_limits(coupled, over[:1], centres, depths), _limits(coupled, over, centres, depths))
     progress("notch, linear loops", total, total)
     along = {coupled: [Point(_values(coupled, float(centre)), over) for centre in centres] for coupled in SETS}
-    strips = sweep("notch", along, folder, progress)
+    results = sweep("notch", along, folder, progress)
 
     figure = new_figure(6.4)
     spec = figure.add_gridspec(2, 2)
@@ -75,7 +75,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     panels[0].set_ylabel(rf"zero damping $\varepsilon_z$ ({own.pole_damping:g}: no notch)")
     figure.colorbar(shown, ax=panels, label="largest real part (1/s)", aspect=15)
     axis = figure.add_subplot(spec[1, :])
-    for coupled, columns in strips.items():
+    for coupled, columns in results.items():
         for suffix, style in (("nominal", "-"), ("worst", "--")):
             label = coupled.label if suffix == "nominal" else None
             decay = columns[f"elastic_decay_time_{suffix}"]
@@ -97,7 +97,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         f"{own.pole_damping:g}. (c) Decay time in flight, nominal vehicle (solid) and worst corner (dashed); no point "
         "where a flight is lost; dotted: the limits of the scenarios, of which "
         f"{SETS[1].scenario} flies another design, {load_scenario(SETS[1].scenario).design}.",
-        tuple(_finding(c, limits[c], strips[c], centres, said_corners(over)) for c in SETS),
+        tuple(_finding(c, limits[c], results[c], centres, said_corners(over)) for c in SETS),
         {
             "centre_rad_per_s": centres.tolist(),
             "zero_damping": depths.tolist(),
@@ -105,7 +105,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 c.label: {"nominal": m[..., 0].tolist(), "worst": m.max(axis=-1).tolist()} for c, m in maps.items()
             },
             "stable": {c.label: {"nominal": vars(n), "worst": vars(w)} for c, (n, w) in limits.items()},
-            "flights": {c.label: columns for c, columns in strips.items()},
+            "flights": {c.label: columns for c, columns in results.items()},
         },
     )
 
@@ -186,7 +186,9 @@ def _draw_map(axis: Axes, centres: np.ndarray, depths: np.ndarray, values: np.nd
     return shown
 
 
-def _finding(coupled: Controller, limits: tuple[Limits, Limits], columns: Strip, centres: np.ndarray, of: str) -> str:
+def _finding(
+    coupled: Controller, limits: tuple[Limits, Limits], columns: SweepResult, centres: np.ndarray, of: str
+) -> str:
     nominal, worst = (found.said(centres) for found in limits)
     best = {}
     for suffix in ("nominal", "worst"):

@@ -1,4 +1,4 @@
-"""The strip over the size of the parameter perturbations."""
+"""The sweep over the size of the parameter perturbations."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from pathlib import Path
 
 from hsv.study.figures.style import GREY, new_figure
 from hsv.study.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, said_corners
-from hsv.study.sensitivity.flights_strip import LOSSES, draw_losses, finding
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_figures import LOSSES, draw_losses, finding
 
 FLOWN = (*ALL, RMPC_DECOUPLED)
 
@@ -17,18 +17,18 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Fly every controller with 0 to 6 times the paper's bounds."""
     scales = grid(0.0, 6.0, 0.25, coarseness)
     over = [corners_of(float(scale), coarseness) for scale in scales]
-    strips = sweep("parameters", {c: [Point(c.parameters(), o) for o in over] for c in FLOWN}, folder, progress)
+    results = sweep("parameters", {c: [Point(c.parameters(), o) for o in over] for c in FLOWN}, folder, progress)
 
     figure = new_figure(7.2)
     label = "parameter scale (1: the paper's bounds, mass and moment of inertia 10 %)"
-    for axis in draw_losses(figure, scales, {c: strips[c] for c in ALL}, label):
+    for axis in draw_losses(figure, scales, {c: results[c] for c in ALL}, label):
         axis.axvline(1.0, color=GREY, linewidth=0.6, linestyle=":")
     return Outcome(
         figure,
         f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {said_corners(over[0])} of the scaled "
         f"bounds. {LOSSES} {SAID_RMPC}.",
-        tuple(finding(c, scales, columns, "{} times the bounds", nominal=False) for c, columns in strips.items()),
-        {"scale": scales.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
+        tuple(finding(c, scales, columns, "{} times the bounds", nominal=False) for c, columns in results.items()),
+        {"scale": scales.tolist(), "flights": {c.label: columns for c, columns in results.items()}},
     )
 
 

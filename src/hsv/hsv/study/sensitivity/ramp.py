@@ -11,10 +11,10 @@ from hsv.simulation.commands import CommandTable
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, letter, new_figure
 from hsv.study.sensitivity.controllers import Controller, corners_of, said_corners
-from hsv.study.sensitivity.flights_strip import draw_metric, legend
-from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_figures import draw_metric, legend
+from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.units import to_paper
 
 CONTROLLERS = (
@@ -29,14 +29,14 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     lengths = grid(15.0, 80.0, 5.0, coarseness)
     over = corners_of(1.0, coarseness)
     along = {c: [Point(_values(c, float(length)), over) for length in lengths] for c in CONTROLLERS}
-    strips = sweep("ramp", along, folder, progress)
+    results = sweep("ramp", along, folder, progress)
     shipped = _command(CONTROLLERS[0])
 
     figure = new_figure(7.2)
     axes = figure.subplots(3, 1, sharex=True)
-    draw_metric(axes[0], lengths, strips, "altitude_error_maximum", "m", "largest altitude error (ft)")
-    draw_metric(axes[1], lengths, strips, "velocity_error_maximum", "m/s", "largest velocity error (ft/s)")
-    draw_metric(axes[2], lengths, strips, "post_fault_attitude_from_nominal", "rad", "attitude from nominal (deg)")
+    draw_metric(axes[0], lengths, results, "altitude_error_maximum", "m", "largest altitude error (ft)")
+    draw_metric(axes[1], lengths, results, "velocity_error_maximum", "m/s", "largest velocity error (ft/s)")
+    draw_metric(axes[2], lengths, results, "post_fault_attitude_from_nominal", "rad", "attitude from nominal (deg)")
     axes[2].axhline(0.5, color="black", linewidth=0.6)
     for axis in axes:
         axis.axvline(shipped.end - shipped.start, color=GREY, linewidth=0.6, linestyle=":")
@@ -50,8 +50,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         f"Case 2 with the ramp from {shipped.start:g} s on; nominal vehicle (solid) and the worst of "
         f"{said_corners(over)} of the parameter bounds (dashed). The one of {lengths[-1]:g} s ends as the fault sets "
         "in, so that its largest error includes the fault's. (c) After the fault, black: half a degree.",
-        tuple(_finding(controller, lengths, columns) for controller, columns in strips.items()),
-        {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in strips.items()}},
+        tuple(_finding(controller, lengths, columns) for controller, columns in results.items()),
+        {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in results.items()}},
     )
 
 
@@ -68,7 +68,7 @@ def _values(controller: Controller, length: float) -> dict[str, object]:
     return {**read_parameters(find_design(controller.design)), **changed.parameters()}
 
 
-def _finding(controller: Controller, lengths: np.ndarray, columns: Strip) -> str:
+def _finding(controller: Controller, lengths: np.ndarray, columns: SweepResult) -> str:
     feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
 
     def off(index: int, which: str) -> str:

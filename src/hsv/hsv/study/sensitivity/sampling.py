@@ -14,9 +14,9 @@ from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import COUPLING_SCALES, worst_growth
 from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_limits, said_corners
-from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.study.sources import DIGITS, code_digest, digest_of, kept, package_digest
 from hsv.units import to_paper
 from hsv.vehicle.vehicle import load_vehicle
@@ -46,7 +46,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
             limits[period, name] = coupling_limits(*loop, over)
     progress("sampling, linear loops", len(growths), len(growths))
     along = {PERIODS[period]: [Point(_values(design), over)] for period, design in designs.items()}
-    strips = sweep("sampling", along, folder, progress)
+    results = sweep("sampling", along, folder, progress)
 
     figure, paper_like = new_figure(5.6), load_vehicle().coupling_scale("paper_like")
     axes = figure.subplots(2, 1, sharex=True)
@@ -74,7 +74,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 (
                     f"{controller.label}: with the notch, {limits[period, FILTERS[0]].said()}",
                     f"without, {limits[period, FILTERS[1]].said()}",
-                    _flown(strips[controller]),
+                    _flown(results[controller]),
                 )
             )
             for period, controller in PERIODS.items()
@@ -86,12 +86,12 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 f"{period:g} s, {name}": {"nominal": found.nominal, "worst": found.worst}
                 for (period, name), found in limits.items()
             },
-            "flights": {c.label: columns for c, columns in strips.items()},
+            "flights": {c.label: columns for c, columns in results.items()},
         },
     )
 
 
-def _flown(columns: Strip) -> str:
+def _flown(columns: SweepResult) -> str:
     degrees = to_paper(1.0, "rad")[0]
     attitude = [degrees * columns[f"post_fault_attitude_deviation_{which}"][0] for which in ("nominal", "worst")]
     decay = [columns[f"elastic_decay_time_{which}"][0] for which in ("nominal", "worst")]

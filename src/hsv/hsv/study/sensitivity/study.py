@@ -20,7 +20,7 @@ class Outcome:
     figure: Figure
     shows: str
     findings: tuple[str, ...]
-    strips: dict[str, Any] = field(default_factory=dict)
+    numbers: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

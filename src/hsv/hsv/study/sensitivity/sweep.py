@@ -1,4 +1,4 @@
-"""The flights of a strip, kept controller by controller: a study that was interrupted goes on where it stopped."""
+"""The flights of a sweep, kept controller by controller: a study that was interrupted goes on where it stopped."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ import numpy as np
 from hsv.design.region import Corner
 from hsv.study.corner_flights import fly_over
 from hsv.study.sensitivity.controllers import Controller
-from hsv.study.sensitivity.strip import Strip, strip
 from hsv.study.sensitivity.study import Progress
+from hsv.study.sensitivity.sweep_result import SweepResult, sweep_result
 from hsv.study.sources import DIGITS, code_digest, digest_of, kept, measuring_code
 
 _HALF_WIDTH = np.ones(5)
-"""The strips use no measure that weighs rigid errors against each other."""
+"""The sweeps use no measure that weighs rigid errors against each other."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """One point of a strip: flat parameters and the vehicles flown there."""
+    """One point of a sweep: flat parameters and the vehicles flown there."""
 
     values: Mapping[str, Any]
     over: Sequence[Corner]
@@ -31,43 +31,43 @@ class Point:
 
 def sweep(
     name: str, along: Mapping[Controller, Sequence[Point]], folder: Path, progress: Progress
-) -> dict[Controller, Strip]:
-    """Fly every controller at its points and return their strips.
+) -> dict[Controller, SweepResult]:
+    """Fly every controller at its points and return what comes of it.
 
     Args:
         name: Of the study.
         along: Points by controller; the nominal vehicle is the first of each point.
-        folder: Where strips are kept, under a digest of what they depend on.
+        folder: Where results are kept, under a digest of what they depend on.
         progress: Called with what is done.
     """
     total, done = sum(map(len, along.values())), 0
-    strips = {}
+    results = {}
     for number, (controller, points) in enumerate(along.items()):
 
-        def flown(points: Sequence[Point] = points, before: int = done) -> Strip:
+        def flown(points: Sequence[Point] = points, before: int = done) -> SweepResult:
             tables = []
             for index, point in enumerate(points):
                 progress(f"{name}, flights", before + index, total)
                 tables.append(fly_over(dict(point.values), point.over, _HALF_WIDTH))
-            return strip(tables)
+            return sweep_result(tables)
 
-        path = folder / f"strip_{name}_{number}_{_digest(points)[:DIGITS]}.json"
-        strips[controller] = kept(path, flown, _save, _load) if controller.kept else flown()
+        path = folder / f"sweep_{name}_{number}_{_digest(points)[:DIGITS]}.json"
+        results[controller] = kept(path, flown, _save, _load) if controller.kept else flown()
         done += len(points)
     progress(f"{name}, flights", total, total)
-    return strips
+    return results
 
 
 def _digest(points: Sequence[Point]) -> str:
     flown = [[dict(point.values), [dict(corner) for corner in point.over]] for point in points]
     text = json.dumps(flown, sort_keys=True, default=np.ndarray.tolist)
-    return digest_of([text.encode(), code_digest().encode(), *measuring_code(strip.__module__)])
+    return digest_of([text.encode(), code_digest().encode(), *measuring_code(sweep_result.__module__)])
 
 
-def _save(path: Path, columns: Strip) -> None:
+def _save(path: Path, columns: SweepResult) -> None:
     path.write_text(json.dumps(columns), encoding="utf-8")
 
 
-def _load(path: Path) -> Strip:
-    columns: Strip = json.loads(path.read_text(encoding="utf-8"))
+def _load(path: Path) -> SweepResult:
+    columns: SweepResult = json.loads(path.read_text(encoding="utf-8"))
     return columns

@@ -24,9 +24,9 @@ from hsv.study.sensitivity.controllers import (
     corners_of,
     said_corners,
 )
-from hsv.study.sensitivity.strip import Strip
 from hsv.study.sensitivity.study import Outcome, Progress, Study
 from hsv.study.sensitivity.sweep import Point, sweep
+from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.study.sensitivity.variations import (
     BOUNDS,
     ELEVATOR,
@@ -39,7 +39,7 @@ from hsv.study.sensitivity.variations import (
 from hsv.units import to_paper
 from hsv.vehicle.vehicle import load_vehicle
 
-Strips = dict[Group, Strip]
+Results = dict[Group, SweepResult]
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
@@ -56,7 +56,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         for notched in (True, False)
     }
 
-    def flown(law: str, groups: tuple[Group, ...], controller: Controller) -> Strips:
+    def flown(law: str, groups: tuple[Group, ...], controller: Controller) -> Results:
         along = {
             Controller(group.label, controller.scenario, group.color): [
                 Point(
@@ -66,8 +66,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
             ]
             for group in groups
         }
-        strips = sweep(f"weights_{law}_{controller.scenario}", along, folder, progress)
-        return dict(zip(groups, strips.values(), strict=True))
+        results = sweep(f"weights_{law}_{controller.scenario}", along, folder, progress)
+        return dict(zip(groups, results.values(), strict=True))
 
     of_F = flown("F", WEIGHTS, WITH_NOTCH)
     of_K = flown("K", (*WEIGHTS, BOUNDS), WITH_NOTCH)
@@ -98,8 +98,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 for notched, rows in growths.items()
             },
             "flights": {
-                name: {group.label: columns for group, columns in strips.items()}
-                for name, strips in (("F", of_F), ("K", of_K), ("K, RMPC", of_rmpc))
+                name: {group.label: columns for group, columns in results.items()}
+                for name, results in (("F", of_F), ("K", of_K), ("K, RMPC", of_rmpc))
             },
         },
     )
@@ -133,7 +133,7 @@ def _draw(
     figure: Figure,
     factors: dict[str, tuple[float, ...]],
     growths: dict[bool, dict[Group, list[float]]],
-    flights: tuple[Strips, Strips, Strips],
+    flights: tuple[Results, Results, Results],
 ) -> None:
     of_F, of_K, of_rmpc = flights
     panels = figure.subplots(3, 2, sharex=True)
@@ -146,14 +146,14 @@ def _draw(
     ends = ("altitude_end_error_nominal", "altitude_end_error_worst")
     settling = ("altitude_settling_time_nominal", "velocity_settling_time_nominal")
     attitude = ("post_fault_attitude_from_nominal_worst",)
-    for axis, law, strips, names, unit, label in (
+    for axis, law, results, names, unit, label in (
         (panels[0, 1], "K", of_K, settling, 1.0, "step settled (s)"),
         (panels[1, 0], "F", of_F, attitude, degrees, "attitude from nominal (deg)"),
         (panels[1, 1], "K", of_K, attitude, degrees, "attitude from nominal (deg)"),
         (panels[2, 0], "F", of_F, ends, feet, "altitude error at end (ft)"),
         (panels[2, 1], "K", of_rmpc, ends, feet, "altitude error at end,\nRMPC (ft)"),
     ):
-        for group, columns in strips.items():
+        for group, columns in results.items():
             for name, style in zip(names, ("o-", "o--"), strict=False):
                 axis.plot(factors[law], unit * np.array(columns[name]), style, color=group.color, markersize=3)
         axis.set_ylabel(label)
@@ -179,12 +179,13 @@ def _factor_axis(axis: Axes) -> None:
     axis.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _feedback_findings(factors: tuple[float, ...], strips: Strips, without: dict[Group, list[float]]) -> list[str]:
+def _feedback_findings(factors: tuple[float, ...], results: Results, without: dict[Group, list[float]]) -> list[str]:
     feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
 
     def at(group: Group, index: int) -> str:
         attitude, altitude = (
-            strips[group][f"{name}_worst"][index] for name in ("post_fault_attitude_from_nominal", "altitude_end_error")
+            results[group][f"{name}_worst"][index]
+            for name in ("post_fault_attitude_from_nominal", "altitude_end_error")
         )
         loop = "stable" if without[group][index] < 0.0 else "unstable"
         return (
@@ -193,10 +194,10 @@ def _feedback_findings(factors: tuple[float, ...], strips: Strips, without: dict
         )
 
     own = f"F, the baseline's own weights, worst corner: {at(ELEVATOR, factors.index(1.0))}"
-    return [own, *(f"F, {g.label} {_said(factors, partial(at, g))}" for g in strips)]
+    return [own, *(f"F, {g.label} {_said(factors, partial(at, g))}" for g in results)]
 
 
-def _nominal_findings(factors: tuple[float, ...], of_K: Strips, of_rmpc: Strips) -> list[str]:
+def _nominal_findings(factors: tuple[float, ...], of_K: Results, of_rmpc: Results) -> list[str]:
     feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
 
     def at(group: Group, index: int) -> str:
@@ -212,8 +213,8 @@ def _nominal_findings(factors: tuple[float, ...], of_K: Strips, of_rmpc: Strips)
             + (f", {100.0 * lost:.0f} % of its flights lost" if lost else "")
         )
 
-    def ends(strips: Strips) -> str:
-        values = np.array([columns["altitude_end_error_nominal"] for columns in strips.values()])
+    def ends(results: Results) -> str:
+        values = np.array([columns["altitude_end_error_nominal"] for columns in results.values()])
         return f"{feet * np.nanmin(values):.1f} to {feet * np.nanmax(values):.1f} ft"
 
     return [

@@ -1,4 +1,4 @@
-"""The numbers of a strip of flights: one controller over one quantity, nominal vehicle and corners."""
+"""The numbers of a sweep of flights: one controller over one quantity, nominal vehicle and corners."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 
 from hsv.study.corner_flights import Table
 
-Strip = dict[str, list[float]]
-"""Columns over the points of a strip, by name."""
+SweepResult = dict[str, list[float]]
+"""Columns over the points of a sweep, by name."""
 
 _METRICS = (
     "post_fault_attitude_deviation",
@@ -27,12 +27,12 @@ SATURATED_STEPS = 50
 """Limited steps, one second, from which a flight counts as at its limits."""
 
 
-def strip(tables: Sequence[Table]) -> Strip:
+def sweep_result(tables: Sequence[Table]) -> SweepResult:
     """Return the columns of one controller from the table of each point; the nominal vehicle is the first flight.
 
     Angles in rad, lengths in m, times in s. What a lost flight does not define is not a number, and infinite at worst.
     """
-    columns: Strip = {"finished": [], "without_limits": [], "nominal_finished": []}
+    columns: SweepResult = {"finished": [], "without_limits": [], "nominal_finished": []}
     for table in tables:
         finished = table["diverged"] == 0.0
         columns["finished"].append(float(finished.mean()))

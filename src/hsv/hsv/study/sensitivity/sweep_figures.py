@@ -1,4 +1,4 @@
-"""Strips of flights drawn and put in words: every controller over one quantity, nominal vehicle and corners."""
+"""Sweeps of flights drawn and put in words: every controller over one quantity, nominal vehicle and corners."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 
 from hsv.study.figures.style import letter, plain_log
 from hsv.study.sensitivity.controllers import Controller
-from hsv.study.sensitivity.strip import Strip
+from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.units import to_paper
 
 
@@ -18,19 +18,21 @@ def widths(count: int) -> np.ndarray:
     return 0.8 + 0.3 * np.arange(count)[::-1]
 
 
-def draw_metric(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip], name: str, unit: str, label: str) -> None:
+def draw_metric(
+    axis: Axes, x: np.ndarray, results: dict[Controller, SweepResult], name: str, unit: str, label: str
+) -> None:
     """Draw a metric of every controller: solid the nominal vehicle, dashed the worst."""
     factor = to_paper(1.0, unit)[0]
-    for (controller, columns), width in zip(strips.items(), widths(len(strips)), strict=True):
+    for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         for suffix, style in (("nominal", "-"), ("worst", "--")):
             values = factor * np.array(columns[f"{name}_{suffix}"])
             axis.plot(x, values, style, color=controller.color, linewidth=width)
     axis.set_ylabel(label)
 
 
-def draw_share(axis: Axes, x: np.ndarray, strips: dict[Controller, Strip]) -> None:
+def draw_share(axis: Axes, x: np.ndarray, results: dict[Controller, SweepResult]) -> None:
     """Draw the share of flights that come to their end (solid), and without being at their limits (dotted)."""
-    for (controller, columns), width in zip(strips.items(), widths(len(strips)), strict=True):
+    for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         shares = {name: 100.0 * np.array(columns[name]) for name in ("finished", "without_limits")}
         axis.plot(x, shares["finished"], color=controller.color, linewidth=width, label=controller.label)
         axis.plot(x, shares["without_limits"], ":", color=controller.color, linewidth=width)
@@ -49,19 +51,19 @@ def legend(figure: Figure, *, shares: bool) -> None:
     figure.legend(handles=[*controllers, *keys], loc="outside upper center", ncols=3, frameon=False)
 
 
-def draw_losses(figure: Figure, x: np.ndarray, strips: dict[Controller, Strip], label: str) -> np.ndarray:
+def draw_losses(figure: Figure, x: np.ndarray, results: dict[Controller, SweepResult], label: str) -> np.ndarray:
     """Draw and return three panels over ``x``: which flights are lost, attitude after the fault, altitude at the end.
 
     Args:
         figure: Empty.
-        x: Values along the strips.
-        strips: By controller.
+        x: Values along the sweeps.
+        results: By controller.
         label: What ``x`` is.
     """
     axes = np.asarray(figure.subplots(3, 1, sharex=True))
-    draw_share(axes[0], x, strips)
-    draw_metric(axes[1], x, strips, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
-    draw_metric(axes[2], x, strips, "altitude_end_error", "m", "altitude error at end (ft)")
+    draw_share(axes[0], x, results)
+    draw_metric(axes[1], x, results, "post_fault_attitude_deviation", "rad", "attitude excursion (deg)")
+    draw_metric(axes[2], x, results, "altitude_end_error", "m", "altitude error at end (ft)")
     for axis in axes[1:]:
         plain_log(axis)
     axes[2].set_xlabel(label)
@@ -80,7 +82,7 @@ LOSSES = (
 def finding(
     controller: Controller,
     x: np.ndarray,
-    columns: Strip,
+    columns: SweepResult,
     words: str,
     *,
     digits: int = 2,
@@ -90,20 +92,20 @@ def finding(
     """Return in words between which points a controller comes to its limits and is lost, going along ``x``.
 
     Args:
-        controller: Whose strip it is.
-        x: Values along the strip, increasing.
-        columns: The strip.
+        controller: Whose sweep it is.
+        x: Values along the sweep, increasing.
+        columns: Of the sweep.
         words: Around a value, which stands for ``{}``.
         digits: Of a value, behind the point.
         rising: Go from the least value on, else from the largest.
-        nominal: Whether the strip changes the nominal vehicle's flight, too.
+        nominal: Whether the sweep changes the nominal vehicle's flight, too.
     """
     where = lost_where(x, columns, words, digits=digits, rising=rising, nominal=nominal)
     return f"{controller.label}: {where}"
 
 
 def lost_where(
-    x: np.ndarray, columns: Strip, words: str, *, digits: int = 2, rising: bool = True, nominal: bool = True
+    x: np.ndarray, columns: SweepResult, words: str, *, digits: int = 2, rising: bool = True, nominal: bool = True
 ) -> str:
     """Return the same without the controller's name."""
     order = slice(None) if rising else slice(None, None, -1)
