@@ -35,10 +35,16 @@ test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damag
 test-ros: setup ## set up, then run the tests that need a full ROS 2 installation, sourced before (ARGS="-k launch" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -m full_ros $(ARGS)
 
-# Browser and node come from Debian, node's readers of bags from npm; where apt-get is not wanted, install them before.
+# Browser and node come from Debian, node's readers of bags from npm. Of them only what is missing is installed: a node
+# from elsewhere brings its own npm, beside which that of Debian cannot be; where apt-get is not wanted, install before.
 test-viewers: setup ## set up, install a browser, node and npm packages, then run the tests that need them
-	@if ! { command -v chromedriver && command -v npm; } > /dev/null; then \
-		$$([ "$$(id -u)" = 0 ] || echo sudo) apt-get install -y --no-install-recommends chromium chromium-driver nodejs npm; \
+	@missing=; \
+	command -v chromium chromium-browser google-chrome > /dev/null || missing=chromium; \
+	for each in chromedriver:chromium-driver node:nodejs npm:npm; do \
+		command -v "$${each%:*}" > /dev/null || missing="$$missing $${each#*:}"; \
+	done; \
+	if [ -n "$$missing" ]; then \
+		$$([ "$$(id -u)" = 0 ] || echo sudo) apt-get install -y --no-install-recommends $$missing; \
 	fi
 	@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
 	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-viewers.txt --constraint "$$pins"
