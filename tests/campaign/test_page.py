@@ -7,6 +7,7 @@ import pytest
 
 from hsv.campaign.page import BINS, histogram, render, sentence, share_interval
 from hsv.campaign.summary import Share, limits, shares, within_all
+from hsv.simulation.metrics import METRICS
 
 
 def test_times_of_whole_periods_make_bars_and_no_comb():
@@ -34,6 +35,17 @@ def test_flights_are_counted(results):
         assert f"{share.within} of {share.flights}" in text
     for places in re.findall(r"\d+(\.\d+)? …", text):
         assert not places, "44 flights tell whole percents apart, at most"
+
+
+def test_metrics_are_named_in_words_and_grouped(results):
+    page = render(results)
+    text = re.sub(r"<(script|style|pre).*?</\1>", "", page, flags=re.DOTALL)
+    names = {name.replace("_", " ") for name in METRICS} - {metric.words for metric in METRICS.values()}
+    assert names and not [name for name in names if name in text]
+    assert re.findall(r'<optgroup label="([^"]*)"', page) == [
+        heading.lower() for heading in re.findall(r"<h3>([^<]*)</h3>", page)
+    ]
+    assert '<optgroup label="after the fault">' in page
 
 
 def test_it_opens_with_how_many_flights_keep_all_limits(results):

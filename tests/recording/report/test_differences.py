@@ -5,7 +5,7 @@ import pytest
 from recorded_flight import record_flight
 
 from hsv.recording.report.differences import differences
-from hsv.recording.report.opening import sentence
+from hsv.recording.report.opening import happened
 from hsv.recording.report.run import reported_runs
 
 
@@ -23,7 +23,7 @@ def test_a_flight_does_not_differ_from_itself(quiet):
     runs = reported_runs([quiet, quiet])
     found = differences(runs)
     assert found and all(difference.none for difference in found)
-    assert "the same, bit for bit" in sentence(runs, found)
+    assert "States and commands are the same, bit for bit" in happened(runs, found)
 
 
 def test_differences_far_below_single_precision_are_kept(quiet, nearly):
@@ -33,13 +33,13 @@ def test_differences_far_below_single_precision_are_kept(quiet, nearly):
     np.testing.assert_array_equal(altitude.y, second - first)
     assert 0.0 < altitude.largest < np.spacing(np.float32(first.max()))
     assert altitude.at == altitude.time[np.argmax(np.abs(second - first))]
-    assert "they nearly agree" in sentence(runs, differences(runs))
+    assert "The flights nearly agree" in happened(runs, differences(runs))
 
 
 def test_flights_that_differ_are_said_to_differ_most_somewhere(quiet, loud):
     runs = reported_runs([quiet, loud])
     found = by_panel(runs)
-    assert "they differ most in" in sentence(runs, list(found.values()))
+    assert "The flights differ most in" in happened(runs, list(found.values()))
     assert found["level"].runs[0].share > 0.01
 
 

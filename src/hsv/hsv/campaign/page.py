@@ -14,14 +14,26 @@ from markupsafe import Markup
 
 from hsv.campaign.envelope import SIGNALS, signals, window_starts
 from hsv.campaign.factors import Factor
-from hsv.campaign.summary import ENDED, Results, Share, distributions, limits, shares, within_all, worst_flights
+from hsv.campaign.summary import (
+    ENDED,
+    Distribution,
+    Results,
+    Share,
+    distributions,
+    limits,
+    shares,
+    within_all,
+    worst_flights,
+)
+from hsv.campaign.table import OUTCOMES
 from hsv.errors import CampaignError, ControllerError, reason
 from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import Numbers, compressed
 from hsv.recording.report.picture import Band, Line, Picture, picture, time_plot
 from hsv.recording.report.templates import environment_of
-from hsv.recording.report.text import units_of, words
+from hsv.recording.report.text import capitalised, in_brackets, quantity, units_of
 from hsv.simulation.closed_loop import Flight
+from hsv.simulation.metrics import METRICS, Group, in_words, is_share
 from hsv.units import UnitSystem
 from hsv.vehicle.plant import Plant
 
@@ -29,6 +41,9 @@ POINTS = 2000
 """Flights that scatter plots draw at most, of more every n-th; WebGL would draw more, in fewer plots a page."""
 
 BINS = 60
+
+RUN = "run"
+"""What numbers tell about that are no metrics: when a flight ended, and how far in its tube it stayed."""
 
 
 PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
@@ -79,10 +94,12 @@ def render(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
         shares=shares(results),
         within_all=within_all(results),
         flights=list(flights),
-        distributions=differing,
+        distributions=_grouped(differing),
         constant=[d for d in shown if d.minimum == d.maximum],
-        units_of={d.name: d.unit for d in shown},
+        outcome=_outcome,
+        outcome_unit=lambda name: in_brackets(OUTCOMES[name], share=is_share(name)),
         worst=worst,
+        chosen=next((d.name for d in differing if d.name == worst[0].limit), differing[0].name if differing else ""),
         ended=ENDED,
         relative=relative,
         share_interval=share_interval,
@@ -107,8 +124,21 @@ def sentence(results: Results) -> str:
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
     over = min(limited, key=lambda share: share.within)
     if broken := ended.flights - over.within:
-        text += f"; the limit of {words(over.name)} is the one that most do not keep, {broken} of {ended.flights}"
+        text += f"; the limit of {in_words(over.name)} is the one that most do not keep, {broken} of {ended.flights}"
     return f"{text}. {said}."
+
+
+def _grouped(shown: Sequence[Distribution]) -> dict[str, list[Distribution]]:
+    """Return distributions by what they tell about: the groups of metrics, then the run."""
+    groups: dict[str, list[Distribution]] = {group: [] for group in (*Group, RUN)}
+    for distribution in shown:
+        groups[METRICS[distribution.name].group if distribution.name in METRICS else RUN].append(distribution)
+    return {group: found for group, found in groups.items() if found}
+
+
+def _outcome(name: str, value: float, digits: int = 3) -> Markup:
+    """Return a number (SI) that is kept of a flight under ``name``, in all systems of units."""
+    return quantity(value, OUTCOMES[name], digits, share=is_share(name))
 
 
 def share_interval(share: Share) -> str:
@@ -128,11 +158,12 @@ def _data(results: Results, names: Sequence[str]) -> dict[str, Any]:
     """Return what the page's script draws besides curves over time, as plain data."""
     drawn = _drawn(results)
     columns = {name: results.column(name) for name in names}
-    stated, units = limits(results), {d.name: d.unit for d in distributions(results)}
+    stated = limits(results)
     return {
         "metrics": {
             name: {
-                "units": units_of(units[name]),
+                "words": in_words(name),
+                "units": units_of(OUTCOMES[name], share=is_share(name)),
                 "limit": stated.get(name),
                 "values": _packed(values[drawn]),
                 **histogram(values),
@@ -229,7 +260,7 @@ def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
                 look = f"run{run} nominal" if run else "run0"
                 lines.append(Line(look, time[: len(curve)], curve, run))
             band = Band(time[reached], envelope.low[reached, index], envelope.high[reached, index])
-            plots.append(time_plot(words(signal.name).capitalize(), signal.unit, end, lines, [band]))
+            plots.append(time_plot(capitalised(in_words(signal.name)), signal.unit, end, lines, [band]))
     starts = [fault.start for fault in results.campaign.scenario.fault]
     return picture(plots, end, [(start, end) for start in starts if start < end])
 

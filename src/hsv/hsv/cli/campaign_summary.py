@@ -21,7 +21,7 @@ from hsv.campaign.summary import (
 )
 from hsv.campaign.table import OUTCOMES
 from hsv.cli.output import console, errors, json_system, print_json
-from hsv.simulation.metrics import METRICS
+from hsv.simulation.metrics import in_words, is_share
 from hsv.units import UnitSystem, in_system, significant, unit_in
 from hsv.vehicle.parameters import COEFFICIENT_UNITS
 
@@ -100,7 +100,7 @@ def _print_tables(
         limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
         interval = "all corners" if share.interval is None else " to ".join(_percent(p) for p in share.interval)
         table.add_row(
-            _words(share.name),
+            in_words(share.name),
             limit,
             f"{share.within} of {share.flights}",
             _percent(share.fraction),
@@ -112,13 +112,13 @@ def _print_tables(
         table.add_column(heading, justify="left" if heading in ("metric", "unit") else "right")
     for d in spread:
         cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
-        table.add_row(_words(d.name), *(number for number, _ in cells), cells[0][1])
+        table.add_row(in_words(d.name), *(number for number, _ in cells), cells[0][1])
     console.print(table)
     worst = [w for w in worst if w.limit]  # of a scenario without limits, those that ended early
     if worst:
         console.print("worst flights, by what they use of their limits:")
     for w in worst:
-        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {_words(w.limit)}"
+        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
         console.print(f"  {w.flight}: {used}; {sample_words(w.sample, units)}", soft_wrap=True)
 
 
@@ -132,16 +132,11 @@ def sample_words(sample: dict[str, float], units: UnitSystem) -> str:
     )
 
 
-def _words(name: str) -> str:
-    return METRICS[name].words if name in METRICS else name.replace("_", " ")
-
-
 def _percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
 def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
     """Return a number that is kept of a flight (SI) as it is printed, and its unit."""
-    share = name in METRICS and METRICS[name].share
-    number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=share)
+    number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=is_share(name))
     return significant(number), "" if unit == "1" else unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from hsv.simulation.metrics import CRITERIA, METRICS
+from hsv.simulation.metrics import CRITERIA, METRICS, in_words
 from hsv.simulation.scenario import Scenario
 from hsv.units import UnitSystem, in_system, significant
 
@@ -60,22 +60,26 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
         metrics: Of the flight, by name, SI.
         system: Units of the numbers in it.
     """
-    over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
-    if not judged:
-        text = "not judged: the scenario has no limits"
-    elif all(verdict.within for verdict in judged.values()):
-        text = f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
-    else:
-        said = ", ".join(f"{METRICS[name].words} {_broken(name, verdict, system)}" for name, verdict in over)
-        head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
-        text = "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
+    text = limits_kept(judged, system)
     free = not_judged(judged, metrics)
     named = [name for name in free if name in CRITERIA]
-    words = [f"{METRICS[name].words} ({in_units(name, metrics[name], system)})" for name in named]
+    words = [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
     if others := len(free) - len(named):
         plural = "s" if others > 1 else ""
         words.append(f"{others} other{plural}" if words else f"{others} metric{plural} without a limit")
     return f"{text}; not judged: {', '.join(words)}" if words and judged else text
+
+
+def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
+    """Return the same without what is not judged."""
+    if not judged:
+        return "not judged: the scenario has no limits"
+    if all(verdict.within for verdict in judged.values()):
+        return f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
+    over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
+    said = ", ".join(f"{in_words(name)} {_broken(name, verdict, system)}" for name, verdict in over)
+    head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
+    return "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
 
 
 def _broken(name: str, verdict: Verdict, system: UnitSystem) -> str:

@@ -122,6 +122,16 @@ CRITERIA = (
 """The metrics that the paper judges a flight by: where a scenario has no limit for one of them, it is named."""
 
 
+def in_words(name: str) -> str:
+    """Return what people call a metric, or whatever else the program has a name for."""
+    return METRICS[name].words if name in METRICS else name.replace("_", " ")
+
+
+def is_share(name: str) -> bool:
+    """Return whether what is kept of a flight under a name is a share of something, which people read in percent."""
+    return name in METRICS and METRICS[name].share
+
+
 @dataclass(frozen=True)
 class FlightData:
     """What the metrics are made of, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2).

@@ -51,7 +51,7 @@ function scatter(data, name, units) {
     draw(`scatter-${factor.name}`, [{
       type: "scatter", mode: "markers", x: scaled(unpack(factor.values), across), y, text: [...flights].map((flight) => `flight ${flight}`),
       marker: { size: 4, opacity: 0.5, color: css("--run0") }, hovertemplate: "%{text}: %{x:.4g}, %{y:.5g}<extra></extra>",
-    }], layout(plain(across.unit), `${name.replaceAll("_", " ")}${unit && ` [${unit}]`}`, { shapes }));
+    }], layout(plain(across.unit), `${metric.words}${unit && ` [${unit}]`}`, { shapes }));
   }
 }
 

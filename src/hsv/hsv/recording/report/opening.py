@@ -1,16 +1,20 @@
-"""What a report opens with: the verdict in one sentence, and one picture of the flight."""
+"""What a report opens with: the verdict in one sentence, what happened, and one picture of the flight."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from markupsafe import Markup, escape
 
 from hsv.recording.report.differences import NEARLY, Difference
 from hsv.recording.report.panels import Kind
 from hsv.recording.report.picture import Line, Picture, TimePlot, picture, time_plot
 from hsv.recording.report.run import ReportedRun
-from hsv.recording.report.text import number, percent, words
+from hsv.recording.report.text import capitalised, number, percent, switched
+from hsv.simulation.limits import limits_kept, verdict_sentence
+from hsv.simulation.metrics import in_words
+from hsv.units import UnitSystem
 
 PICTURED = ("altitude", "velocity", "angle_of_attack", "level")
 """Panels that the picture is made of."""
@@ -20,19 +24,42 @@ RUN_COLOURS = 6
 _LOOKS = {Kind.actual: "", Kind.nominal: "nominal", Kind.reference: "reference", Kind.bound: "bound"}
 
 
-def sentence(runs: Sequence[ReportedRun], found: Sequence[Difference]) -> str:
-    """Return the verdict on one flight, or on several and how far they agree."""
+def sentence(runs: Sequence[ReportedRun]) -> Markup:
+    """Return the verdict on one flight, or on several, in all systems of units."""
+    return switched({system: str(escape(f"{capitalised(_verdict(runs, system))}.")) for system in UnitSystem})
+
+
+def _verdict(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
     if len(runs) == 1:
-        return f"{_verdict(runs[0])}{_faults(runs[0])}{_tube(runs[0])}."
+        (run,) = runs
+        return _whole(run, verdict_sentence(run.verdicts, run.metrics, system))
     judged = [run for run in runs if run.verdicts or run.failure]
-    parts = []
-    if judged:
-        good = [run for run in judged if run.good]
-        parts.append(f"{len(good)} of {len(judged)} flights are within all of their limits")
-        parts += [f"{run.label}: {_verdict(run)[0].lower()}{_verdict(run)[1:]}" for run in judged if not run.good]
-    else:
-        parts.append("There are no limits to judge these flights by")
-    return "; ".join([*parts, *_agreement(found)]) + "."
+    if not judged:
+        return "there are no limits to judge these flights by"
+    good = [run for run in judged if run.good]
+    parts = [f"{len(good)} of {len(judged)} flights are within all of their limits"]
+    parts += [f"{run.label}: {kept(run, system)}" for run in judged if not run.good]
+    return "; ".join(parts)
+
+
+def kept(run: ReportedRun, system: UnitSystem) -> str:
+    """Return whether a flight came to its end and kept its limits, and which it did not."""
+    return _whole(run, limits_kept(run.verdicts, system))
+
+
+def _whole(run: ReportedRun, verdict: str) -> str:
+    """Return a verdict with what else makes a flight good or not: whether it ended early or is not recorded whole."""
+    parts = [f"lost: {run.failure}"] if run.failure else []
+    parts.append(verdict if run.scenario else run.remark)
+    if run.incomplete:
+        parts.append(f"recorded are {run.incomplete}")
+    return "; ".join(parts)
+
+
+def happened(runs: Sequence[ReportedRun], found: Sequence[Difference]) -> str:
+    """Return what happened in one flight, or how far several agree; empty where nothing is known of that."""
+    said = (_faults(runs[0]), *_tube(runs[0])) if len(runs) == 1 else tuple(_agreement(found))
+    return f"{capitalised('; '.join(said))}." if said else ""
 
 
 def _agreement(found: Sequence[Difference]) -> Iterator[str]:
@@ -42,42 +69,26 @@ def _agreement(found: Sequence[Difference]) -> Iterator[str]:
     if all(difference.none for difference in found):
         yield "states and commands are the same, bit for bit"
     elif share <= NEARLY:
-        yield f"they nearly agree: no quantity differs by more than {percent(share)} of its range"
+        yield f"the flights nearly agree: no quantity differs by more than {percent(share)} of its range"
     elif np.isfinite(share):
-        yield f"they differ most in {title[0].lower()}{title[1:]}, by {percent(share)} of its range"
-
-
-def _verdict(run: ReportedRun) -> str:
-    over = [words(name) for name, verdict in run.verdicts.items() if not verdict.within]
-    if run.failure:
-        return f"Lost: {run.failure}"
-    if over:
-        return f"Not within its limits: {', '.join(over)} ({len(over)} of {len(run.verdicts)})"
-    if not run.verdicts:
-        return "There are no limits to judge this flight by"
-    limits = f"all {len(run.verdicts)} limits" if len(run.verdicts) > 1 else "its limit"
-    return f"Within {limits}{f' in what is recorded: {run.incomplete}' if run.incomplete else ''}"
+        yield f"the flights differ most in {title[0].lower()}{title[1:]}, by {percent(share)} of its range"
 
 
 def _faults(run: ReportedRun) -> str:
     faults = run.description["faults"] or ()
     if not faults:
-        return ", without a fault"
+        return "no fault"
     first = faults[0]
     more = f" and {len(faults) - 1} more" if len(faults) > 1 else ""
-    return f", with {words(first['type'])} of the {words(first['channel'])} from {number(first['start_s'])} s{more}"
+    return f"{in_words(first['type'])} of the {in_words(first['channel'])} from {number(first['start_s'])} s{more}"
 
 
-def _tube(run: ReportedRun) -> str:
+def _tube(run: ReportedRun) -> Iterator[str]:
     tube = run.description["tube"]
-    if not tube or not tube["checked_steps"]:
-        return ""
-    level = f"largest level {number(tube['largest_level'], 3)}"
-    if tube["outside_steps"]:
-        return (
-            f"; the error left the invariant set in {tube['outside_steps']} of {tube['checked_steps']} steps, {level}"
-        )
-    return f"; the error stayed in the invariant set, {level}"
+    if tube and tube["checked_steps"]:
+        outside, checked = tube["outside_steps"], tube["checked_steps"]
+        where = f"left the invariant set in {outside} of {checked} steps" if outside else "stayed in the invariant set"
+        yield f"the error {where}, largest level {number(tube['largest_level'], 3)}"
 
 
 def flight_picture(runs: Sequence[ReportedRun]) -> Picture:

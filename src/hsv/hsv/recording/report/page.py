@@ -6,19 +6,20 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
 from hsv.recording.report.comparison import comparisons, differing_metrics
 from hsv.recording.report.differences import differences
-from hsv.recording.report.opening import flight_picture, sentence
+from hsv.recording.report.opening import flight_picture, happened, kept, sentence
 from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
 from hsv.recording.report.templates import environment_of
+from hsv.recording.report.text import switched
 from hsv.recording.report.values import Quantity, Section, Table
-from hsv.simulation.metrics import METRICS
+from hsv.simulation.metrics import METRICS, Group, Metric
 from hsv.simulation.scenario import scenario_names
 from hsv.units import UnitSystem
 
@@ -70,14 +71,16 @@ def render(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric
         runs=runs,
         units=units,
         sections=sections,
-        sentence=sentence(runs, found),
+        sentence=sentence(runs),
+        happened=happened(runs, found),
+        kept=lambda run: switched({system: str(escape(kept(run, system))) for system in UnitSystem}),
         picture=flight_picture(runs),
         differences=found,
         differing=differing_metrics(runs),
         groups=groups,
         panels=panels,
         effectors=any(curve["kind"] == Kind.effector for panel in plots["panels"] for curve in panel["curves"]),
-        metrics={name: metric for name, metric in METRICS.items() if any(name in run.metrics for run in runs)},
+        metrics=_grouped(runs),
         comparisons=comparisons(runs),
         shipped_scenarios=scenario_names(),
         events_shown=EVENTS_SHOWN,
@@ -85,3 +88,13 @@ def render(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric
         numbers=Markup(numbers),
         library=Markup(compressed(LIBRARY.read_bytes())),
     )
+
+
+def _grouped(runs: Sequence[ReportedRun]) -> dict[Group, dict[str, Metric]]:
+    """Return the metrics that any of the runs defines or is judged by, by what they tell about."""
+    known = {name for run in runs for name in (*run.metrics, *run.verdicts)}
+    groups = {
+        group: {name: metric for name, metric in METRICS.items() if metric.group is group and name in known}
+        for group in Group
+    }
+    return {group: metrics for group, metrics in groups.items() if metrics}

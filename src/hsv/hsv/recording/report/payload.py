@@ -15,7 +15,8 @@ from hsv.recording.report.differences import Difference
 from hsv.recording.report.events import Event
 from hsv.recording.report.panels import Kind, Panel
 from hsv.recording.report.run import ReportedRun
-from hsv.recording.report.text import units_of, words
+from hsv.recording.report.text import units_of
+from hsv.simulation.metrics import in_words
 
 _COMMON = (Kind.reference, Kind.bound)
 """Kinds that are drawn once, for all flights, where they are the same in all."""
@@ -77,7 +78,7 @@ def _faults(run: ReportedRun) -> list[dict[str, Any]]:
     return [
         {
             "channel": fault["channel"],
-            "text": f"{words(fault['channel'])}: {words(fault['type'])}",
+            "text": f"{in_words(fault['channel'])}: {in_words(fault['type'])}",
             "from": fault["start_s"],
             "to": run.duration if fault["end_s"] is None else fault["end_s"],
         }

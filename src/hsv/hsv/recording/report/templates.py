@@ -8,6 +8,7 @@ from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from hsv.recording.report import text
+from hsv.simulation.metrics import in_words
 
 SHARED = "hsv.recording.report"
 """The package whose templates, style and scripts all pages share."""
@@ -30,12 +31,13 @@ def environment_of(package: str, *, escaped: bool = True) -> Environment:
     environment.filters |= {
         "number": text.number,
         "percent": text.percent,
-        "words": text.words,
+        "words": in_words,
         "breakable": text.breakable,
     }
     environment.globals |= {
         "asset": asset,
         "quantity": text.quantity,
+        "in_brackets": text.in_brackets,
         "unit": text.unit,
         "unit_systems": text.SYSTEMS,
     }

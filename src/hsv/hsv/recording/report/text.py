@@ -32,7 +32,7 @@ def quantity(value: float, unit: str, digits: int = 5, *, signed: bool = False, 
     """
     plus = "+" if signed and value > 0.0 else ""
     shown = {system: in_system(value, unit, system, share=share) for system in SYSTEMS}
-    return _switched({system: plus + _with_unit(*pair, digits) for system, pair in shown.items()})
+    return switched({system: plus + _with_unit(*pair, digits) for system, pair in shown.items()})
 
 
 def decimals(value: float | None, unit: str, places: Mapping[str, int]) -> Markup:
@@ -40,12 +40,18 @@ def decimals(value: float | None, unit: str, places: Mapping[str, int]) -> Marku
     if value is None:
         return Markup("–")
     shown = {system: in_system(value, unit, system)[0] for system in SYSTEMS}
-    return _switched({system: f"{number:.{places[system]}f}".replace("-", "−") for system, number in shown.items()})
+    return switched({system: f"{number:.{places[system]}f}".replace("-", "−") for system, number in shown.items()})
 
 
 def unit(unit: str, *, share: bool = False) -> Markup:
     """Return the unit in all systems; nothing for a pure number."""
-    return _switched({system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS})
+    return switched({system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS})
+
+
+def in_brackets(unit: str, *, share: bool = False) -> Markup:
+    """Return the unit in all systems as it stands behind what has it; nothing for a pure number."""
+    names = {system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS}
+    return switched({system: f" [{name}]" if name else "" for system, name in names.items()})
 
 
 def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
@@ -64,22 +70,22 @@ def percent(share: float) -> str:
     return f"{number(float(f'{100.0 * share:.2g}'), 15)} %"
 
 
+def capitalised(text: str) -> str:
+    """Return a text as a sentence begins."""
+    return text[:1].upper() + text[1:]
+
+
 def breakable(name: str) -> Markup:
     """Return a name of the program that may go on in a next line where it has underscores."""
     return Markup("_<wbr>").join(name.split("_"))
-
-
-def words(name: str) -> str:
-    """Return a name of the program in words."""
-    return name.replace("_", " ")
 
 
 def _with_unit(value: float, unit: str, digits: int) -> str:
     return f"{number(value, digits)}&nbsp;{unit_html(unit)}" if unit not in ("1", "") else number(value, digits)
 
 
-def _switched(texts: dict[UnitSystem, str]) -> Markup:
-    """Return a text of which the page shows the one of its system of units; equal ones are there once."""
+def switched(texts: Mapping[UnitSystem, str]) -> Markup:
+    """Return the text of the system of units that the page shows, of HTML by system; equal ones are there once."""
     systems: dict[str, list[str]] = {}
     for system, text in texts.items():
         systems.setdefault(text, []).append(system)
