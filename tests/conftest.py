@@ -22,6 +22,9 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("busy")
 
+# Its assertions say what they found, as those of test modules do.
+pytest.register_assert_rewrite("page_checks")
+
 PICTURES = Path(__file__).parents[1] / "docs" / "images"
 """The pictures of the documentation."""
 

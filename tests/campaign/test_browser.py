@@ -1,8 +1,14 @@
 """The page of a campaign as a browser shows it."""
 
 import pytest
+from page_checks import PageChecks
 
+from hsv.campaign.campaign import plan
+from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.page import write_page
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
+from hsv.campaign.summary import Results, within_all
 
 pytestmark = pytest.mark.viewer
 
@@ -21,12 +27,20 @@ def opened(browser, page):
     return browser
 
 
+@pytest.fixture
+def show(browser, page):
+    return lambda: browser.open(page)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
 def ends(browser, name, axis):
     return browser.run("return document.getElementById(arguments[0])._fullLayout[arguments[1]].range", name, axis)
 
 
-def test_it_opens_quietly_with_every_plot(opened):
-    assert opened.console() == []
+def test_every_plot_is_drawn(opened):
     drawn = "return [...document.querySelectorAll('.plot')].every((plot) => plot.querySelector('.main-svg'))"
     assert opened.run(drawn)
 
@@ -73,28 +87,13 @@ def test_the_address_says_what_is_shown_and_shows_it(opened):
     assert opened.run(what) == shown and opened.console() == []
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_there_are_no_barriers(opened, screen, scheme):
-    screen(1280, scheme)
-    assert opened.barriers() == []
-
-
-@pytest.mark.parametrize("width", [1280, 400])
-def test_nothing_is_wider_than_the_screen(browser, page, screen, width):
-    screen(width)
+def test_what_a_campaign_of_whole_flights_opens_with(browser, screen, tmp_path, pictures):
+    campaign = plan("case1", samples=100, seed=1, commit="test")
+    out = tmp_path / "case1.parquet"
+    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+    results, page = Results(out), tmp_path / "case1.html"
+    write_page(results, page)
+    screen(1280)
     browser.open(page)
-    assert browser.run("return document.documentElement.scrollWidth") <= width
-    beyond = "return [...document.querySelectorAll('.scroll')].some((each) => each.scrollWidth > each.clientWidth)"
-    assert width < 1280 or not browser.run(beyond)
-
-
-def test_in_print_plots_fit_and_controls_go(opened):
-    opened.media(media="print", features=[{"name": "prefers-color-scheme", "value": "dark"}])
-    assert opened.run("return getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    assert opened.run("return getComputedStyle(document.getElementById('toolbar')).display") == "none"
-    fits = """
-        const plots = [...document.querySelectorAll(".plot")];
-        return plots.every((plot) => plot.clientWidth > 0 && plot.querySelector("svg").clientWidth <= plot.clientWidth);
-    """
-    assert opened.run(fits)
-    opened.media(media="", features=[])
+    assert browser.run("return document.querySelector('.lead').innerText").startswith(f"{within_all(results)} of 100 ")
+    browser.picture(pictures / "montecarlo.png")

@@ -88,7 +88,7 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, t
     assert injected["accepted"], injected
     paused = page.ask("pause", paused="true")
     # Nothing is flown any more from the acknowledged step on.
-    assert paused["message"].startswith(f"paused = True from step {paused['step']} on")
+    assert paused["message"].startswith(f"paused = true from step {paused['step']} on")
     wait_until(lambda: recorded_steps(tmp_path / "bag") >= paused["step"] - 50, [watched.popen.pid])
     while not page.status["settings"].get("paused"):
         assert page.read()

@@ -5,6 +5,7 @@ import time
 import pytest
 from live_clients import FoxgloveClient, addresses, assert_without_gap
 from node_processes import Processes, recorded_steps, short_scenario
+from page_checks import PageChecks
 from ros_domain import own_environment
 from waiting import wait_until
 
@@ -35,11 +36,11 @@ def until(browser, flight, condition):
     wait_until(lambda: browser.run(f"return Boolean({condition})"), [flight.pid])
 
 
-def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, tmp_path, pictures):
+def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, screen, tmp_path, pictures):
     bag = tmp_path / "bag"
     flight, page, _ = fly(processes, short_scenario(tmp_path, 40, fault=35), "--bag", bag, "--real-time-factor", "2")
     driver = browser.driver
-    driver.set_window_size(1280, 1000)
+    screen(1280)
     browser.console()
     browser.requests()
     driver.get(page)
@@ -58,10 +59,10 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     driver.find_element("css selector", "[name=inject]").click()
     until(browser, flight, "live.status.faults.length === 1")
     answer = browser.run("return document.getElementById('answer').textContent")
-    assert answer.startswith("loss_of_effectiveness effectiveness 0.8 of elevator_deflection from step ")
+    assert answer.startswith("loss of effectiveness effectiveness 0.8 of elevator deflection from step ")
     step = int(answer.partition("from step ")[2].split()[0])
     until(browser, flight, f"live.charts.now > {step * 0.02 + 6.0}")
-    driver.save_screenshot(str(pictures / "live.png"))
+    browser.picture(pictures / "live.png")
     shade = browser.run("return document.getElementById('plot-altitude').layout.shapes[0]")
     assert shade["x0"] == pytest.approx(step * 0.02) and shade["x1"] > shade["x0"]
     limits = "document.getElementById('plot-elevator_deflection')"
@@ -84,34 +85,64 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     driver.get(f"{report.as_uri()}#events")
     events = browser.run("return document.getElementById('events').textContent")
     assert "effectiveness 0.8" in events
-    driver.save_screenshot(str(pictures / "live_report.png"))
+    browser.picture(pictures / "live_report.png")
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(400, "dark"), (1280, "light")])
-def test_it_fits_narrow_and_wide_windows_in_both_themes(browser, processes, tmp_path, width, scheme):
-    flight, page, _ = fly(processes, short_scenario(tmp_path, 3600), "--bag", tmp_path / "bag", "--no-report")
-    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 500}
-    browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-    theme = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
-    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", theme)
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory):
+    """Start a flight that lasts longer than the tests that look at it; return its process and the page's address."""
+    folder = tmp_path_factory.mktemp("endless")
+    with own_environment() as environment:
+        started = Processes(environment, folder)
+        flight, page, _ = fly(started, short_scenario(folder, 3600, fault=2), "--bag", folder / "bag", "--no-report")
+        yield flight, page
+        started.stop()
+
+
+def look(browser, flight, page):
+    """Open the live page at an address, and wait until a fault acts and everything is drawn."""
+    # The same page with another token is no other page to a browser.
+    browser.driver.get("about:blank")
     browser.driver.get(page)
-    until(browser, flight, "window.live && live.charts.now > 1")
-    assert browser.run("return document.documentElement.scrollWidth") <= width
-    channels = browser.run("return getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)")
-    assert (min(channels) > 128) == (scheme == "light")
-    browser.driver.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
-    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+    until(browser, flight, "window.live && live.charts.now > 3 && live.status && live.status.faults.length")
 
 
-def test_without_the_token_it_shows_and_asks_nothing(browser, processes, tmp_path):
-    flight, page, _ = fly(processes, short_scenario(tmp_path, 3600), "--bag", tmp_path / "bag", "--no-report")
-    browser.driver.get(page.partition("#")[0])
-    until(browser, flight, "window.live && live.charts.now > 1")
+@pytest.fixture
+def show(browser, endless):
+    return lambda: look(browser, *endless)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
+def test_without_the_token_it_shows_and_asks_nothing(browser, endless):
+    flight, page = endless
+    look(browser, flight, page.partition("#")[0])
     assert browser.run("return document.querySelector('fieldset.flight').disabled")
     assert "token" in browser.run("return document.getElementById('answer').textContent")
     browser.run("live.ask('pause', { paused: 'true' })")
+    assert_refused(browser, flight)
+
+
+@pytest.mark.parametrize("button", ["pause", "set_pace", "set_tau", "inject", "clear"])
+def test_with_another_token_every_button_is_answered_with_a_reason(browser, endless, button):
+    flight, page = endless
+    look(browser, flight, f"{page}x")
+    browser.driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
+    browser.driver.find_element("css selector", f"[name={button}]").click()
+    assert_refused(browser, flight)
+
+
+def assert_refused(browser, flight):
+    """The page says why nothing was done, and nothing was: the flight goes on as it was."""
     until(browser, flight, "document.getElementById('answer').className === 'bad'")
     assert browser.run("return document.getElementById('answer').textContent").startswith("token: wrong or missing")
+    before = browser.run("return live.charts.now")
+    until(browser, flight, f"live.charts.now > {before + 0.5}")
+    status = browser.run("return live.status")
+    assert not status["settings"]["paused"] and status["settings"]["real_time_factor"] == 1
+    assert [fault["channel"] for fault in status["faults"]] == ["elevator_deflection"]
 
 
 def test_two_hundred_seconds_at_real_time_pace_lack_nothing(processes, tmp_path):

@@ -1,12 +1,9 @@
 """The Foxglove server: topics with their definitions, bytes as they came."""
 
-import socket
-
 import pytest
 from live_clients import FoxgloveClient
 from waiting import wait_until
 
-from hsv.errors import ParameterError
 from hsv.graph.description import TOPICS, resolved
 from hsv.live.foxglove_server import FoxgloveServer
 from hsv.recording.definitions import definition
@@ -49,12 +46,3 @@ def test_a_new_run_begins_a_new_session(server):
     server.start_run()
     wait_until(lambda: len(client.sessions) == 2)
     assert client.sessions[0] != client.sessions[1]
-
-
-def test_a_port_in_use_is_named():
-    with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))
-        held.listen()
-        port = held.getsockname()[1]
-        with pytest.raises(ParameterError, match=rf"^live\.port = {port}: in use, expected a free port"):
-            FoxgloveServer(port, NAMES)

@@ -1,19 +1,15 @@
 """The server of the page: who is let in, what he gets, and that nobody is kept waiting."""
 
 import json
-import socket
 import urllib.error
 import urllib.request
-from pathlib import Path
 
 import pytest
 from live_clients import PageClient
 from waiting import wait_until
 from websocket import WebSocketBadStatusException
 
-from hsv.errors import ParameterError
 from hsv.live.commands import Clear
-from hsv.live.server import PageServer
 
 A_STEP = 9
 
@@ -65,22 +61,6 @@ def test_pages_of_other_places_are_refused(server):
     with pytest.raises(WebSocketBadStatusException) as refused:
         PageClient(server.url, origin=None)
     assert refused.value.resp_body.decode() == f"Origin: missing, expected {expected}\n"
-
-
-def test_it_listens_on_this_machine_only(server):
-    tables = "".join(Path("/proc/net", name).read_text() for name in ("tcp", "tcp6"))
-    listening = [line.split() for line in tables.splitlines()]
-    places = [words[1] for words in listening if words[1].endswith(f":{server.port:04X}") and words[3] == "0A"]
-    assert places == [f"0100007F:{server.port:04X}"]
-
-
-def test_a_port_in_use_is_named(hub):
-    with socket.socket() as held:
-        held.bind(("127.0.0.1", 0))
-        held.listen()
-        port = held.getsockname()[1]
-        with pytest.raises(ParameterError, match=rf"^live\.page_port = {port}: .*in use, expected a free port"):
-            PageServer(port, hub)
 
 
 def test_commands_need_the_token(hub, server):

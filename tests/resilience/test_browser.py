@@ -2,6 +2,7 @@
 
 import pytest
 from node_processes import short_scenario
+from page_checks import PageChecks
 
 from hsv.campaign.executors import SerialExecutor
 from hsv.resilience.campaign import plan
@@ -21,17 +22,22 @@ def page(tmp_path_factory):
     return write_results(ResilienceResults.read(campaign, store), folder / "out", "hsv resilience")[0]
 
 
-@pytest.mark.parametrize("width", [1280, 400])
-def test_the_page_is_as_wide_as_the_screen_and_prints_its_numbers(browser, page, screen, width):
-    screen(width)
+@pytest.fixture
+def show(browser, page):
+    return lambda: browser.open(page)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
+@pytest.mark.usefixtures("screen")
+def test_it_prints_its_numbers(browser, page):
     browser.open(page)
-    assert browser.console() == []
-    assert browser.run("return document.documentElement.scrollWidth") <= width
     height = "return document.querySelector('details').getBoundingClientRect().height"
     closed = browser.run(height)
     browser.media(media="print")
     assert browser.run(height) > 1.5 * closed
-    assert browser.run("return getComputedStyle(document.getElementById('toolbar')).display") == "none"
     links = browser.run("return [...document.querySelectorAll('a')].map((a) => a.getAttribute('href'))")
     assert all((page.parent / link).is_file() for link in links if not link.startswith("#"))
 
@@ -53,10 +59,3 @@ def test_units_are_switched_and_kept_in_the_address(browser, page):
     browser.driver.get("about:blank")
     browser.driver.get(address)
     assert browser.run(head) == "altitude (ft)" and browser.console() == []
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_there_are_no_barriers(browser, page, screen, scheme):
-    screen(1280, scheme)
-    browser.open(page)
-    assert browser.barriers() == []

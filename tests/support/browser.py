@@ -89,6 +89,13 @@ class Browser:
         features = [{"name": "prefers-color-scheme", "value": scheme}]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": features})
 
+    def picture(self, path: Path) -> None:
+        """Save what the screen shows, without scroll bars."""
+        self.driver.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": True})
+        self.settle()
+        self.driver.save_screenshot(str(path))
+        self.driver.execute_cdp_cmd("Emulation.setScrollbarsHidden", {"hidden": False})
+
     def barriers(self) -> list[str]:
         """Return what axe-core finds wrong with the page, everything on it unfolded: rule and place."""
         if not AXE.is_file():

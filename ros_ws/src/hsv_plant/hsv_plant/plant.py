@@ -113,7 +113,8 @@ class PlantNode(LockstepNode):
             if parameter.name in _IN_FLIGHT:
                 self.values[parameter.name] = parameter.value
                 self._paced_from = time.monotonic(), step
-                self.say_change(f"{parameter.name} = {parameter.value} from step {step + 1} on")
+                said = str(parameter.value).lower()  # as it is written in files: true, not True
+                self.say_change(f"{parameter.name} = {said} from step {step + 1} on")
         return SetParametersResult(successful=True)
 
     def _on_progress(self, progress: RecorderProgress) -> None:

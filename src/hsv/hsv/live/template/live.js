@@ -4,6 +4,9 @@
 const REDRAW = 200; // ms between two drawings of the plots
 const ROWS = 1024; // that there is room for at first
 
+/* Names of the program in words. */
+const words = (name) => name.replaceAll("_", " ");
+
 class LiveCharts extends Charts {
   /* Charts whose arrays grow: time, then the columns. */
   constructor(plots) {
@@ -93,7 +96,7 @@ class Vehicle {
 
   draw(faults) {
     if (!this.charts.count) return;
-    const said = faults.map(({ channel, type }) => ({ channel, text: `${channel}: ${type}`.replaceAll("_", " ") }));
+    const said = faults.map(({ channel, type }) => ({ channel, text: words(`${channel}: ${type}`) }));
     this.view.draw({ ...this.sample("actuator", "actual"), faults: said, nominal: this.sample("nominal") });
   }
 }
@@ -153,7 +156,7 @@ class Flight {
       this.socket.send(JSON.stringify({ id, token: this.token, command, ...fields }));
     });
     output.className = answer.accepted ? "good" : "bad";
-    output.textContent = answer.message;
+    output.textContent = answer.accepted ? words(answer.message) : answer.message;
     return answer;
   }
 
@@ -172,9 +175,9 @@ class Flight {
     this.fill("diagnostics", Object.entries(status.diagnostics).map(([node, said]) => [
       node, { text: said.words, bad: said.level > 0 }, Object.entries(said.values).map((pair) => pair.join(" ")).join(", "),
     ]));
-    this.fill("events", [...status.events].reverse().map((event) => [event.time.toFixed(2), String(event.step), { text: event.words, bad: event.warning }]));
+    this.fill("events", [...status.events].reverse().map((event) => [event.time.toFixed(2), String(event.step), { text: words(event.words), bad: event.warning }]));
     const faults = document.getElementById("faults");
-    faults.textContent = status.faults.map((fault) => fault.words.replaceAll("_", " ")).join("; ") || "none";
+    faults.textContent = status.faults.map((fault) => words(fault.words)).join("; ") || "none";
     faults.classList.toggle("bad", status.faults.length > 0);
     this.tellState();
     this.enable();
@@ -194,21 +197,21 @@ class Flight {
   }
 
   tellState() {
-    const words = [];
+    const said = [];
     const { run, settings, ending, bag } = this.status || { settings: {} };
-    if (!run) words.push("Waiting for a flight");
-    else words.push(`t = ${this.charts.now.toFixed(2)} s of ${(run.last_step * run.period).toFixed(0)} s`);
+    if (!run) said.push("Waiting for a flight");
+    else said.push(`t = ${this.charts.now.toFixed(2)} s of ${(run.last_step * run.period).toFixed(0)} s`);
     if (ending) {
-      words.unshift(`Flight ${ending.how} at t = ${ending.time.toFixed(2)} s`);
-      words.length = 1;
-      if (bag) words.push(`verdict, metrics and report: ${bag}/report.html`);
-    } else if (this.over) words.unshift("Connection lost");
-    else if (settings.paused) words.push("paused");
+      said.unshift(`Flight ${ending.how} at t = ${ending.time.toFixed(2)} s`);
+      said.length = 1;
+      if (bag) said.push(`verdict, metrics and report: ${bag}/report.html`);
+    } else if (this.over) said.unshift("Connection lost");
+    else if (settings.paused) said.push("paused");
     else if (run && settings.real_time_factor !== undefined) {
-      words.push(settings.real_time_factor === 0 ? "as fast as possible" : `${settings.real_time_factor} × real time`);
+      said.push(settings.real_time_factor === 0 ? "as fast as possible" : `${settings.real_time_factor} × real time`);
     }
     const state = document.getElementById("state");
-    state.textContent = words.join(" · ");
+    state.textContent = said.join(" · ");
     state.classList.toggle("bad", Boolean(ending && ending.how !== "finished"));
   }
 
@@ -264,7 +267,6 @@ class Flight {
 function connectControls(flight) {
   const { charts, form } = flight;
   const kinds = JSON.parse(document.getElementById("kinds").textContent);
-  const words = (name) => name.replaceAll("_", " ");
   const offer = (select, names) => select.replaceChildren(...names.map((name) => new Option(words(name), name)));
   const explain = () => {
     const kind = kinds[form.channel.value][form.type.value];
