@@ -124,7 +124,7 @@ def sentence(results: Results) -> str:
     text = f"{within_all(results)} of {ended.flights} flights are within all {len(limited)} limits"
     over = min(limited, key=lambda share: share.within)
     if broken := ended.flights - over.within:
-        text += f"; the limit of {in_words(over.name)} is the one that most do not keep, {broken} of {ended.flights}"
+        text += f"; most often not kept is the limit of {in_words(over.name)}, by {broken} of {ended.flights}"
     return f"{text}. {said}."
 
 

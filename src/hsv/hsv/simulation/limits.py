@@ -61,13 +61,17 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
         system: Units of the numbers in it.
     """
     text = limits_kept(judged, system)
-    free = not_judged(judged, metrics)
-    named = [name for name in free if name in CRITERIA]
-    words = [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
-    if others := len(free) - len(named):
+    words = criteria_not_judged(judged, metrics, system)
+    if others := len(not_judged(judged, metrics)) - len(words):
         plural = "s" if others > 1 else ""
         words.append(f"{others} other{plural}" if words else f"{others} metric{plural} without a limit")
     return f"{text}; not judged: {', '.join(words)}" if words and judged else text
+
+
+def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> list[str]:
+    """Return in words, with their values, the metrics that the paper judges a flight by and its scenario does not."""
+    named = [name for name in not_judged(judged, metrics) if name in CRITERIA]
+    return [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
 
 
 def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:

@@ -12,7 +12,7 @@ from hsv.recording.report.panels import Kind
 from hsv.recording.report.picture import Line, Picture, TimePlot, picture, time_plot
 from hsv.recording.report.run import ReportedRun
 from hsv.recording.report.text import capitalised, number, percent, switched
-from hsv.simulation.limits import limits_kept, verdict_sentence
+from hsv.simulation.limits import criteria_not_judged, limits_kept, verdict_sentence
 from hsv.simulation.metrics import in_words
 from hsv.units import UnitSystem
 
@@ -38,19 +38,23 @@ def _verdict(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
         return "there are no limits to judge these flights by"
     good = [run for run in judged if run.good]
     parts = [f"{len(good)} of {len(judged)} flights are within all of their limits"]
-    parts += [f"{run.label}: {kept(run, system)}" for run in judged if not run.good]
+    parts += [f"{run.label}: {_whole(run, limits_kept(run.verdicts, system))}" for run in judged if not run.good]
+    for run in judged:
+        if free := criteria_not_judged(run.verdicts, run.metrics, system):
+            parts.append(f"{run.label}: not judged: {', '.join(free)}")
     return "; ".join(parts)
 
 
-def kept(run: ReportedRun, system: UnitSystem) -> str:
-    """Return whether a flight came to its end and kept its limits, and which it did not."""
-    return _whole(run, limits_kept(run.verdicts, system))
+def verdict(run: ReportedRun) -> Markup:
+    """Return the verdict on one flight among several, in all systems of units."""
+    said = {system: _whole(run, verdict_sentence(run.verdicts, run.metrics, system)) for system in UnitSystem}
+    return switched({system: str(escape(text)) for system, text in said.items()})
 
 
-def _whole(run: ReportedRun, verdict: str) -> str:
+def _whole(run: ReportedRun, said: str) -> str:
     """Return a verdict with what else makes a flight good or not: whether it ended early or is not recorded whole."""
     parts = [f"lost: {run.failure}"] if run.failure else []
-    parts.append(verdict if run.scenario else run.remark)
+    parts.append(said if run.scenario else run.remark)
     if run.incomplete:
         parts.append(f"recorded are {run.incomplete}")
     return "; ".join(parts)
@@ -71,7 +75,8 @@ def _agreement(found: Sequence[Difference]) -> Iterator[str]:
     elif share <= NEARLY:
         yield f"the flights nearly agree: no quantity differs by more than {percent(share)} of its range"
     elif np.isfinite(share):
-        yield f"the flights differ most in {title[0].lower()}{title[1:]}, by {percent(share)} of its range"
+        most = f"{percent(share)} of" if share < 1.0 else f"{number(share, 2)} times"
+        yield f"the flights differ most in {title[0].lower()}{title[1:]}, by {most} its range"
 
 
 def _faults(run: ReportedRun) -> str:

@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from hsv.errors import RecordingError
 from hsv.recording.reader import Bag
 from hsv.recording.report.comparison import comparisons, differing_metrics
 from hsv.recording.report.differences import differences
-from hsv.recording.report.opening import flight_picture, happened, kept, sentence
+from hsv.recording.report.opening import flight_picture, happened, sentence, verdict
 from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
 from hsv.recording.report.templates import environment_of
-from hsv.recording.report.text import switched
 from hsv.recording.report.values import Quantity, Section, Table
-from hsv.simulation.metrics import METRICS, Group, Metric
+from hsv.simulation.metrics import CRITERIA, METRICS, Group, Metric
 from hsv.simulation.scenario import scenario_names
 from hsv.units import UnitSystem
 
@@ -73,7 +72,8 @@ def render(runs: Sequence[ReportedRun], *, units: UnitSystem = UnitSystem.metric
         sections=sections,
         sentence=sentence(runs),
         happened=happened(runs, found),
-        kept=lambda run: switched({system: str(escape(kept(run, system))) for system in UnitSystem}),
+        verdict=verdict,
+        criteria=CRITERIA,
         picture=flight_picture(runs),
         differences=found,
         differing=differing_metrics(runs),
