@@ -38,7 +38,7 @@ def until(browser, flight, condition):
 
 def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, screen, tmp_path, pictures):
     bag = tmp_path / "bag"
-    flight, page, _ = fly(processes, short_scenario(tmp_path, 40, fault=35), "--bag", bag, "--real-time-factor", "2")
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 90, fault=85), "--bag", bag)
     driver = browser.driver
     screen(1280)
     browser.console()
@@ -57,7 +57,8 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     until(browser, flight, "!live.status.settings.paused")
     driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
     driver.find_element("css selector", "[name=inject]").click()
-    until(browser, flight, "live.status.faults.length === 1")
+    # The fault may be seen to act before the answer has come.
+    until(browser, flight, "live.status.faults.length === 1 && document.getElementById('answer').className")
     answer = browser.run("return document.getElementById('answer').textContent")
     assert answer.startswith("loss of effectiveness effectiveness 0.8 of elevator deflection from step ")
     step = int(answer.partition("from step ")[2].split()[0])
@@ -68,13 +69,16 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     limits = "document.getElementById('plot-elevator_deflection')"
     browser.run(f"{limits}.scrollIntoView()")
     until(browser, flight, f"{limits}.layout && {limits}.layout.shapes.filter((s) => s.type === 'line').length === 2")
+    pace = driver.find_element("css selector", "[name=pace]")
+    pace.clear()
+    pace.send_keys("0\n")
     until(browser, flight, "live.status.ending")
     state = browser.run("return document.getElementById('state').textContent")
-    assert state == f"Flight finished at t = 40.00 s · verdict, metrics and report: {bag}/report.html"
+    assert state == f"Flight finished at t = 90.00 s · verdict, metrics and report: {bag}/report.html"
     wait_until(lambda: flight.poll() is not None, [flight.pid])
     # The server has left; the curves stay.
     until(browser, flight, "live.over")
-    assert browser.run("return live.charts.now") == pytest.approx(40.0)
+    assert browser.run("return live.charts.now") == pytest.approx(90.0)
     assert browser.run("return document.querySelector('fieldset.flight').disabled")
     assert browser.console() == []
     assert {address.split("/")[2] for address in browser.requests() if ":" in address} <= {page.split("/")[2]}

@@ -225,7 +225,8 @@ class Flight {
     const { settings = {}, tau = null } = this.status || {};
     if (document.activeElement !== this.form.pace && settings.real_time_factor !== undefined) this.form.pace.value = settings.real_time_factor;
     if (document.activeElement !== this.form.tau && tau !== null) this.form.tau.value = tau.join(", ");
-    if (!this.token) document.getElementById("answer").textContent = "Controls need the address with the token, as the start has printed it.";
+    /* Until something is answered. */
+    if (!this.token && !this.number) document.getElementById("answer").textContent = "Controls need the address with the token, as the start has printed it.";
   }
 
   fill(section, rows) {
