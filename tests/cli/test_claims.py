@@ -6,6 +6,7 @@ from hsv.study.claims.catalogue import GROUPS
 from hsv.study.claims.claim import Judged
 from hsv.study.claims.finding import Finding, Reading
 from hsv.study.claims.ranking import CONTROLLERS, METRICS, Rank
+from hsv.units import UnitSystem
 
 FINDING = Finding((Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)), "It is so.")
 
@@ -17,7 +18,7 @@ def judged(monkeypatch):
 
 
 def test_every_claim_is_one_whole_line_of_a_terminal(judged, capsys):
-    _print_claims(judged, verbose=False)
+    _print_claims(judged, verbose=False, units=UnitSystem.paper)
     lines = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
     for claims in GROUPS.values():
         for claim in claims:
@@ -27,14 +28,16 @@ def test_every_claim_is_one_whole_line_of_a_terminal(judged, capsys):
 
 
 def test_details_are_printed_when_asked_for(judged, capsys):
-    _print_claims(judged, verbose=True)
+    _print_claims(judged, verbose=True, units=UnitSystem.paper)
     printed = " ".join(capsys.readouterr().out.split())
     assert "* yes first: 0.5 (at most 1) no second: 2 (at most 1) It is so." in printed
     assert all(claim.quote in printed for claims in GROUPS.values() for claim in claims)
 
 
 def test_the_ranking_fits_a_terminal(judged, capsys):
-    _print_ranking({metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS})
+    _print_ranking(
+        {metric: {name: Rank(123456.0, 2e5, 1, 2) for name in CONTROLLERS} for metric in METRICS}, UnitSystem.paper
+    )
     printed = capsys.readouterr().out
     assert "…" not in printed
     assert printed.count("nominal") == printed.count("worst") == len(METRICS) + 1

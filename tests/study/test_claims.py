@@ -59,8 +59,8 @@ def test_numbers_are_shown_in_the_paper_s_units():
     assert shown(math.inf, "s") == "not by the end"
     assert shown(math.inf, "1") == "unbounded"
     assert shown(math.nan, "s") == "not defined"
-    assert Reading("x", 0.0, "rad", at_most=math.pi / 360.0).threshold == "at most 0.5 deg"
-    assert Reading("x", 0.0, "dB", at_least=20.0).threshold == "at least 20 dB"
+    assert Reading("x", 0.0, "rad", at_most=math.pi / 360.0).threshold() == "at most 0.5 deg"
+    assert Reading("x", 0.0, "dB", at_least=20.0).threshold() == "at least 20 dB"
 
 
 def test_a_lost_flight_has_no_worst_value():
@@ -84,7 +84,7 @@ def test_every_claim_is_measured_and_says_why(claim, evidence):
     result = claim.measure(evidence)
     assert 1 <= result.leading <= len(result.readings)
     assert len(result.why) > 20
-    assert len({(r.what, r.threshold, r.actuators) for r in result.readings}) == len(result.readings)
+    assert len({(r.what, r.threshold(), r.actuators) for r in result.readings}) == len(result.readings)
     for reading in result.readings:
         # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
         assert not math.isnan(reading.value), reading.what

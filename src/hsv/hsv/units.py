@@ -134,6 +134,12 @@ def significant(value: float, digits: int = 3) -> str:
     return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
 
 
+def in_words(value: float, unit: str, system: UnitSystem) -> str:
+    """Return ``value``, given in the SI ``unit``, with three significant digits and its unit, as people read it."""
+    number, name = in_system(value, unit, system)
+    return significant(number) + ("" if name in ("", "1") else f" {name}")
+
+
 def si_unit_of(text: object) -> str:
     """Return the SI unit of what a quantity is written in, ``"1"`` where there is no unit or no such quantity."""
     try:

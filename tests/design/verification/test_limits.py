@@ -60,10 +60,10 @@ def test_limits_that_are_reached_take_the_certificate_away():
     for near in (Reach(far.channel, -0.1, 0.36, 5.0, 0.35, 6.0), Reach(far.channel, -0.1, 0.3, 6.1, 0.35, 6.0)):
         assert not near.inactive
         limited = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 0.5, (near,)).limited()
-        assert not limited.certified and "beyond it by" in limited.said
+        assert not limited.certified and "beyond it by" in limited.said()
     assert Reach("fuel_equivalence_ratio", 0.0, 0.8, 3.0, np.inf, np.inf).as_dict()["stop"] is None
 
 
 def test_a_flight_that_starts_outside_the_set_is_not_certified():
     verdict = Verdict("all", "", np.ones(5), np.ones(2), np.ones((2, 2)), np.ones((2, 2)), 1.2)
-    assert not verdict.certified and verdict.said == "flights may start outside the set, at level 1.2"
+    assert not verdict.certified and verdict.said() == "flights may start outside the set, at level 1.2"

@@ -9,7 +9,7 @@ def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeyp
         raise DesignError("no set")
 
     monkeypatch.setattr(verdict, "ellipsoid", none)
-    assert verdict.verdict("x", subject.design, subject).said == "no set"
+    assert verdict.verdict("x", subject.design, subject).said() == "no set"
 
 
 def test_a_design_that_knows_actuators_is_judged_with_those_that_fly(realistic):

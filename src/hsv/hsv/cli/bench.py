@@ -9,7 +9,7 @@ import typer
 from rich.text import Text
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, errors, print_json
+from hsv.cli.output import console, errors, folded, print_json
 from hsv.cli.targets import check_target
 
 if TYPE_CHECKING:
@@ -90,14 +90,15 @@ def _as_json(figure: Figure) -> dict[str, Any]:
 
 
 def _print(figures: list[Figure]) -> None:
-    from rich.table import Table
-
+    """Print a figure a paragraph: a table of them all, which the page of the docs has, is wider than a terminal."""
     from hsv.bench.page import cells
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("what", "against", "ours", "theirs", "ratio", "spread", "promise"):
-        table.add_column(heading, justify="left" if heading in ("what", "against", "promise") else "right")
     for figure in figures:
-        row = cells(figure)
-        table.add_row(*row[:-1], Text(row[-1], "bold red" if "WORSE" in row[-1] else ""))
-    console.print(table)
+        what, against, ours, theirs, ratio, spread, promise = cells(figure)
+        compared = f" against {theirs} of {against}: ratio {ratio}" if theirs else ""
+        said = f"{ours}{compared}{f' ({spread})' if spread else ''}"
+        console.print(Text(folded(what), "bold"), soft_wrap=True)
+        console.print(folded(said, 4, first=4), soft_wrap=True)
+        if promise:
+            style = "bold red" if "WORSE" in promise else ""
+            console.print(Text(folded(promise, 4, first=4), style), soft_wrap=True)

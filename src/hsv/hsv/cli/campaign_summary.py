@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rich.table import Table
-
 from hsv.campaign.capacity import Capacity
 from hsv.campaign.page import write_page
 from hsv.campaign.summary import (
@@ -20,7 +18,7 @@ from hsv.campaign.summary import (
     worst_flights,
 )
 from hsv.campaign.table import OUTCOMES
-from hsv.cli.output import console, errors, json_system, print_json
+from hsv.cli.output import console, errors, folded, json_system, new_table, print_json
 from hsv.simulation.metrics import in_words, is_share
 from hsv.units import UnitSystem, in_system, significant, unit_in
 from hsv.vehicle.parameters import COEFFICIENT_UNITS
@@ -93,9 +91,9 @@ def _print_tables(
     units: UnitSystem,
 ) -> None:
     campaign = results.campaign
-    table = Table(title=f"{campaign.scenario.title}: {campaign.samples} flights", title_justify="left", box=None)
-    for heading in ("limit", "", "within", "share", "95 % interval"):
-        table.add_column(heading, justify="left" if heading == "limit" else "right")
+    headings = ("limit", "", "within", "share", "95 % interval")
+    title = f"{campaign.scenario.title}: {campaign.samples} flights"
+    table = new_table(*headings, title=title, right=headings[1:])
     for share in rows:
         limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
         interval = "all corners" if share.interval is None else " to ".join(_percent(p) for p in share.interval)
@@ -107,9 +105,8 @@ def _print_tables(
             interval,
         )
     console.print(table)
-    table = Table(box=None)
-    for heading in ("metric", "least", "median", "95 %", "largest", "unit"):
-        table.add_column(heading, justify="left" if heading in ("metric", "unit") else "right")
+    numbers = ("least", "median", "95 %", "largest")
+    table = new_table("metric", *numbers, "unit", right=numbers)
     for d in spread:
         cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
         table.add_row(in_words(d.name), *(number for number, _ in cells), cells[0][1])
@@ -119,7 +116,7 @@ def _print_tables(
         console.print("worst flights, by what they use of their limits:")
     for w in worst:
         used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
-        console.print(f"  {w.flight}: {used}; {sample_words(w.sample, units)}", soft_wrap=True)
+        console.print(folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2), soft_wrap=True)
 
 
 def sample_words(sample: dict[str, float], units: UnitSystem) -> str:
@@ -127,7 +124,7 @@ def sample_words(sample: dict[str, float], units: UnitSystem) -> str:
     return ", ".join(
         f"{name} {100.0 * value:+.3g} %"
         if units is UnitSystem.metric and name in COEFFICIENT_UNITS
-        else f"{name} {value:+.4g}"
+        else f"{name} {value:+.3g}"
         for name, value in sample.items()
     )
 

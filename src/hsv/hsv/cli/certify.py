@@ -6,13 +6,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
-from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json, report_error
+from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.output import console, folded, print_json, quantity_table, report_error
+from hsv.units import UnitSystem
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from hsv.design.verification.verdict import Verdict
+
+
+HALF_WIDTHS = {
+    "h": "m",
+    "V": "m/s",
+    "alpha": "rad",
+    "theta": "rad",
+    "q": "rad/s",
+    "FZ fuel": "1",
+    "FZ elevator": "rad",
+}
+"""Columns of a table of invariant sets, with SI units: half-widths of the rigid states, and of the feedback on them."""
 
 
 def certify(
@@ -37,6 +51,7 @@ def certify(
     reach: Annotated[
         float, typer.Option(help="Standard deviations that bound noise and turbulence; 8.572 is beyond all of ours.")
     ] = 3.0,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Say whether a design stays certified with hardware and air, and by how much; fails where it does not.
@@ -72,28 +87,22 @@ def certify(
         print_json({"design": subject.design.name, **found})
     else:
         for thing in uncovered:
-            console.print(f"not covered as it is: {thing}", soft_wrap=True)
-        console.print(_table(verdicts))
+            console.print(folded(f"not covered as it is: {thing}"), soft_wrap=True)
+        console.print(_table(verdicts, units))
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"
-            console.print(f"{verdict.name}: {state}, {verdict.said}", soft_wrap=True)
+            console.print(folded(f"{verdict.name}: {state}, {verdict.said(units)}"), soft_wrap=True)
     last = next((verdict for verdict in reversed(verdicts) if not verdict.certified), None)
     if last:
-        report_error(f"{subject.design.name}: not certified with {last.name}: {last.said}")
+        report_error(f"{subject.design.name}: not certified with {last.name}: {last.said(units)}")
         raise typer.Exit(1)
 
 
-def _table(verdicts: list[Verdict]) -> Table:
-    from hsv.units import to_paper
-
-    table = Table(box=None, pad_edge=False)
-    for column in ("", "h ft", "V ft/s", "alpha deg", "theta deg", "q deg/s", "FZ fuel", "FZ elevator deg"):
-        table.add_column(column, justify="left" if not column else "right", overflow="fold")
-    units = ("m", "m/s", "rad", "rad", "rad/s", "1", "rad")
+def _table(verdicts: list[Verdict], units: UnitSystem) -> Table:
+    rows: list[tuple[str, list[float] | None]] = []
     for verdict in verdicts:
-        numbers = [""] * len(units)
+        values = None
         if verdict.half_width is not None and verdict.feedback is not None:
-            values = (*verdict.half_width, *verdict.feedback)
-            numbers = [f"{to_paper(value, unit)[0]:.3g}" for value, unit in zip(values, units, strict=True)]
-        table.add_row(verdict.name, *numbers)
-    return table
+            values = [*verdict.half_width, *verdict.feedback]
+        rows.append((verdict.name, values))
+    return quantity_table("Half-widths of the invariant set", HALF_WIDTHS, rows, units)

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json, report_error
+from hsv.cli.output import console, new_table, print_json, report_error
 
 
 def check(
@@ -40,9 +39,8 @@ def check(
         checks = [vars(finding) | {"same": not finding.difference} for finding in found]
         print_json({"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks})
     else:
-        table = Table(title=f"{scenario.controller} in {scenario.name}", title_justify="left", box=None, pad_edge=False)
-        for name in ("check", "flights", "bytes"):
-            table.add_column(name, justify="right" if name == "flights" else "left", overflow="fold")
+        title = f"{scenario.controller} in {scenario.name}"
+        table = new_table("check", "flights", "bytes", title=title, right=["flights"])
         for finding in found:
             style = "bold red" if finding.difference else None
             table.add_row(finding.check, str(finding.flights), finding.difference or "the same", style=style)

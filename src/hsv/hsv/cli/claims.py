@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from hsv.cli.options import FlightsOption, JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.options import FlightsOption, JsonOption, UnitsOption
+from hsv.cli.output import console, new_table, print_json
 from hsv.cli.targets import check_folder, check_target
+from hsv.units import UnitSystem, in_system, significant, unit_in
 
 if TYPE_CHECKING:
     from hsv.study.claims.claim import Judged
@@ -21,6 +22,7 @@ def claims(
     out: Annotated[Path | None, typer.Option(help="Also write the page of all claims here, in Markdown.")] = None,
     flights: FlightsOption = Path("bags/study"),
     verbose: Annotated[bool, typer.Option("--verbose", help="Print quotes, readings and reasons, too.")] = False,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Measure every checkable statement of the paper, nominal and at all corners of the parameters, and judge it.
@@ -53,8 +55,8 @@ def claims(
             }
         )
         return
-    _print_claims(judged, verbose)
-    _print_ranking(ranks)
+    _print_claims(judged, verbose, units)
+    _print_ranking(ranks, units)
 
 
 def _as_json(group: str, entry: Judged) -> dict[str, Any]:
@@ -69,9 +71,8 @@ def _as_json(group: str, entry: Judged) -> dict[str, Any]:
     }
 
 
-def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
+def _print_claims(judged: dict[str, list[Judged]], verbose: bool, units: UnitSystem) -> None:
     from rich.padding import Padding
-    from rich.table import Table
 
     from hsv.study.claims.page import tally
 
@@ -85,13 +86,14 @@ def _print_claims(judged: dict[str, list[Judged]], verbose: bool) -> None:
                 for number, reading in enumerate(entry.finding.readings):
                     mark = "*" if number < entry.finding.leading else " "
                     behind = f", actuators {reading.actuators}" if reading.actuators else ""
-                    said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}{behind}: {reading.measured}"
-                    console.print(Padding(f"{said} ({reading.threshold})", (0, 0, 0, 4)))
+                    said = f"{mark} {'yes' if reading.holds else 'no ':3}  {reading.what}{behind}: "
+                    said += f"{reading.measured(units)} ({reading.threshold(units)})"
+                    console.print(Padding(said, (0, 0, 0, 4)))
                 console.print(Padding(entry.finding.why, (0, 0, 1, 4)))
             continue
-        table = Table(box=None, pad_edge=False, show_header=False)
-        for width in (_NAME, _LOCATION, None):
-            table.add_column(width=width, no_wrap=True)
+        table = new_table("claim", "location", "verdict", head=False)
+        for column, width in zip(table.columns, (_NAME, _LOCATION, None), strict=True):
+            column.width, column.no_wrap = width, True
         for entry in entries:
             table.add_row(entry.claim.name, _shorter(entry.claim.location), _verdict(entry))
         console.print(table)
@@ -115,31 +117,25 @@ def _verdict(entry: Judged) -> Text:
     return Text(str(entry.finding.verdict), colours[entry.finding.verdict])
 
 
-def _print_ranking(ranks: dict[str, dict[str, Rank]]) -> None:
-    from rich.table import Table
-
+def _print_ranking(ranks: dict[str, dict[str, Rank]], units: UnitSystem) -> None:
     from hsv.study.claims.page import mean_places
     from hsv.study.claims.ranking import METRICS
-    from hsv.units import to_paper
 
     places = mean_places(ranks)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("Case 1, smaller is better", width=29)
-    table.add_column("", no_wrap=True)
-    for name in places:
-        table.add_column(name, justify="right", min_width=8)
+    table = new_table("Case 1, smaller is better", "", *places)
+    table.columns[0].width, table.columns[1].no_wrap = 29, True
+    for column in table.columns[2:]:
+        column.justify, column.min_width = "right", 8
     for metric, row in ranks.items():
         what, unit = METRICS[metric]
-        said = f"{what}, {to_paper(0.0, unit)[1]}".removesuffix(", 1")
-        table.add_row(said, "nominal\nworst", *(Text("\n").join(_ranked(rank, unit)) for rank in row.values()))
+        said = f"{what}, {unit_in(units, unit)}".removesuffix(", 1")
+        table.add_row(said, "nominal\nworst", *(Text("\n").join(_ranked(rank, unit, units)) for rank in row.values()))
     table.add_row("mean place", "nominal\nworst", *("\n".join(f"{p:.1f}" for p in pair) for pair in places.values()))
     console.print(table)
 
 
-def _ranked(rank: Rank, unit: str) -> list[Text]:
-    """Return both numbers of a rank in the paper's unit, bold where it is the best."""
-    from hsv.units import to_paper
-
+def _ranked(rank: Rank, unit: str, units: UnitSystem) -> list[Text]:
+    """Return both numbers of a rank, bold where it is the best."""
     both = ((rank.nominal, rank.nominal_place), (rank.worst, rank.worst_place))
-    numbers = [(f"{to_paper(value, unit)[0]:.3g}", place) for value, place in both]
+    numbers = [(significant(in_system(value, unit, units)[0]), place) for value, place in both]
     return [Text(number, "bold" if place == 1 else "") for number, place in numbers]

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.table import Table
 
-from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json, report_error
+from hsv.cli.options import JsonOption, UnitsOption
+from hsv.cli.output import console, folded, new_table, print_json, quantity_table, report_error
 from hsv.cli.targets import check_target, writing
+from hsv.units import UnitSystem, in_words, significant
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from hsv.control.design import ControlDesign
     from hsv.design.baseline import DesignResult
     from hsv.design.inputs import DesignInputs
@@ -34,6 +37,7 @@ def design(
     check: Annotated[
         bool, typer.Option("--check", help="Write nothing; compare with the parameter file beside the input.")
     ] = False,
+    units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Compute a controller offline, with its tube; write its parameter file and, beside it, its certificate.
@@ -74,15 +78,15 @@ def design(
         print_json(result.report | compared | {"file": str(target)})
         return
     if inputs.adjustable:
-        console.print(_steps(result.report))
+        console.print(_steps(result.report, units))
     else:
         _summary(result.report)
-    console.print(f"written              {target}, {certificate_path(target).name}")
+    console.print(f"written              {target}, {certificate_path(target).name}", soft_wrap=True)
     if rows:
-        console.print(_table(rows))
+        console.print(_table(rows, units))
         for row in rows:
             if row.note:
-                console.print(f"{row.name}: {row.note}")
+                console.print(folded(f"{row.name}: {row.note}"), soft_wrap=True)
 
 
 def _computed(inputs: DesignInputs) -> DesignResult:
@@ -104,11 +108,9 @@ def _check(source: Path, inputs: DesignInputs, json: bool) -> None:
     if json:
         print_json({"deviations": [vars(deviation) for deviation in found], "ok": worst.ok})
     else:
-        table = Table(box=None, pad_edge=False)
-        for column in ("parameter", "largest deviation, scaled", "entry"):
-            table.add_column(column)
+        table = new_table("parameter", "largest deviation, scaled", "entry")
         for d in found:
-            table.add_row(d.parameter, f"{d.scaled:.2g}", ", ".join(map(str, d.index)) if d.scaled else "")
+            table.add_row(d.parameter, significant(d.scaled), ", ".join(map(str, d.index)) if d.scaled else "")
         console.print(table)
     if not worst.ok:
         report_error(str(worst))
@@ -136,24 +138,20 @@ def _summary(report: dict[str, Any]) -> None:
         console.print(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
 
 
-def _steps(report: dict[str, Any]) -> Table:
+def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
     """Return the seven steps of Algorithm 1 with what came of each."""
     import numpy as np
 
     from hsv.control.adjustable import compact
-    from hsv.units import to_paper
+    from hsv.vehicle.dynamics import STATE_UNITS
 
     feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
     accuracy, model = report["model"]["accuracy"], report["model"]
     sections = ", ".join(f"{section['zero_frequency']:g} rad/s" for section in report["inputs"]["notch"])
-    units = ("m", "m/s", "rad", "rad", "rad/s")
-    named = ("ft", "ft/s", "deg", "deg", "deg/s")
-    sizes = [
-        f"{to_paper(value, unit)[0]:.1f} {name}"
-        for value, unit, name in zip(tube["invariant_set"]["half_width"], units, named, strict=False)
-    ]
+    half_widths = zip(tube["invariant_set"]["half_width"], STATE_UNITS, strict=False)  # of the rigid states only
+    sizes = [in_words(value, unit, units) for value, unit in half_widths]
     fuel, elevator = adjustable["input_bound"]
-    bounds = f"{fuel:.3f}, {to_paper(elevator, 'rad')[0]:.1f} deg"
+    bounds = f"{in_words(fuel, '1', units)}, {in_words(elevator, 'rad', units)}"
     beyond = adjustable["complete_fault"]
     parts = adjustable["full_state"]["largest_real_part"]
     least = np.array(adjustable["tau"])
@@ -163,7 +161,8 @@ def _steps(report: dict[str, Any]) -> Table:
         "notch filter": f"centre {sections}",
         "extended states coupling model": f"{9 + 2 * len(report['inputs']['notch'])} states, the filter's among them",
         "co-designed polytopic model": f"{' x '.join(str(n) for n in model['vertices'])} vertices, Bode within "
-        f"{accuracy['bode_magnitude_error_db']:.2f} dB, {accuracy['bode_phase_error_deg']:.2f} deg",
+        f"{significant(accuracy['bode_magnitude_error_db'])} dB, "
+        f"{in_words(radians(accuracy['bode_phase_error_deg']), 'rad', units)}",
         "feedback gain F'": f"spectral radius {max(feedback['spectral_radii']):.5f}; one Lyapunov function for tau "
         f"{span}, whole fault",
         "adjustable factor tau, set Z'": f"tau {tau}; {', '.join(sizes)}",
@@ -171,7 +170,7 @@ def _steps(report: dict[str, Any]) -> Table:
         "control law u'": f"worst level {tube['flights']['worst_level']:.3f} of 1 in W', "
         f"{beyond['worst_level']:.3f} with the whole fault, {beyond['flights']} flights each",
     }
-    table = Table(title="Algorithm 1", title_justify="left", box=None, pad_edge=False, show_header=False)
+    table = new_table("step", "name", "value", title="Algorithm 1", head=False)
     for number, (name, value) in enumerate(rows.items(), 1):
         table.add_row(f"({number})", name, value)
         if number == 4:
@@ -195,27 +194,14 @@ def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInput
     return compare_sets(design, problem, delta, inputs.disturbance.inflation, inputs.invariant_set)
 
 
-def _table(rows: list[Row]) -> Table:
-    from hsv.units import to_paper
+def _table(rows: list[Row], units: UnitSystem) -> Table:
+    from hsv.cli.certify import HALF_WIDTHS
 
-    table = Table(title="Invariant sets: half-widths about the centre", title_justify="left", box=None, pad_edge=False)
-    columns = {
-        "h ft": "m",
-        "V ft/s": "m/s",
-        "alpha deg": "rad",
-        "theta deg": "rad",
-        "q deg/s": "rad/s",
-        "FZ fuel": "1",
-        "FZ elevator deg": "rad",
-        "size": "1",
-    }
-    table.add_column("set")
-    for name in columns:
-        table.add_column(name, justify="right")
+    found: list[tuple[str, list[float] | None]] = []
     for row in rows:
-        cells = ["-"] * len(columns)
+        values = None
         if row.half_width is not None and row.feedback is not None and row.size is not None:
             values = [*row.half_width[:5], *row.feedback, row.size]
-            cells = [f"{to_paper(float(v), unit)[0]:.3g}" for v, unit in zip(values, columns.values(), strict=True)]
-        table.add_row(row.name, *cells)
-    return table
+        found.append((row.name, values))
+    title = "Invariant sets: half-widths about the centre"
+    return quantity_table(title, {**HALF_WIDTHS, "size": "1"}, found, units)

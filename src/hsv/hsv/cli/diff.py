@@ -9,7 +9,8 @@ import typer
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import console, folded, new_table, print_json
+from hsv.units import significant
 
 if TYPE_CHECKING:
     from hsv.recording.compare import Comparison, Difference
@@ -72,8 +73,6 @@ def diff(
 
 
 def _print(compared: list[Comparison], earliest: Difference | None) -> None:
-    from rich.table import Table
-
     if earliest is None:
         count = sum(c.actual_count for c in compared)
         padding = sum(c.different_padding for c in compared)
@@ -81,17 +80,15 @@ def _print(compared: list[Comparison], earliest: Difference | None) -> None:
         same = identical if all(c.identical for c in compared) else "equal within the tolerance"
         console.print(f"{count} messages: {same}", soft_wrap=True)
     else:
-        console.print(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}", soft_wrap=True)
+        console.print(folded(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"), soft_wrap=True)
         common = sum(c.common_count for c in compared)
         if common < max(sum(c.expected_count for c in compared), sum(c.actual_count for c in compared)):
             equal = not any(c.largest for c in compared)
             same = f"{common} messages of the same steps are compared"
             console.print(f"{same}{', and they are equal' if equal else ''}", soft_wrap=True)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for column in ("topic", "field", "largest difference"):
-        table.add_column(column, justify="right" if column.startswith("largest") else "left")
+    table = new_table("topic", "field", "largest difference", right=["largest difference"])
     for comparison in compared:
         for name, value in comparison.largest.items():
-            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else f"{value:.4g}")
+            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else significant(value))
     if table.row_count:
         console.print(table)

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from hsv.cli.options import ListJsonOption, UnitsOption
-from hsv.cli.output import console, json_system, print_json, print_rows
+from hsv.cli.output import console, folded, json_system, print_json, print_rows
 from hsv.units import UnitSystem, in_system
 
 
@@ -29,7 +29,7 @@ def equipment(
     if json:
         print_json({"name": name, **sets[name]} if name else sets)
     elif name:
-        console.print(f"{name}: {sets[name]['source']}", soft_wrap=True)
+        console.print(folded(f"{name}: {sets[name]['source']}"), soft_wrap=True)
         console.print(f'in a scenario: [{sets[name]["table"]}] set = "{name}"', soft_wrap=True)
         if sets[name]["numbers"]:
             print_rows(sets[name]["numbers"])

@@ -6,10 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json
+from hsv.cli.output import console, new_table, print_json
 from hsv.cli.targets import check_folder, writing
 
 
@@ -42,10 +41,8 @@ def export_controller(
         written = [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths]
         print_json({"written": written, "most_in_a_step": {name: vars(bound) for name, bound in bounds.items()}})
         return
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    table.add_column("most in a step")
-    for heading in ("multiplications", "additions", "comparisons", "numbers of state"):
-        table.add_column(heading, justify="right")
+    counts = ("multiplications", "additions", "comparisons", "numbers of state")
+    table = new_table("most in a step", *counts, right=counts)
     for name, bound in bounds.items():
         table.add_row(name, *map(str, vars(bound).values()))
     console.print(table)

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from hsv.cli.options import ListJsonOption, UnitsOption
-from hsv.cli.output import console, json_system, print_json, print_rows
+from hsv.cli.output import console, folded, json_system, print_json, print_rows
 from hsv.units import UnitSystem, in_system
 
 
@@ -36,9 +36,10 @@ def faults(
         if json:
             print_json({"type": type, **kinds[type], "parameters": parameters})
             return
-        console.print(f"{type}: {kinds[type]['meaning']}", soft_wrap=True)
-        console.print(f"side: {kinds[type]['side']}; channels: {_listed(kinds[type]['channels'])}", soft_wrap=True)
-        print_rows(parameters)
+        console.print(folded(f"{type}: {kinds[type]['meaning']}"), soft_wrap=True)
+        side = f"side: {kinds[type]['side']}; channels: {_listed(kinds[type]['channels'])}"
+        console.print(folded(side), soft_wrap=True)
+        print_rows([_row(**parameter) for parameter in parameters])
     elif json:
         print_json(kinds)
     else:
@@ -59,6 +60,11 @@ def _listed(channels: list[str]) -> str:
     from hsv.vehicle.dynamics import STATE_NAMES
 
     return "every state" if channels == list(STATE_NAMES) else ", ".join(channels)
+
+
+def _row(parameter: str, channel: str, **others: Any) -> dict[str, Any]:
+    """Return a row of the table, in which one column holds a parameter and its channel."""
+    return {"parameter": f"{parameter} of {channel}" if channel else parameter, **others}
 
 
 def _parameters(type: str, units: UnitSystem) -> list[dict[str, Any]]:

@@ -11,8 +11,8 @@ import typer
 
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, UnitsOption
-from hsv.cli.output import console, print_json, to_json
-from hsv.units import UnitSystem, in_system, significant
+from hsv.cli.output import console, new_table, print_json, to_json
+from hsv.units import UnitSystem, in_words, significant
 
 if TYPE_CHECKING:
     from hsv.errors import RecordingError
@@ -75,8 +75,6 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
 
 def _print(description: dict[str, Any], units: UnitSystem) -> None:
-    from rich.table import Table
-
     from hsv.cli.summary import print_section
     from hsv.simulation.fingerprint import published_in_words
 
@@ -99,11 +97,9 @@ def _print(description: dict[str, Any], units: UnitSystem) -> None:
     if description["not_covered"]:
         heading["not covered"] = "; ".join(map(str, description["not_covered"]))
     print_section("bag", heading)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for column in ("topic", "type", "messages", "rate Hz"):
-        table.add_column(column, justify="right" if column in ("messages", "rate Hz") else "left")
+    table = new_table("topic", "type", "messages", "rate Hz", right=("messages", "rate Hz"))
     for topic in description["topics"]:
-        table.add_row(topic["name"], topic["type"], str(topic["messages"]), f"{topic['rate_hz'] or 0:.4g}")
+        table.add_row(topic["name"], topic["type"], str(topic["messages"]), significant(topic["rate_hz"] or 0.0))
     console.print(table)
 
 
@@ -116,13 +112,8 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
 def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
     from hsv.recording.info import parameters_in_words
 
-    parameters = parameters_in_words(fault, lambda value, unit: _quantity(value, unit, units))
+    parameters = parameters_in_words(fault, lambda value, unit: in_words(value, unit, units))
     return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
-
-
-def _quantity(value: float, unit: str, units: UnitSystem) -> str:
-    value, unit = in_system(value, unit, units)
-    return f"{significant(value)} {unit}" if unit not in ("", "1") else significant(value)
 
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
@@ -135,7 +126,7 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
     si = dict(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
 
     def quantities(numbers: dict[str, float]) -> str:
-        return ", ".join(f"{name} {_quantity(value, si[name], units)}" for name, value in numbers.items())
+        return ", ".join(f"{name} {in_words(value, si[name], units)}" for name, value in numbers.items())
 
     lines = {
         "sensors": ("rms error ", quantities(equipment["measurement_error_rms"])),
@@ -144,7 +135,7 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
         "air": (
             "",
             ", ".join(
-                f"{name} {' to '.join(_quantity(value, AIR[name][0], units) for value in ends)}"
+                f"{name} {' to '.join(in_words(value, AIR[name][0], units) for value in ends)}"
                 for name, ends in equipment["air_range"].items()
             ),
         ),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,7 +14,7 @@ from hsv.cli.options import (
     VehicleOption,
     VelocityOption,
 )
-from hsv.cli.output import console, json_system, print_json
+from hsv.cli.output import console, json_system, new_table, print_json, print_matrix
 from hsv.units import UnitSystem, in_system, significant
 
 if TYPE_CHECKING:
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
     from hsv.vehicle.modes import Mode
 
 READINGS = ("physical", "printed")
-
-_COLUMN = 12
-"""Characters of a column of a matrix, the gap included."""
 
 FILTER_UNITS = ("rad", "rad s")
 UNIT_SYSTEMS = {
@@ -106,27 +102,11 @@ def linearise(
         )
         return
     for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
-        _print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", matrix.tolist(), names, columns)
+        cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
+        print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", names, columns, cells)
     console.print(_poles("Poles", poles))
     if difference:
         console.print(_poles("Poles of the other reading of eq. 40", difference))
-
-
-def _print_matrix(title: str, matrix: list[list[float]], rows: Sequence[str], columns: Sequence[str]) -> None:
-    """Print a matrix, with as many columns beside each other as fit on the terminal."""
-    from rich.table import Table
-
-    label = max(map(len, rows))
-    count = max(1, (console.width - label) // _COLUMN)
-    for first in range(0, len(columns), count):
-        shown = range(first, min(first + count, len(columns)))
-        table = Table(title="" if first else title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-        table.add_column("", no_wrap=True, min_width=label)
-        for column in shown:
-            table.add_column(columns[column].replace("_", "\n"), justify="right", no_wrap=True, min_width=_COLUMN - 2)
-        for row, name in zip(matrix, rows, strict=True):
-            table.add_row(name, *(significant(row[column]) for column in shown))
-        console.print(table)
 
 
 def _pole(mode: Mode) -> dict[str, float]:
@@ -139,16 +119,13 @@ def _pole(mode: Mode) -> dict[str, float]:
 
 
 def _poles(title: str, poles: list[Mode]) -> Table:
-    from rich.table import Table
-
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    for column in ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio"):
-        table.add_column(column, justify="right")
+    headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
+    table = new_table(*headings, title=title, right=headings)
     for mode in poles:
         table.add_row(
-            f"{mode.pole.real:.4f}",
-            f"±{mode.pole.imag:.4f}" if mode.pole.imag else "0",
-            f"{mode.natural_frequency:.4f}",
-            f"{mode.damping_ratio:.4f}",
+            significant(mode.pole.real),
+            f"±{significant(mode.pole.imag)}" if mode.pole.imag else "0",
+            significant(mode.natural_frequency),
+            significant(mode.damping_ratio),
         )
     return table

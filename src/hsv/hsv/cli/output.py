@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
-from rich.console import Console
+from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from hsv.json_text import json_text
-from hsv.units import UnitSystem, in_system, significant
+from hsv.units import UnitSystem, in_system, significant, unit_in
 
 # Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
 console = Console(highlight=False, markup=False, emoji=False)
@@ -112,9 +113,10 @@ def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
     if as_json:
         print_json(titles)
         return
-    width = max(map(len, titles))
+    table = new_table("name", "title", head=False)
     for name, title in titles.items():
-        console.print(Text.assemble((f"{name:{width}}", "bold"), f"  {title}"))
+        table.add_row(Text(name, "bold"), title)
+    console.print(table)
 
 
 def print_json(values: Mapping[str, Any]) -> None:
@@ -122,8 +124,52 @@ def print_json(values: Mapping[str, Any]) -> None:
     sys.stdout.write(json_text(values, indent=2) + "\n")
 
 
+def folded(text: str, indent: int = 0, first: int = 0) -> str:
+    """Return ``text`` as lines no wider than the terminal, or 80 columns, folded between words, which stay whole.
+
+    Args:
+        text: What to fold.
+        indent: Spaces before each line.
+        first: Spaces before the first line.
+    """
+    return fill(
+        text,
+        console.width,
+        initial_indent=" " * first,
+        subsequent_indent=" " * indent,
+        break_long_words=False,  # paths are copied
+        break_on_hyphens=False,
+    )
+
+
+def new_table(*headings: str, title: str = "", right: Collection[str] = (), head: bool = True) -> Table:
+    """Return an empty table as all commands print it: without lines, folded between words to the terminal's width.
+
+    Args:
+        headings: Of the columns.
+        title: Above the table.
+        right: Headings of the columns that stand at the right and are not folded, as numbers do.
+        head: Whether the headings are shown.
+    """
+    table = Table(
+        title=title or None,
+        title_justify="left",
+        box=None,
+        pad_edge=False,
+        show_header=head,
+        header_style="bold",
+    )
+    for heading in headings:
+        number = heading in right
+        table.add_column(heading, justify="right" if number else "left", no_wrap=number, overflow="fold")
+    return table
+
+
 def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
-    """Print rows with the same keys, the headings; a line a row however wide, numbers at the right, none as ``-``."""
+    """Print rows with the same keys, the headings: numbers at the right, as given to five digits, none as ``-``.
+
+    Where they are wider than the terminal, the last column stands below the others, a paragraph a row.
+    """
     columns = []
     for heading in rows[0]:
         values = [row[heading] for row in rows]
@@ -131,16 +177,72 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
         width = max(map(len, (heading, *texts)))
         align = str.ljust if any(isinstance(value, str) for value in values) else str.rjust
         columns.append([align(text, width) for text in (heading, *texts)])
+    wide = sum(len(column[0]) + 2 for column in columns) - 2 > console.width
+    below = columns.pop() if wide else []
     for number, line in enumerate(zip(*columns, strict=True)):
         console.print(Text("  ".join(line).rstrip(), style="" if number else "bold"), soft_wrap=True)
+        if below and number and (text := below[number].strip()):
+            console.print(folded(text, 4, first=4), soft_wrap=True)
+
+
+def print_matrix(
+    title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
+) -> None:
+    """Print a matrix, with as many columns beside each other as fit on the terminal; names fold at their underscores.
+
+    Args:
+        title: Above the matrix.
+        rows: Names of the rows.
+        columns: Names of the columns.
+        cells: By row.
+    """
+    label = max(map(len, rows))
+    count = max(1, (console.width - label) // _COLUMN)
+    for first in range(0, len(columns), count):
+        shown = columns[first : first + count]
+        headings = [column.replace("_", "\n") for column in shown]
+        table = new_table("", *headings, title="" if first else title, right=headings)
+        table.columns[0].no_wrap = True
+        for column in table.columns[1:]:
+            column.min_width = _COLUMN - 2
+        for name, row in zip(rows, cells, strict=True):
+            table.add_row(name, *row[first : first + count])
+        console.print(table)
+
+
+_COLUMN = 12
+"""Characters of a column of a matrix, the gap included."""
+
+
+def quantity_table(
+    title: str,
+    columns: Mapping[str, str],
+    rows: Sequence[tuple[str, list[float] | None]],
+    units: UnitSystem,
+) -> Table:
+    """Return a table of quantities, a row a thing, the unit of each column below its heading.
+
+    Args:
+        title: Above the table.
+        columns: The SI unit by heading.
+        rows: Name and values (SI) of each; ``None`` where it has no values.
+        units: Units of what is shown.
+    """
+    named = {name: unit_in(units, unit) for name, unit in columns.items()}
+    headings = [f"{name}\n{'' if unit == '1' else unit}" for name, unit in named.items()]
+    table = new_table("", *headings, title=title, right=headings)
+    for name, values in rows:
+        cells = ["-"] * len(columns)
+        if values is not None:
+            pairs = zip(values, columns.values(), strict=True)
+            cells = [significant(in_system(float(value), unit, units)[0]) for value, unit in pairs]
+        table.add_row(name, *cells)
+    return table
 
 
 def print_table(title: str, quantities: Mapping[str, Quantity], units: UnitSystem, digits: int = 3) -> None:
     """Print name, value and unit of every quantity."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="bold")
-    table.add_column("quantity", overflow="fold")
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("unit")
+    table = new_table("quantity", "value", "unit", title=title, right=["value"])
     for name, quantity in quantities.items():
         value, unit = in_system(*quantity, units)
         table.add_row(name.replace("_", " "), significant(value, digits), "" if unit == "1" else unit)

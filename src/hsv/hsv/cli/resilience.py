@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from hsv.cli.options import JsonOption, SchedulerOption, WorkersOption
-from hsv.cli.output import console, errors, print_json, resumable
+from hsv.cli.output import console, errors, print_json, print_matrix, resumable
 from hsv.cli.targets import check_folder
 
 if TYPE_CHECKING:
@@ -85,16 +85,10 @@ def _names(text: str) -> tuple[str, ...]:
 
 
 def _show(results: ResilienceResults) -> None:
-    from rich.table import Table
-
-    table = Table(title="flights survived", title_justify="left", box=None, pad_edge=False, header_style="bold")
-    table.add_column("fault")
-    for subject in results.campaign.subjects:
-        table.add_column(subject.name, justify="right", overflow="fold")
-    for fault in results.campaign.faults:
-        counts = [results.squares[fault, subject.name].survived for subject in results.campaign.subjects]
-        table.add_row(fault.replace("_", " "), *(f"{survived} of {flights}" for survived, flights in counts))
-    console.print(table)
+    names = [subject.name for subject in results.campaign.subjects]
+    faults = results.campaign.faults
+    cells = [["{} of {}".format(*results.squares[fault, name].survived) for name in names] for fault in faults]
+    print_matrix("flights survived", [fault.replace("_", " ") for fault in faults], names, cells)
 
 
 def _cells(results: ResilienceResults) -> list[dict[str, Any]]:

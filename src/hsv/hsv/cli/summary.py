@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import nan
-from textwrap import fill
 from typing import Any
 
-from rich.table import Table
 from rich.text import Text
 
-from hsv.cli.output import console, print_json, to_json
+from hsv.cli.output import console, folded, new_table, print_json, to_json
 from hsv.errors import RunError
 from hsv.simulation.fingerprint import as_published, published_in_words
 from hsv.simulation.limits import Verdict, in_units, not_judged, verdict_sentence, verdicts
@@ -94,11 +92,8 @@ def print_metrics(
     title: str, metrics: Mapping[str, float], units: UnitSystem, judged: Mapping[str, Verdict] | None = None
 ) -> None:
     """Print metrics (SI) in groups, each in words, with its unit and, where ``judged`` is given, with the verdict."""
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False, show_header=False)
-    table.add_column("metric", overflow="fold")
-    table.add_column("value", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    table.add_column("verdict", overflow="fold")
+    table = new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
+    table.columns[2].no_wrap = True
     known = [*metrics, *(name for name in judged or () if name not in metrics)]
     for group in Group:
         names = [name for name in METRICS if name in known and METRICS[name].group is group]
@@ -114,7 +109,7 @@ def print_metrics(
 
 
 def print_section(title: str, lines: Mapping[str, object]) -> None:
-    """Print what has a name and is no number under a title, a line each, folded between words on a terminal.
+    """Print what has a name and is no number under a title, a line each, folded between words.
 
     What follows a line break in a text stands on a line of its own.
     """
@@ -122,17 +117,7 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
     width = max(map(len, lines)) + 4
     for name, text in lines.items():
         first, *others = f"  {name:{width - 2}}{text}".split("\n")
-        if console.is_terminal:
-            # Words are whole, those that are wider than the terminal as well: paths are copied.
-            first = fill(
-                first,
-                console.width,
-                subsequent_indent=" " * width,
-                break_long_words=False,
-                break_on_hyphens=False,
-                drop_whitespace=True,
-            )
-        for line in (first, *(f"  {other}" for other in others)):
+        for line in (folded(first, width), *(f"  {other}" for other in others)):
             console.print(line, soft_wrap=True)
 
 

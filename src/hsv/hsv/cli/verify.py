@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 from rich.text import Text
 
 from hsv.cli.options import JsonOption
-from hsv.cli.output import console, print_json, report_error
+from hsv.cli.output import console, new_table, print_json, report_error
+from hsv.units import significant
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from hsv.design.verification.claims import Claim
 
 
@@ -58,16 +60,21 @@ def verify(
 
 
 def _table(claims: dict[str, list[Claim]]) -> Table:
-    table = Table(box=None, pad_edge=False)
-    for name in ("", "claim", "came out", "expected"):
-        table.add_column(name, overflow="fold")
+    table = new_table("", "claim", "came out", "expected")
     for part, made in claims.items():
         if not made:
             continue
         table.add_row("", Text(part, "bold"), "", "")
         for claim in made:
-            cells = ("ok" if claim.ok else "FAIL", f"  {claim.name}", claim.shown, claim.expected)
+            cells = ("ok" if claim.ok else "FAIL", f"  {claim.name}", _came_out(claim), claim.expected)
             table.add_row(*cells, style=None if claim.ok else "bold red")
     total, held = sum(len(made) for made in claims.values()), sum(c.ok for made in claims.values() for c in made)
     table.add_row("", Text(f"{held} of {total} claims hold", "bold"), "", "")
     return table
+
+
+def _came_out(claim: Claim) -> str:
+    """Return what came out to three digits, unless these hide which side of a bound it is on, as 0.9999 would be 1."""
+    if isinstance(claim.value, str) or not claim.ok or significant(claim.value) in ("1", "-1"):
+        return claim.shown
+    return significant(claim.value)

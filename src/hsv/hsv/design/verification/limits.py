@@ -15,7 +15,7 @@ from hsv.control.design import ControlDesign
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.tube_problem import known_actuators
 from hsv.design.verification.plan import Plan
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_system
 from hsv.vehicle.actuators import SUBSTEPS, ActuatorSet, actuator_map
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS
 from hsv.vehicle.trim import trim
@@ -45,19 +45,18 @@ class Reach:
         """Whether no limit is reached."""
         return self.position <= self.stop and self.rate <= self.rate_limit
 
-    @property
-    def said(self) -> str:
-        """By how much each limit is reached or not, in words."""
+    def said(self, units: UnitSystem = UnitSystem.metric) -> str:
+        """Return by how much each limit is reached or not, in words."""
         unit = INPUT_UNITS[INPUT_NAMES.index(self.channel)]
         words = []
         for what, value, limit, of in (
             ("position", self.position, self.stop, unit),
             ("rate", self.rate, self.rate_limit, "1/s" if unit == "1" else f"{unit}/s"),
         ):
-            number, shown = to_paper(value, of)
+            number, shown = in_system(value, of, units)
             named = "" if shown == "1" else f" {shown}"
             if np.isfinite(limit):
-                bound = to_paper(limit, of)[0]
+                bound = in_system(limit, of, units)[0]
                 side = f"inactive by {bound - number:.3g}" if number <= bound else f"beyond it by {number - bound:.3g}"
                 words.append(f"{what} up to {number:.3g} of {bound:.3g}{named}, {side}")
             else:

@@ -28,7 +28,7 @@ from hsv.design.verification.invariant_set import lag_feedback
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.errors import DesignError
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_words
 from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
 from hsv.vehicle.dynamics import (
     INPUT_NAMES,
@@ -61,17 +61,19 @@ class Verdict:
     """Largest level at which a flight may start: x_n takes errors of the first measurement for the truth"""
     reaches: tuple[Reach, ...] = ()
     """Of the actuators, over the set"""
+    without_limits: Verdict | None = None
+    """Where this one is on the limits of actuators: the verdict without them"""
 
-    @property
-    def said(self) -> str:
-        """By how much, in words."""
+    def said(self, units: UnitSystem = UnitSystem.metric) -> str:
+        """Return by how much, in words."""
+        if self.without_limits:
+            return "; ".join(reach.said(units) for reach in self.reaches) or self.without_limits.said(units)
         if self.room is None or self.shares is None:
             return self.reason
         if self.start > 1.0:
             return f"flights may start outside the set, at level {self.start:.3g}"
         input, side = np.unravel_index(int(np.argmin(self.shares)), self.room.shape)
-        value, unit = to_paper(abs(float(self.room[input, side])), INPUT_UNITS[input])
-        amount = f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
+        amount = in_words(abs(float(self.room[input, side])), INPUT_UNITS[input], units)
         where = f"{INPUT_NAMES[input]}, {('lower', 'upper')[side]} side"
         return f"room of {amount} ({where})" if self.certified else f"the plan lacks {amount} ({where})"
 
@@ -82,10 +84,10 @@ class Verdict:
 
     def limited(self) -> Verdict:
         """Return the verdict on the same actuators with their limits: certified where no limit is reached."""
-        reason = "; ".join(reach.said for reach in self.reaches)
         inactive = self.certified and all(reach.inactive for reach in self.reaches)
-        name = f"{self.name}, limits of actuators"
-        return replace(self, name=name, reason=reason) if inactive else Verdict(name, reason or self.said)
+        limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
+        limited = limited if inactive else replace(limited, half_width=None, feedback=None, room=None, shares=None)
+        return replace(limited, reason=limited.said(UnitSystem.si))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the verdict for JSON."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from hsv.units import to_paper
+from hsv.units import UnitSystem, in_system
 
 
 class Verdict(StrEnum):
@@ -17,11 +17,11 @@ class Verdict(StrEnum):
     FAILS = "does not hold"
 
 
-def shown(value: float, unit: str) -> str:
-    """Return a number (SI) in the paper's unit, with the unit; a time that is infinite lies beyond the flight."""
+def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper) -> str:
+    """Return a number (SI) with its unit, as the page the paper's; a time that is infinite lies beyond the flight."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
-    number, name = to_paper(value, unit)
+    number, name = in_system(value, unit, units)
     return f"{number:.4g}" + ("" if name == "1" else f" {name}")
 
 
@@ -37,18 +37,16 @@ class Reading:
     actuators: str = ""
     """Those between command and vehicle, by name; empty where the claim names none: the paper's"""
 
-    @property
-    def measured(self) -> str:
-        """The number in the paper's unit."""
-        return shown(self.value, self.unit)
+    def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
+        """Return the number with its unit."""
+        return shown(self.value, self.unit, units)
 
-    @property
-    def threshold(self) -> str:
-        """The threshold in words."""
+    def threshold(self, units: UnitSystem = UnitSystem.paper) -> str:
+        """Return the threshold in words."""
         if self.at_most is not None:
-            return f"at most {shown(self.at_most, self.unit)}"
+            return f"at most {shown(self.at_most, self.unit, units)}"
         assert self.at_least is not None
-        return f"at least {shown(self.at_least, self.unit)}"
+        return f"at least {shown(self.at_least, self.unit, units)}"
 
     @property
     def holds(self) -> bool:

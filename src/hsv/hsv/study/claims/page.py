@@ -98,7 +98,7 @@ def _claim(entry: Judged) -> str:
     for number, r in enumerate(finding.readings):
         what = f"**{_cell(r.what)}**" if number < finding.leading else _cell(r.what)
         behind = f"{_elevator(r.actuators)} | " if named else ""
-        rows.append(f"| {what} | {behind}{r.measured} | {r.threshold} | {'yes' if r.holds else 'no'} |")
+        rows.append(f"| {what} | {behind}{r.measured()} | {r.threshold()} | {'yes' if r.holds else 'no'} |")
     table = "\n".join(rows)
     return (
         f"### {claim.name[0].upper()}{claim.name[1:]}\n> {claim.quote}\n\n{claim.location}. "
