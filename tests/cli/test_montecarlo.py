@@ -46,7 +46,7 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
         (("--scale", "0"), "varies"),
         (("--out", "result.csv"), ".parquet"),
         (("--workers", "-1"), "workers = -1: expected 0 to 4096"),
-        (("--scheduler", "nonsense"), "scheduler = 'nonsense'"),
+        (("--workers", "0", "--scheduler", "nonsense"), "scheduler = 'nonsense'"),
     ],
 )
 def test_bad_settings_end_with_one_line_and_leave_nothing(campaign, tmp_path, words, expected):

@@ -277,7 +277,21 @@ def test_tau_and_its_changes_become_parameters():
     assert values["tau_change.values"] == [0.6, 0.6, 0.7, 0.8, 1.0, 0.9, 0.9, 0.9, 0.9, 0.9]
     assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
     assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))
-    robust = 'controller = "robust_mpc"\n' + CASE1
-    assert "integral: robust_mpc does not read it" in refusal(robust + '[integral]\nrate = "0.1 / s"\n')
-    assert "robust_mpc: tube_mpc does not read it" in refusal(CASE1 + "[robust_mpc]\ngain_index = 1\n")
-    assert "tube.tau: robust_mpc has no adjustable factor" in refusal(robust + "[tube]\ntau = 0.8\n")
+
+
+@pytest.mark.parametrize(
+    ("controller", "table", "expected"),
+    [
+        ("robust_mpc", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
+        ("robust_mpc", "[tube]\ntau = 0.8", "controller tube_mpc"),
+        ("robust_mpc", "[tube]", "controller tube_mpc"),
+        ("robust_mpc", '[nominal]\nlaw = "qp"', "one that follows the nominal state"),
+        ("tube_mpc", "[robust_mpc]\ngain_index = 1", "controller robust_mpc"),
+        ("one.of:Ours", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
+        ("one.of:Ours", "[robust_mpc]", "controller robust_mpc"),
+    ],
+)
+def test_a_table_that_the_controller_does_not_read_is_refused(controller, table, expected):
+    name = table[1 : table.index("]")]
+    said = refusal(f'controller = "{controller}"\n{CASE1}\n{table}\n')
+    assert f"{name}: {controller} does not read it, expected {expected}" in said

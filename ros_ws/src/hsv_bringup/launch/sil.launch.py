@@ -38,7 +38,7 @@ ARGUMENTS = {
     ),
     "external": ("false", "true: wait for a controller that is started by hand, any node of yours"),
     "live": ("false", "true: show the flight while it is flown, on a page and to Foxglove; or false"),
-    "live_port": ("8765", "port for Foxglove, the page has the next one; 0: any two that are free"),
+    "live_port": ("", "port for Foxglove, the page has the next one; 0: any two that are free; empty: 8765"),
     "composed": ("false", "true: all nodes in one process, faster, the same bytes; or false"),
     "report": ("true", "true: write the report into the bag's folder; or false"),
     "units": (
@@ -147,7 +147,7 @@ def prepare(context: LaunchContext) -> list[Action]:
         refuse("package hsv is not found: expected a built and sourced workspace (make setup, then source env.sh)")
     command = [hsv, "prepare", options["scenario"], "--json", "--folder", folder]
     command += ["--real-time-factor", options["real_time_factor"]] if options["real_time_factor"] else []
-    command += ["--live-port", options["live_port"]]
+    command += ["--live-port", options["live_port"]] if options["live_port"] else []
     command += ["--step-timeout", options["step_timeout"]] if options["step_timeout"] else []
     command += ["--namespace", options["namespace"]]
     command += ["--bag", options["bag"]] if options["bag"] else []

@@ -117,6 +117,8 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
     if scheduler:
+        if workers:
+            raise CampaignError(f"workers = {workers}: expected no --workers with --scheduler, whose workers fly")
         with connected(scheduler, on_wait) as client:
             yield DaskExecutor(client)
         return

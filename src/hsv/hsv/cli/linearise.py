@@ -41,8 +41,11 @@ def linearise(
         str, typer.Option(help="Coupled (CM) or decoupled (DM) model, or CM with the notch filter in it (ECM).")
     ] = "CM",
     reading: Annotated[
-        str, typer.Option(help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q').")
-    ] = "physical",
+        str,
+        typer.Option(
+            help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q'); default: physical."
+        ),
+    ] = "",
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -63,6 +66,9 @@ def linearise(
 
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
+    if reading and model != "ECM":
+        raise QuantityError(f"reading = {reading!r}: expected with model ECM, where eq. 40 is read")
+    reading = reading or READINGS[0]
     if reading not in READINGS:
         raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
     parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
@@ -123,9 +129,10 @@ def _poles(title: str, poles: list[Mode]) -> Table:
     table = new_table(*headings, title=title, right=headings)
     for mode in poles:
         table.add_row(
-            significant(mode.pole.real),
+            # What rounding leaves of a pole at zero is no number.
+            significant(round(mode.pole.real, 9) + 0.0),
             f"±{significant(mode.pole.imag)}" if mode.pole.imag else "0",
-            significant(mode.natural_frequency),
+            significant(round(mode.natural_frequency, 9)),
             significant(mode.damping_ratio),
         )
     return table

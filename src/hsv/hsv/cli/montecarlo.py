@@ -165,8 +165,10 @@ def replay(
     from hsv.cli.campaign_summary import sample_words
     from hsv.cli.output import print_table
     from hsv.cli.progress import stages
-    from hsv.errors import RunError
+    from hsv.errors import CampaignError, RunError
 
+    if bag and not over_dds:
+        raise CampaignError(f"bag = {str(bag)!r}: expected with --over-dds, nothing else is recorded")
     results = Results(result, trust=trust)
     if over_dds:
         target = bag or Path("bags", f"{result.stem}_flight_{flight}")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from hsv.errors import ParameterError
 from hsv.units import UnitSystem
 
 GraphNamespaceOption = Annotated[
@@ -37,7 +38,11 @@ LiveOption = Annotated[
     bool, typer.Option("--live", help="Show the flight while it is flown: a page for the browser, and Foxglove.")
 ]
 LivePortOption = Annotated[
-    int, typer.Option(help="Port for Foxglove, with --live; the page has the next one. 0: any two that are free.")
+    int | None,
+    typer.Option(
+        help="Port for Foxglove, with --live; the page has the next one. 0: any two that are free; default: 8765.",
+        show_default=False,
+    ),
 ]
 StepTimeoutOption = Annotated[
     float | None,
@@ -63,3 +68,14 @@ TrustOption = Annotated[bool, typer.Option("--trust", help="Run code that the fi
 FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]
 WorkersOption = Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")]
 SchedulerOption = Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers fly instead.")]
+
+
+def live_port_of(live: bool, port: int | None) -> int | None:
+    """Return the port of the live view, ``None`` where there is none.
+
+    Raises:
+        ParameterError: A port is given for no live view.
+    """
+    if port is not None and not live:
+        raise ParameterError(f"live-port = {port}: expected with --live, nothing listens without")
+    return (8765 if port is None else port) if live else None

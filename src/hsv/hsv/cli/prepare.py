@@ -18,6 +18,7 @@ from hsv.cli.options import (
     RealTimeFactorOption,
     ScenarioArgument,
     StepTimeoutOption,
+    live_port_of,
 )
 from hsv.cli.output import console, print_json
 
@@ -25,7 +26,7 @@ from hsv.cli.output import console, print_json
 def prepare(
     scenario: ScenarioArgument = "case1",
     live: LiveOption = False,
-    live_port: LivePortOption = 8765,
+    live_port: LivePortOption = None,
     real_time_factor: RealTimeFactorOption = None,
     composed: ComposedOption = False,
     external: ExternalOption = False,
@@ -67,7 +68,7 @@ def prepare(
             folder=target,
             composed=composed,
             external=external,
-            live_port=live_port if live else None,
+            live_port=live_port_of(live, live_port),
         )
     except BaseException:
         if not folder:

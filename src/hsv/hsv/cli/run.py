@@ -19,6 +19,7 @@ from hsv.cli.options import (
     ScenarioArgument,
     StepTimeoutOption,
     UnitsOption,
+    live_port_of,
 )
 from hsv.cli.output import report_line
 from hsv.units import UnitSystem
@@ -27,7 +28,7 @@ from hsv.units import UnitSystem
 def run(
     scenario: ScenarioArgument = "case1",
     live: LiveOption = False,
-    live_port: LivePortOption = 8765,
+    live_port: LivePortOption = None,
     real_time_factor: RealTimeFactorOption = None,
     composed: ComposedOption = False,
     external: ExternalOption = False,
@@ -62,7 +63,7 @@ def run(
         step_timeout=step_timeout,
         composed=composed,
         external=external,
-        live_port=live_port if live else None,
+        live_port=live_port_of(live, live_port),
     )
     loaded = prepared.scenario
     clock: dict[str, float] = {}

@@ -116,8 +116,10 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
     console.print(Text(title, "bold"))
     width = max(map(len, lines)) + 4
     for name, text in lines.items():
-        first, *others = f"  {name:{width - 2}}{text}".split("\n")
-        for line in (folded(first, width), *(f"  {other}" for other in others)):
+        first, *others = str(text).split("\n")
+        # Beside its name, as wide as it is: a path is copied.
+        words = folded(first, width, first=width)[width:]
+        for line in (f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others)):
             console.print(line, soft_wrap=True)
 
 

@@ -22,8 +22,12 @@ def topic(
 
     Example: hsv topic /hsv/state --every 50
     """
+    from hsv.errors import ParameterError
     from hsv.graph.description import TOPIC
     from hsv.graph.launcher import become
 
+    if not name and (once or every > 1):
+        option = "once" if once else f"every = {every}"
+        raise ParameterError(f"{option}: expected with a topic, whose messages these are")
     flags = [f"--{flag}" for flag, given in (("once", once), ("json", json)) if given]
     become(TOPIC, ["--prog", "hsv topic", *flags, "--every", str(every), *(["--", name] if name else [])], namespace)

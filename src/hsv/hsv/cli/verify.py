@@ -37,8 +37,11 @@ def verify(
     from hsv.design.verification.scenario import bounding_corners, scenario_claims
     from hsv.design.verification.verifier import load_subject
     from hsv.design.verification.verifier import verify as recompute
+    from hsv.errors import QuantityError
     from hsv.simulation.scenario import load_scenario
 
+    if corners and not scenario:
+        raise QuantityError("corners: expected with --scenario, whose flights they are")
     subject = load_subject(file)
     with stages() as progress:
         claims = recompute(subject, quick or bool(scenario), progress)

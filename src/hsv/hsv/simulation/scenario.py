@@ -384,12 +384,11 @@ def _check(scenario: Scenario) -> None:
         if name not in scenario.vehicle.described.uncertainty:
             expected = ", ".join(scenario.vehicle.described.uncertainty)
             raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
-    if scenario.controller != "tube_mpc" and (scenario.tube.tau or scenario.tube.change):
-        field = "tube.tau" if scenario.tube.tau else "tube.change"
-        raise ScenarioError(f"{field}: {scenario.controller} has no adjustable factor, expected controller tube_mpc")
-    for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc")):
-        if table in scenario.model_fields_set and scenario.controller in {*SHIPPED_CONTROLLERS} - {controller}:
+    for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc"), ("tube", "tube_mpc")):
+        if table in scenario.model_fields_set and scenario.controller != controller:
             raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
+    if "nominal" in scenario.model_fields_set and scenario.controller == "robust_mpc":
+        raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
     for index, change in enumerate(scenario.tube.change):
         field = f"tube.change[{index}].tau"
         try:
