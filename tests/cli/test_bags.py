@@ -72,7 +72,7 @@ def test_diff(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
 
 def test_info_tells_what_happened(hsv: Hsv, bag: Path) -> None:
     out = hsv("info", str(bag)).out
-    assert "loss_of_effectiveness 0.9 of elevator_deflection, from 6 s to the end" in out
+    assert "loss_of_effectiveness 0.9 of elevator_deflection, from 6 s to the end" in " ".join(out.split())
     assert "saturation   0 steps" in out and "largest level" in out
     assert "design.yaml (" in out and "scenario     short" in out
 

@@ -23,7 +23,8 @@ HERE = {
     "hsv run case1 --bag bags/first",
     "hsv run case1_derived --bag bags/second",
     "hsv simulate case1",
-    "hsv info bags/first",
+    "hsv info bags/*",
+    "hsv report bags/* --out all.html",
     "hsv plot bags/first",
     "hsv report bags/first bags/second --out comparison.html",
     'hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper',
@@ -50,7 +51,7 @@ HERE = {
     "ROS_DOMAIN_ID=7 hsv run case1",
     "hsv prepare case1 --json",
 }
-"""Run by this file, in a folder like the checkout, one after the other."""
+"""Run by this file as one script, in a folder like the checkout, in the order in which they are printed."""
 
 TOGETHER = {
     "ros2 run hsv_bringup recorder",
@@ -154,9 +155,11 @@ def test_commands_run_as_they_are_printed(checkout: Path) -> None:
     assert len(commands) == len(HERE)
     with own_environment() as environment:
         processes = Processes(environment, checkout)
-        for command in commands:
-            done = processes.run("bash", "-c", command)
-            assert done.returncode == DIFFERENT.get(command, 0), f"{command}: {done.stdout}"
+        script = "\n".join(
+            f"{command} || [ $? = {DIFFERENT[command]} ]" if command in DIFFERENT else command for command in commands
+        )
+        done = processes.run("bash", "-e", "-x", "-c", script)
+        assert done.returncode == 0, done.stdout
         processes.stop()
 
 
