@@ -11,8 +11,10 @@ from full_disk import files_no_larger_than
 from pyarrow import parquet
 from waiting import wait_until
 
+from hsv.campaign import table
 from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.run import capacity, run_campaign
+from hsv.campaign.sample_runner import SampleRunner
 from hsv.campaign.store import ResultStore, read_campaign
 from hsv.campaign.summary import Results
 from hsv.campaign.table import CAMPAIGN, fly_batch
@@ -250,3 +252,24 @@ def test_what_is_to_come_is_expected_from_flights_of_the_campaign(planned):
     assert all_.wall_time > one.wall_time > 0.0
     assert all_.bytes > 100 * 8 * 30
     assert flown == [("time_flight", [96, 97, 98, 99]), ("time_flight", [0, 25, 50, 75])]
+
+
+def test_a_flight_that_takes_long_is_timed_by_a_piece_of_it(planned, monkeypatch):
+    flown = []
+    fly_piece = SampleRunner.fly_piece
+
+    def watched(runner, steps):
+        flown.append(fly_piece(runner, steps))
+        return flown[-1]
+
+    monkeypatch.setattr(SampleRunner, "fly_piece", watched)
+    for name in ("_SLOW", "_LONG_PIECE"):
+        monkeypatch.setattr(table, name, 1e-9)
+    monkeypatch.setattr(table, "_rows", None)  # nothing is flown whole
+    campaign = planned(samples=4)
+    table._flight_time.cache_clear()
+    first, second = (float(table.time_flight(campaign.text, flight)) for flight in (0, 3))
+    table._flight_time.cache_clear()
+    assert first == second > 0.0
+    steps = table.sample_runner(campaign.text).steps
+    assert flown == [1, min(198, steps)]

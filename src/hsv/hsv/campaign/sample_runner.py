@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
 from functools import lru_cache
 
 from hsv.campaign.campaign import Campaign
@@ -51,6 +53,13 @@ class SampleRunner:
     def fly_unchanged(self) -> Flight:
         """Fly the scenario itself."""
         return fly(self._variants.unchanged)
+
+    def fly_piece(self, steps: int) -> int:
+        """Fly so many ``steps`` of the scenario itself; return how many it came to."""
+        parts = self._variants.unchanged
+        plant = copy(parts.plant)
+        plant.steps = steps
+        return len(fly(replace(parts, plant=plant)).time) - 1
 
     @property
     def controller(self) -> Controller:
