@@ -1,10 +1,13 @@
-"""The same job on many items, as flights of many vehicles: compiled code runs beside other compiled code."""
+"""The same job on many items, as flights of many vehicles, in threads; and how processes begin beside Ctrl-C."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+import signal
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -24,3 +27,17 @@ def over_threads(
             results.append(result)
             progress(len(results))
     return results
+
+
+@contextmanager
+def ctrl_c_held_back() -> Iterator[None]:
+    """Let Ctrl-C take effect at the end only; threads and processes that begin meanwhile never receive it.
+
+    A cluster that is interrupted half started does not close. Such processes are ended by the command.
+    """
+    resource_tracker.ensure_running()  # where it is started, it lets Ctrl-C in
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from itertools import islice
-from multiprocessing import resource_tracker
 from typing import Any, Protocol
 
 from hsv.campaign.scheduler import connected
 from hsv.errors import CampaignError, RunError, reason
+from hsv.threads import ctrl_c_held_back
 
 _AHEAD = 4
 """Batches per core that are queued at the workers: enough that none is idle, few enough that a lost worker costs
@@ -130,7 +129,7 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
     from distributed import Client, LocalCluster
 
     with dask.config.set(_LOCAL), ExitStack() as stack:
-        with _ctrl_c_held_back():
+        with ctrl_c_held_back():
             cluster = stack.enter_context(
                 LocalCluster(
                     n_workers=workers,
@@ -144,17 +143,3 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
             )
             client = stack.enter_context(Client(cluster, set_as_default=False))
         yield DaskExecutor(client)
-
-
-@contextmanager
-def _ctrl_c_held_back() -> Iterator[None]:
-    """Let Ctrl-C take effect at the end only; threads and processes that begin meanwhile never receive it.
-
-    A cluster that is interrupted half started does not close. Its workers are ended by the command.
-    """
-    resource_tracker.ensure_running()  # where it is started, it lets Ctrl-C in
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

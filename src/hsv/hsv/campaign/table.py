@@ -30,16 +30,15 @@ OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, m
 COMPRESSION = "zstd"
 
 _SLOW = 2.0
-"""Seconds from which on a flight is not flown whole to see how long it takes."""
+"""Seconds from which on a flight is flown whole once at most to see how long it takes, not sample by sample."""
 
-_FIRST_PIECE = 198
-"""Steps of the first piece of a flight that is timed; the next are four times as long.
+_VERY_SLOW = 60.0
+"""Seconds from which on it is not, and a piece of it has to do."""
 
-Problems that are solved in flight every 2 s, and in the first step, count as often as in the rest.
+_PIECE = 198
+"""Steps of that piece. Problems that are solved every 2 s, and in the first step, count as often as in the rest; of
+those that are solved in every step the first ones take longest: what is extrapolated is rather too much.
 """
-
-_LONG_PIECE = 3.0
-"""Seconds that a piece takes from which a whole flight is extrapolated."""
 
 
 def schema(campaign: Campaign) -> pa.Schema:
@@ -103,19 +102,15 @@ def _flight_time(text: str) -> float:
     What is compiled and built once is there then.
     """
     runner = sample_runner(text)
-    steps = min(_FIRST_PIECE, runner.steps)
     seconds = 0.0
-    with suppress(ControllerError):  # what is flown is going to say so
+    with suppress(ControllerError):  # the flights are going to say so
         runner.fly_piece(1)
-        while seconds < _LONG_PIECE:
+        for steps in (min(_PIECE, runner.steps), runner.steps):
             started = time.perf_counter()
             flown = runner.fly_piece(steps)
-            seconds = time.perf_counter() - started
-            if flown < steps or steps == runner.steps:
+            seconds = (time.perf_counter() - started) * (runner.steps / steps if flown == steps else 1.0)
+            if not _SLOW < seconds < _VERY_SLOW:
                 break
-            share, steps = steps, min(4 * steps, runner.steps)
-        else:
-            return seconds * runner.steps / share
     return seconds
 
 

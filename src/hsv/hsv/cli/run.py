@@ -70,7 +70,7 @@ def run(
 
     def line(node: str, text: str) -> None:
         # Where the live view is to be seen.
-        if verbose or WARNING in text or node == LIVE.label:
+        if verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
             report_line(node, text)
 
     with flight_bar(loaded.name, prepared.steps, units) as shown:

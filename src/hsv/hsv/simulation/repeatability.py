@@ -20,6 +20,7 @@ from hsv.errors import HsvError, ParameterError, RunError
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import Components, Flight, History, fly
 from hsv.simulation.scenario import Scenario, load_scenario, scenario_names
+from hsv.threads import ctrl_c_held_back
 from hsv.vehicle.dynamics import PITCH_RATE
 
 FLOWN_BY_DEFAULT = "case1"
@@ -116,8 +117,14 @@ def under_load(scenario: Scenario, first: Flight) -> Finding:
     name = f"under load, {processes} processes"
     try:
         with ProcessPoolExecutor(processes, mp_context=context) as pool:
-            flown = [pool.submit(_fly_at_once, scenario) for _ in range(processes)]
-            histories = [history for future in flown for history in future.result()]
+            try:
+                with ctrl_c_held_back():
+                    flown = [pool.submit(_fly_at_once, scenario) for _ in range(processes)]
+                histories = [history for future in flown for history in future.result()]
+            except KeyboardInterrupt:
+                for process in multiprocessing.active_children():
+                    process.terminate()
+                raise
     except BrokenProcessPool:
         return Finding(name, processes * _FLIGHTS, "a process died")
     except HsvError as error:

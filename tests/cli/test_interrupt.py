@@ -1,0 +1,74 @@
+"""Ctrl-C, which a terminal sends to all processes of a command, is one line and exit code 130; nothing runs on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+from ros_domain import own_environment
+
+from hsv.cli.main import EXIT_CODES
+
+INTERRUPTED = next(code for code, meaning in EXIT_CODES.items() if meaning == "interrupted")
+
+DESIGNS = Path(__file__).parents[2] / "offline_design"
+
+COMMANDS = [
+    "design baseline",
+    "check lqr",
+    "montecarlo case1 --samples 2000",
+    "resilience --controllers case1 --faults elevator_loss",
+    "claims",
+    "study coupling",
+    "bench --only in_process",
+    "certify baseline.yaml",
+    "run case1 --live --live-port 0",
+]
+
+
+def left_of(mark: str) -> list[int]:
+    """Return the processes that have ``mark`` in their environment."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        try:
+            if mark.encode() in (process / "environ").read_bytes():
+                found.append(int(process.name))
+        except OSError:
+            continue  # it has ended, or is another user's
+    return found
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("delay", [2.0, 4.0, 7.0])
+@pytest.mark.parametrize("words", COMMANDS)
+def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay) -> None:
+    for name in ("baseline.yaml", "baseline.certificate.json"):
+        (tmp_path / name).symlink_to(DESIGNS / name)
+    with own_environment() as environment:
+        mark = f"HSV_INTERRUPTED={tmp_path.name}"
+        marked = environment | {"HSV_INTERRUPTED": tmp_path.name}
+        command = ["hsv", *words.split(), *(["--out", "mine.yaml"] if words.startswith("design") else [])]
+        popen = subprocess.Popen(
+            command,
+            cwd=tmp_path,
+            env=marked,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
+        time.sleep(delay)
+        if popen.poll() is None:
+            os.killpg(popen.pid, signal.SIGINT)
+        said = popen.communicate()[1].splitlines()
+        if popen.returncode == 0:
+            pytest.skip("done before it was interrupted")
+        # What was said before, as how long it is going to take, stands above.
+        assert popen.returncode == INTERRUPTED
+        assert said[-1].startswith("hsv: error: interrupted")
+        assert not [line for line in said if "Traceback" in line or "KeyboardInterrupt" in line]
+        assert left_of(mark) == []
