@@ -135,6 +135,18 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
     try:
         stage.run(command, {**env, **own}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
     finally:
+        _hold_interrupts(INSTALL / "hsv" / "bin" / "hsv")
         for package, key in keys.items():
             if read_stamp(package.exit_code).strip() == "0":
                 write_stamp(package.stamp, key)
+
+
+def _hold_interrupts(script: Path) -> None:
+    """Have a script start with Ctrl-C held back, which :mod:`hsv.cli.entry` lets through as soon as it can answer it.
+
+    Else it would be a traceback of Python's own start.
+    """
+    plain, held = f"#!{PYTHON}\n", f"#!/usr/bin/env -S --block-signal=INT {PYTHON}\n"
+    # A path with spaces has another first line.
+    if script.is_file() and (text := script.read_text()).startswith(plain):
+        script.write_text(held + text.removeprefix(plain))
