@@ -13,6 +13,7 @@ from real_hardware import ELEVATOR, scenario_file
 from waiting import output_of, wait_until
 
 from hsv.recording.flight import input_columns, state_columns
+from hsv.recording.info import describe
 from hsv.recording.reader import Bag
 from hsv.replay.attached import complete_steps, flown_parameters
 from hsv.replay.engine import replay, rerun
@@ -49,6 +50,11 @@ def test_graph_equals_in_process_bit_for_bit(shared_processes: Processes, name: 
     forces = bag.columns("/hsv/forces")
     assert np.any(forces["wind_up"] != 0.0)
     assert np.any(forces["effector.elevator_deflection"] != recorded["actuator"][:, 1])
+    # Of a sensor, too, from the step in which it fails, though the message before it tells of that.
+    acting = {
+        (fault["channel"], fault["type"]): (fault["start_s"], fault["end_s"]) for fault in describe(bag)["faults"]
+    }
+    assert acting["velocity", "sensor_freeze"] == (2.0, 4.0) and acting["engine", "thrust_loss"] == (1.0, 4.0)
 
 
 @pytest.mark.long

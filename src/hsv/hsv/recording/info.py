@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hsv.control.coverage import uncovered
 from hsv.control.design import design_of
 from hsv.errors import HsvError, ParameterError, RecordingError
+from hsv.faults.table import FAULT_KINDS, SENSOR
 from hsv.faults.table import fault_parameters as parameters_of
 from hsv.graph.description import ACTUATOR, STATE, TUBE_MPC, TUBE_STATUS
 from hsv.graph.parameter_sections import ParameterSections
@@ -112,6 +113,9 @@ def _faults(bag: Bag) -> list[dict[str, Any]]:
         channel, kind, *parameters = key
         entry = {"channel": channel, "type": kind, "parameters": dict(parameters)}
         acting = np.array([key in faults for faults in active])
+        if kind in FAULT_KINDS and FAULT_KINDS[kind].side == SENSOR:
+            # Listed in a step are those of sensors in the next, and in the first step those that are there from it on.
+            acting = np.concatenate((acting[:1], acting[:-1]))
         intervals += [entry | interval for interval in _intervals(columns["header.stamp"], acting)]
     return sorted(intervals, key=lambda interval: interval["start_s"])
 
