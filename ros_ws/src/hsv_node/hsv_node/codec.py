@@ -14,6 +14,7 @@ from functools import cache
 from typing import Any, Protocol
 
 from hsv.errors import RunError
+from hsv.graph.description import WIRE_ALIGNMENT
 from hsv_node.messages import message_class
 
 _CODES = {
@@ -163,7 +164,8 @@ def _text(value: str, lengths: list[int]) -> tuple[int, bytes]:
 class _Layout:
     """Where everything is in a message whose texts and sequences have certain lengths.
 
-    ``length_at`` gives the length that stands at an offset.
+    ``length_at`` gives the length that stands at an offset. ``padding`` is what DDS sends behind the message; it is
+    there without DDS, too, so that bags of nodes in one process have the same bytes.
     """
 
     def __init__(self, kind: _Kind, length_at: Callable[[int], int]) -> None:
@@ -176,6 +178,7 @@ class _Layout:
         made = kind.lay(self)
         self.made: Callable[[tuple[Any, ...]], Any] = eval(f"lambda values: {made}", self.classes)
         self.struct = struct.Struct("".join(self._formats))
+        self.padding = bytes(-self.struct.size % WIRE_ALIGNMENT)
         self.lengths = tuple(self._lengths)
 
     def put(self, code: str, count: int = 1) -> int:
@@ -241,7 +244,7 @@ class Codec:
         if layout is None:
             known = iter(lengths)
             layout = self._keep(_Layout(self._kind, lambda _: next(known)))
-        return layout.struct.pack(_LITTLE_ENDIAN, *values)
+        return layout.struct.pack(_LITTLE_ENDIAN, *values) + layout.padding
 
     def decode(self, data: bytes) -> Any:
         """Return the message that CDR bytes are.

@@ -36,6 +36,8 @@ ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
 MARKERS = "hsv/airframe"
 """What the airframe node publishes for RViz2; no node of the graph knows of it, and no bag holds it."""
+WIRE_ALIGNMENT = 4
+"""What is sent over DDS is padded with zeros to a multiple of so many bytes."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 

@@ -12,7 +12,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.errors import RecordingError
-from hsv.graph.description import CLOCK, COMMAND, PLANT, STATE, TOPICS, step_topics
+from hsv.graph.description import CLOCK, COMMAND, PLANT, STATE, TOPICS, WIRE_ALIGNMENT, step_topics
 from hsv.graph.parameter_sections import ParameterSections
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
@@ -25,8 +25,6 @@ Progress = Callable[[str, int, int], None]
 """Name of what is done, steps done, steps in all."""
 
 PROGRESS_INTERVAL = 200
-WIRE_ALIGNMENT = 4
-"""What is sent over DDS is padded with zeros to a multiple of so many bytes."""
 
 
 @dataclass(frozen=True)
