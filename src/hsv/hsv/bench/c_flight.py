@@ -89,7 +89,9 @@ class CFlight:
             raise RunError("C build: nominal.filtered without a notch filter in the loop, expected one")
         self._folder = tempfile.TemporaryDirectory(prefix="hsv_bench_")
         source = controller_source(law.design, sections)
-        self._library = ctypes.CDLL(str(_compiled(Path(self._folder.name), source, flags)))
+        with as_file(files("hsv.bench").joinpath("flight.c")) as flight:
+            library = compiled(Path(self._folder.name), source, flags, [flight])
+        self._library = ctypes.CDLL(str(library))
         self._library.fly.restype = c_int64
         self._kept: list[np.ndarray] = []
         plant, tube = components.plant, law.kernel
@@ -140,16 +142,20 @@ class CFlight:
         return self._kept[-1].ctypes.data_as(pointer)
 
 
-def _compiled(folder: Path, controller: str, flags: Sequence[str]) -> Path:
+def compiled(folder: Path, controller: str, flags: Sequence[str] = FLAGS, others: Sequence[Path] = ()) -> Path:
+    """Return the library in ``folder`` that the source of an exported controller and ``others`` are compiled to.
+
+    Raises:
+        RunError: No C compiler, or a failed build.
+    """
     compiler = shutil.which("cc")
     if compiler is None:
         raise RunError("C build: no C compiler cc on PATH, expected one (sudo apt-get install gcc)")
     library, source = folder / "flight.so", folder / SOURCE
     source.write_text(controller, encoding="utf-8")
-    with as_file(files("hsv.bench").joinpath("flight.c")) as flight:
-        names = [f"-I{include_folder()}", "-o", str(library), str(flight), str(source), "-lm"]
-        command = [compiler, *flags, "-std=c99", "-shared", "-fPIC", *names]
-        result = subprocess.run(command, capture_output=True, text=True)
+    names = [f"-I{include_folder()}", "-o", str(library), *map(str, others), str(source), "-lm"]
+    command = [compiler, *flags, "-std=c99", "-shared", "-fPIC", *names]
+    result = subprocess.run(command, capture_output=True, text=True)
     if result.returncode:
         raise RunError(f"C build: {' '.join(command)} failed: {result.stderr.strip().splitlines()[-1:]}")
     return library

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hsv.bench import campaigns, graph, in_process, live, offline, writing
+from hsv.bench import campaigns, controllers, graph, in_process, live, offline, writing
 from hsv.bench.figure import Figure
 
 
@@ -20,6 +20,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "in_process": lambda: in_process.against_c(times(40)),
         "scipy": lambda: in_process.against_scipy(times(10)),
         "jsbsim": lambda: in_process.against_jsbsim(times(10)),
+        "controllers": lambda: [*controllers.compiled_laws(times(40)), *controllers.a_step_in_python(times(20))],
         "mcap": lambda: writing.against_mcap(times(10)),
         "graph": lambda: graph.against_rings(times(5)),
         "live": lambda: live.watched(times(2)),

@@ -1,0 +1,144 @@
+"""What controllers of one's own cost, beside the law that the compiled loop has in itself."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numba import cfunc
+
+from hsv.bench.c_flight import compiled
+from hsv.bench.figure import Figure, interleaved
+from hsv.control.c_block import load_block
+from hsv.control.controller import ControllerInput, ForeignController, StepKernel
+from hsv.control.library import LibraryController
+from hsv.control.tube_law import TubeLaw
+from hsv.export.controller import controller_source
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import Components, fly
+from hsv.simulation.scenario import load_scenario
+
+_FLIGHTS, _DURATION = 40, 2.0
+"""Short flights with the input held: the vehicle alone is unstable, and leaves the range of the model after 3.5 s."""
+
+
+class _Holding:
+    """A controller in Python that does nothing: the input stays that of the trim."""
+
+    def __init__(self, held: np.ndarray) -> None:
+        self._held = tuple(held.tolist())
+
+    def reset(self) -> None:
+        pass
+
+    def step(self, inputs: ControllerInput) -> tuple[float, ...]:
+        return self._held
+
+
+def a_step_in_python(repeats: int) -> list[Figure]:
+    """Return what a step of a class in Python costs: of one that does nothing, and of the example where it is there."""
+    flight = assemble_flight(load_scenario("case1", {"duration": f"{_DURATION} s", "fault": []}))
+    held = flight.plant.initial.input
+
+    @cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
+    def hold(k: Any, given: Any, wanted: Any, state: Any, parameters: Any) -> Any:
+        wanted[0], wanted[1] = parameters[0], parameters[1]
+        return 0
+
+    assert hold.address is not None
+    kernel = SimpleNamespace(kernel=StepKernel(hold.address, np.zeros(0), held))
+    figures = [
+        _beside(
+            "python_class",
+            "a step of a class in Python that does nothing",
+            "the same, compiled",
+            _several(_flown_by(flight, _Holding(held)), _FLIGHTS),
+            _several(_flown_by(flight, kernel), _FLIGHTS),
+            _FLIGHTS * flight.plant.steps,
+            repeats,
+            5e-6,
+        )
+    ]
+    if find_spec("hsv_lqr") is not None:
+        own, shipped = (assemble_flight(load_scenario("case1", c)) for c in (_LQR, {}))
+        figures.append(
+            _beside(
+                "python_lqr",
+                "a step of examples/lqr, its own time included",
+                "the shipped loop",
+                lambda: fly(own),
+                lambda: fly(shipped),
+                own.plant.steps,
+                max(2, repeats // 4),
+            )
+        )
+    return figures
+
+
+_LQR = {"controller": "lqr", "design": "", "notch.enabled": False}
+
+
+def compiled_laws(repeats: int) -> list[Figure]:
+    """Return Case 1 under the shipped law as a compiled function of one's own, against the loop that has it in itself.
+
+    The function is that of the exported controller: the same work, and the same bits.
+    """
+    shipped = assemble_flight(load_scenario("case1"))
+    with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
+        assert isinstance(shipped.controller, TubeLaw)
+        library = compiled(Path(folder), controller_source(shipped.controller.design, shipped.notch_filter.sections))
+        scenario = Path(folder, "own.toml")
+        scenario.write_text(f'extends = "case1"\ncontroller = "{library.name}:tube_law"\n', encoding="utf-8")
+        own = assemble_flight(load_scenario(str(scenario)))
+        assert isinstance(own.controller, LibraryController)
+        kernel = replace(own, controller=own.controller.loaded(load_block(library, "tube_law").address))
+        equal = {f.fingerprint for f in (fly(shipped), fly(own), fly(kernel))}
+        note = "the same bits" if len(equal) == 1 else "other bits"
+        jobs: dict[str, tuple[str, Components, Callable[[], float]]] = {
+            "cfunc": ("Case 1, 200 s, the tube law as a compiled function of one's own", kernel, time.thread_time),
+            "c_library": ("Case 1, 200 s, the tube law in a C library, in its process", own, time.perf_counter),
+        }
+        return [
+            Figure(
+                name,
+                what,
+                "the shipped loop",
+                "s",
+                *interleaved(lambda parts=parts: fly(parts), lambda: fly(shipped), repeats, clock),  # type: ignore[misc]
+                "most",
+                1.1,
+                note=note,
+            )
+            for name, (what, parts, clock) in jobs.items()
+        ]
+
+
+def _flown_by(flight: Components, controller: Any) -> Components:
+    return replace(flight, controller=ForeignController("holding", controller, flight.plant.data.vehicle))
+
+
+def _several(flight: Components, count: int) -> Callable[[], object]:
+    return lambda: [fly(flight) for _ in range(count)]
+
+
+def _beside(
+    name: str,
+    what: str,
+    against: str,
+    ours: Callable[[], object],
+    theirs: Callable[[], object],
+    steps: int,
+    repeats: int,
+    limit: float | None = None,
+) -> Figure:
+    """Return the time (s) that a step of ours takes beyond one of theirs."""
+    pairs = zip(*interleaved(ours, theirs, repeats), strict=True)
+    more = tuple((a - b) / steps for a, b in pairs)
+    return Figure(name, f"{what}, beyond one of {against}", "", "s", more, (), "most" if limit else "", limit)
