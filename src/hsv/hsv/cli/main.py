@@ -152,6 +152,11 @@ def main() -> None:
         _fail(interrupted, _INTERRUPTED)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
+    except ImportError as error:
+        # Interrupted while it starts, a compiled module says that it has failed to.
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        _fail("interrupted", _INTERRUPTED)
     except BrokenPipeError:
         _end(1)  # Nobody reads any more: no more words either, as of click and rich.
     except OSError as error:
