@@ -35,7 +35,7 @@ def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
     monkeypatch.setattr("hsv.campaign.scheduler.ANSWER", 1e6)
     with (
         pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"),
-        make_executor(1, address),
+        make_executor(0, address),
     ):
         pass
 
@@ -45,7 +45,7 @@ def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(1, address):
+        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(0, address):
             pass
     assert capfd.readouterr().err == ""
 
@@ -64,7 +64,7 @@ def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkey
     waited = []
     with (
         pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
-        make_executor(1, cluster.scheduler_address, lambda: waited.append(True)),
+        make_executor(0, cluster.scheduler_address, lambda: waited.append(True)),
     ):
         pass
     assert waited
@@ -79,7 +79,7 @@ def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, o
             cluster.close()
 
     with (
-        make_executor(1, cluster.scheduler_address) as workers,
+        make_executor(0, cluster.scheduler_address) as workers,
         pytest.raises(RunError, match="the scheduler is lost"),
     ):
         run_campaign(campaign, store, workers, progress=lose)

@@ -22,7 +22,7 @@ def test_a_study_is_plotted_and_printed_as_json(hsv, tmp_path):
     ran = hsv("study", "notch", "--coarseness", "20", "--out", "plots", "--json")
     assert ran.code == 0
     assert ran.json["study"] == "notch"
-    assert len(ran.json["strips"]["centre_rad_per_s"]) == 3
+    assert len(ran.json["numbers"]["centre_rad_per_s"]) == 3
     assert (tmp_path / "plots" / "notch.png").is_file()
 
 
@@ -30,7 +30,7 @@ def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv, tm
     (tmp_path / "mine.toml").write_text('extends = "case1_integral_heavy"\ntitle = "with integral action"\n')
     ran = hsv("study", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")
     assert ran.code == 0
-    assert "with integral action" in ran.json["strips"]["flights"]
+    assert "with integral action" in ran.json["numbers"]["flights"]
     assert ran.json["findings"][-1].startswith("with integral action: ")
 
 

@@ -78,7 +78,7 @@ def test_faults_that_the_page_on_hardware_injects_are_faults():
     injected = [shlex.split(command.partition(" --duration")[0]) for command in commands]
     assert [str(read_fault(channel, kind, parameters)) for channel, kind, *parameters in injected] == [
         "oscillation amplitude 0.5 deg, frequency 2 Hz of elevator_deflection",
-        "loss_of_effectiveness effectiveness 0.8 of elevator_deflection",
+        "loss_of_effectiveness 0.8 of elevator_deflection",
     ]
 
 

@@ -11,8 +11,10 @@ from pathlib import Path
 
 import matplotlib
 import pytest
+from node_processes import Processes
 from printed_commands import printed
 from pyarrow import parquet
+from ros_domain import own_environment
 
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -45,6 +47,7 @@ def hsv(tmp_path_factory):
             command, capture_output=True, text=True, cwd=folder, env={**os.environ, "PYTHONPATH": path}
         )
 
+    run.path = path
     return run
 
 
@@ -76,6 +79,19 @@ def test_a_campaign_flies_it(hsv, example):
     assert ended["within"] == 100
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("example", [*FLYABLE, "c_gain_scheduled"])
+def test_its_page_is_true_to_the_last_command(hsv, tmp_path, example):
+    shutil.copytree(EXAMPLES / example, tmp_path / "examples" / example, ignore=shutil.ignore_patterns("*.so"))
+    script = "\n".join(printed(f"examples/{example}/README.md"))
+    with own_environment() as environment:
+        processes = Processes(environment | {"PYTHONPATH": hsv.path}, tmp_path)
+        done = processes.run("bash", "-e", "-x", "-c", script)
+        processes.stop()
+    assert done.returncode == 0, done.stdout
+    assert len(list(tmp_path.glob("*.html"))) == 1
+
+
 @pytest.mark.parametrize(
     "flown",
     [pytest.param(name, marks=pytest.mark.long) for name in ("lqr", str(EXAMPLES / "compiled" / "compiled.toml"))],
@@ -97,12 +113,12 @@ def test_what_an_example_refuses_is_said_in_a_line(hsv, tmp_path):
 
 @pytest.fixture(scope="module")
 def checkout(tmp_path_factory):
-    """Return a folder with the example in C as in the checkout, where its commands have been run as printed."""
+    """Return a folder with the example in C as in the checkout, built, flown and in a campaign as printed."""
     folder = tmp_path_factory.mktemp("checkout")
     example = Path("examples", "c_gain_scheduled")
     shutil.copytree(EXAMPLES.parent / example, folder / example, ignore=shutil.ignore_patterns("*.so"))
-    commands = printed(str(example / "README.md"))
-    assert [command.split()[0] for command in commands] == ["make", "hsv", "hsv"]
+    commands = printed(str(example / "README.md"))[:3]
+    assert [command.split()[:2] for command in commands[1:]] == [["hsv", "simulate"], ["hsv", "montecarlo"]]
     for command in commands:
         ran = subprocess.run(shlex.split(command), cwd=folder, capture_output=True, text=True)
         assert ran.returncode == 0, f"{command}: {ran.stderr}"

@@ -97,7 +97,7 @@ def test_what_the_page_asks_is_acknowledged_and_recorded(processes: Processes, t
     faster = page.ask("pace", real_time_factor="0")
     cleared = page.ask("clear")
     assert faster["accepted"] and cleared["accepted"] and cleared["step"] > injected["step"]
-    fault = "loss_of_effectiveness effectiveness 0.9 of elevator_deflection"
+    fault = "loss_of_effectiveness 0.9 of elevator_deflection"
     while f"{fault} has ended" not in [event["words"] for event in page.status["events"]]:
         assert page.read()
     assert (f"{fault} begins", injected["step"]) in [(e["words"], e["step"]) for e in page.status["events"]]

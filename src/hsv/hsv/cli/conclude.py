@@ -59,13 +59,13 @@ def conclude_flight(bag: Path, *, report: bool, units: UnitSystem, json: bool, w
             f"{bag}: holds no scenario, as of a graph flown by hand: hsv info and hsv report tell of it"
         )
     data = flight_data(recorded)
-    extra = {"bag": str(bag)}
+    files = {"bag": bag}
     unwritten = None
     if report:
         page = bag / "report.html"
         try:
             write_report([recorded], page, units=units)
-            extra["report"] = str(page)
+            files["report"] = page
         except RecordingError as error:
             unwritten = error  # the flight itself is whole, and told first
     description = describe(recorded)
@@ -80,7 +80,7 @@ def conclude_flight(bag: Path, *, report: bool, units: UnitSystem, json: bool, w
         units=units,
         json=json,
         not_covered=description["not_covered"],
-        extra=extra,
+        files=files,
     )
     if unwritten:
         raise unwritten

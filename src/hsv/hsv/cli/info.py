@@ -79,7 +79,7 @@ def _print(description: dict[str, Any], units: UnitSystem) -> None:
     from hsv.simulation.fingerprint import published_in_words
 
     heading = {
-        "path": description["path"],
+        "path": Path(description["path"]),
         "duration": f"{description['duration_s']:.6g} s",
         "messages": description["messages"],
         "complete": f"no: {'; '.join(description['warnings'])}" if description["warnings"] else "yes",

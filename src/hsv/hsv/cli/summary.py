@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import nan
-from typing import Any
+from pathlib import Path
 
 from rich.text import Text
 
@@ -29,7 +29,7 @@ def report_flight(
     units: UnitSystem,
     json: bool,
     not_covered: Sequence[str] | None,
-    extra: dict[str, Any] | None = None,
+    files: Mapping[str, Path] | None = None,
 ) -> None:
     """Print the summary of a flight.
 
@@ -44,7 +44,7 @@ def report_flight(
         units: UnitSystem of what is printed.
         json: Whether to print JSON.
         not_covered: What of the flight the certificate of its design does not cover; ``None``: not known.
-        extra: More to print, by name.
+        files: What was written, by name.
 
     Raises:
         RunError: The flight diverged or was broken off; the message says when.
@@ -67,15 +67,15 @@ def report_flight(
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
                 "not_covered": not_covered,
-                **(extra or {}),
+                **{name: str(path) for name, path in (files or {}).items()},
             }
         )
     else:
         pace = f" in {significant(wall_time)} s, {significant(factor)} x real time" if wall_time and factor else ""
-        run = {
+        run: dict[str, object] = {
             "flown": f"{simulated_time:.6g} s{pace}",
             **({"not covered": "; ".join(not_covered)} if not_covered else {}),
-            **(extra or {}),
+            **(files or {}),
             # Alone on a line it is as wide as a terminal.
             "fingerprint": f"{published_in_words(fingerprint, same)}\n{fingerprint or ''}".rstrip(),
         }
@@ -109,7 +109,7 @@ def print_metrics(
 
 
 def print_section(title: str, lines: Mapping[str, object]) -> None:
-    """Print what has a name and is no number under a title, a line each, folded between words.
+    """Print what has a name and is no number under a title, a line each, folded between words; no path, to be copied.
 
     What follows a line break in a text stands on a line of its own.
     """
@@ -117,8 +117,7 @@ def print_section(title: str, lines: Mapping[str, object]) -> None:
     width = max(map(len, lines)) + 4
     for name, text in lines.items():
         first, *others = str(text).split("\n")
-        # Beside its name, as wide as it is: a path is copied.
-        words = folded(first, width, first=width)[width:]
+        words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
         for line in (f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others)):
             console.print(line, soft_wrap=True)
 

@@ -30,7 +30,7 @@ def solve(problem: cp.Problem, name: str) -> SolverReport:
             warnings.filterwarnings("ignore", message="Solution may be inaccurate")
             problem.solve(solver=cp.CLARABEL, max_threads=1, direct_solve_method="qdldl")
     except cp.SolverError as error:
-        raise DesignError(f"{name}: Clarabel found no solution ({error}), expected a feasible design") from error
+        raise DesignError(f"{name}: Clarabel found no solution, expected a feasible design") from error
     if problem.status not in _ACCEPTED:
         raise DesignError(f"{name}: status {problem.status!r}, expected one of {', '.join(_ACCEPTED)}")
     statistics = problem.solver_stats

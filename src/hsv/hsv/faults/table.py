@@ -406,8 +406,11 @@ class Fault:
 
     def __str__(self) -> str:
         known = {parameter.name: parameter for parameter in fault_parameters(self.channel, self.type)}
-        values = [f"{name} {known[name].written(self.channel, value)}" for name, value in self.parameters.items()]
-        said = ", ".join(values)
+        said = ", ".join(
+            # A loss of effectiveness is one of effectiveness.
+            ("" if self.type.endswith(name) else f"{name} ") + known[name].written(self.channel, value)
+            for name, value in self.parameters.items()
+        )
         return f"{self.type} {said + ' ' if said else ''}of {self.channel}"
 
     @property
