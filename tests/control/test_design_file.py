@@ -167,6 +167,36 @@ def test_errors_of_a_file_name_file_and_parameter(tmp_path):
     assert str(caught.value).startswith(f"{path}: parameter period = 1: expected double")
 
 
+SHIPPED = find_design("baseline").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        (
+            "    period: ",
+            "    perriod: ",
+            "parameter perriod: unknown, expected those of a design (did you mean 'period'?)",
+        ),
+        ("    period: 0.02", "    period: 0.02\n    period: 0.03", "the key 'period' stands there twice at line 6"),
+        ("    period: 0.02", "    period: 0.02\n    design.name: b", "parameter design.name stands there twice"),
+        (
+            "    period: 0.02",
+            "    period: 0.02\n    own: &a {own: *a}",
+            "the alias 'a' stands inside of what it is for",
+        ),
+        ("half_width: [12.9", "half_width: [-12.9", "parameter tube.half_width = [-12.9"),
+    ],
+)
+def test_what_a_design_must_not_have_is_named(tmp_path, old, new, problem):
+    path = tmp_path / "mine.yaml"
+    assert SHIPPED.count(old) == 1
+    path.write_text(SHIPPED.replace(old, new))
+    with pytest.raises(DesignError) as caught:
+        read_design(path)
+    assert problem in str(caught.value) and str(path) in str(caught.value) and "\n" not in str(caught.value)
+
+
 def test_a_section_of_one_node_goes_over_that_for_all(tmp_path):
     path = tmp_path / "parameters.yaml"
     path.write_text(

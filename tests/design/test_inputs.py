@@ -81,5 +81,5 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
         read_inputs(tmp_path / "absent.toml")
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ")
-    with pytest.raises(DesignError, match=r"broken.toml.*expected TOML"):
+    with pytest.raises(DesignError, match=r"broken.toml.*in TOML"):
         read_inputs(broken)

@@ -147,7 +147,7 @@ def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of()
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("title = ", r"mine.toml': .*, expected TOML"),
+        ("title = ", r"mine.toml': .*, expected a TOML file"),
         ('extends = "parkr"\n', r"vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file \(did"),
         ('extends = "mine.toml"\n', r"vehicle 'mine': extends: .* expected files that do not extend each other"),
         ("extends = 3\n", r"vehicle 'mine': extends = 3: expected a name or the path of a file"),

@@ -21,6 +21,10 @@ class VehicleError(HsvError, ValueError):
     """A vehicle file that is missing or has a wrong field."""
 
 
+class DocumentError(HsvError, ValueError):
+    """A file that cannot be read, or a text that is not what it should be; the message does not name it."""
+
+
 class ScenarioError(HsvError, ValueError):
     """A scenario file that is missing or has a wrong field."""
 

@@ -8,12 +8,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from hsv.documents import parse_yaml, read_text
 from hsv.errors import ParameterError
 from hsv.graph.description import checked_namespace
 
-_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PARAMETERS = "ros__parameters"
 
 
@@ -26,7 +24,7 @@ def shared_parameters(words: Sequence[str], several: bool) -> frozenset[str]:
     names: set[str] = set()
     for flag, value in pairwise(_ros_arguments(words)):
         if flag == "--params-file":
-            content = yaml.load(Path(value).read_text(encoding="utf-8"), _LOADER)
+            content = parse_yaml(read_text(Path(value)))
             names.update(_of_all_nodes(content if isinstance(content, Mapping) else {}))
         elif several and flag in ("-p", "--param"):
             names.add(value.partition(":=")[0])

@@ -14,6 +14,7 @@ import tomli_w
 
 from hsv.campaign.factors import Factor, check_factors, factors_of, flown_table, with_factors
 from hsv.control.library import library_digest
+from hsv.documents import parse_json
 from hsv.errors import CampaignError
 from hsv.noise import SEED_PARAMETER
 from hsv.simulation.assembly import assemble, blamed_on, design_parameters, scenario_parameters
@@ -118,7 +119,7 @@ class Campaign:
         """
         commit = "unknown"
         try:
-            values = json.loads(text)
+            values = parse_json(text)
             commit = values.get("commit", commit)
             found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
             if found.method not in METHODS:

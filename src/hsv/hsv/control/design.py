@@ -208,7 +208,7 @@ def _tube(values: Mapping[str, Any], n: int) -> TubeSet | None:
     shape = shaped(values, "tube.shape", (n, n))
     if not (np.allclose(shape, shape.T, rtol=1e-9, atol=0.0) and np.linalg.eigvalsh(shape)[0] > 0.0):
         raise DesignError("parameter tube.shape: expected a symmetric positive definite matrix")
-    return TubeSet(shaped(values, "tube.centre", (n,)), shape, shaped(values, "tube.half_width", (n,)))
+    return TubeSet(shaped(values, "tube.centre", (n,)), shape, positive(values, "tube.half_width", (n,)))
 
 
 def _actuators(text: str) -> tuple[str, ...]:

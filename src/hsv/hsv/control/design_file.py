@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from hsv.control.design import ControlDesign
-from hsv.errors import DesignError
+from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.documents import parse_yaml, read_text
+from hsv.errors import DesignError, DocumentError, did_you_mean
+
+_DESIGN_NAMES = [parameter.name for parameter in DESIGN_PARAMETERS]
 
 
 def write_design(path: Path, design: ControlDesign, comment: str) -> None:
@@ -34,10 +38,9 @@ def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
         DesignError: The file is missing or is not parameter YAML.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not text"
-        raise DesignError(f"design {str(path)!r}: cannot be read ({reason}), expected a parameter file") from error
+        text = read_text(path)
+    except DocumentError as error:
+        raise DesignError(f"design {str(path)!r}: {error}, expected a parameter file") from error
     return parse_parameters(text, str(path), node)
 
 
@@ -63,13 +66,17 @@ def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
         DesignError: As :func:`parse_parameters`.
     """
     try:
-        tree = yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except yaml.YAMLError as error:
-        raise DesignError(f"design {source!r}: {' '.join(str(error).split())}") from error
+        tree = parse_yaml(text)
+    except DocumentError as error:
+        raise DesignError(f"design {source!r}: {error}") from error
     sections: dict[str, dict[str, Any]] = {}
     for section, branch in tree.items() if isinstance(tree, dict) else ():
         if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
-            _flatten(branch["ros__parameters"], "", sections.setdefault(str(section), {}))
+            flat = sections.setdefault(str(section), {})
+            for name, value in _flattened(branch["ros__parameters"], ""):
+                if name in flat:
+                    raise DesignError(f"design {source!r}: parameter {name} stands there twice, expected once")
+                flat[name] = value
     if not any(sections.values()):
         raise _no_parameters(source)
     return sections
@@ -83,6 +90,11 @@ def read_design(path: Path) -> ControlDesign:
     """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
     values = read_parameters(path)
     try:
+        for name in values:
+            if name not in _DESIGN_NAMES:
+                raise DesignError(
+                    f"parameter {name}: unknown, expected those of a design{did_you_mean(name, _DESIGN_NAMES)}"
+                )
         return ControlDesign.from_parameters(values)
     except DesignError as error:
         raise DesignError(f"{path}: {error}") from error
@@ -114,9 +126,9 @@ def find_file(name: str, suffix: str) -> Path:
     )
 
 
-def _flatten(branch: Mapping[str, Any], prefix: str, into: dict[str, Any]) -> None:
+def _flattened(branch: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
     for name, value in branch.items():
         if isinstance(value, dict):
-            _flatten(value, f"{prefix}{name}.", into)
+            yield from _flattened(value, f"{prefix}{name}.")
         else:
-            into[f"{prefix}{name}"] = value
+            yield f"{prefix}{name}", value

@@ -26,7 +26,8 @@ from hsv.control.controller import (
 )
 from hsv.control.library_process import LibraryUser, library_user
 from hsv.control.notch_filter import NotchFilter
-from hsv.errors import ControllerError, HsvError, ParameterError, ProcessError, reason
+from hsv.documents import read_bytes
+from hsv.errors import ControllerError, DocumentError, HsvError, ParameterError, ProcessError, reason
 from hsv.parameters import check_all
 from hsv.signals import SignalType
 from hsv.vehicle.parameters import VehicleParameters
@@ -103,9 +104,9 @@ def library_digest(controller: str) -> str:
     if place is None:
         return ""
     try:
-        return hashlib.sha256(place[0].read_bytes()).hexdigest()
-    except OSError as error:
-        raise ParameterError(f"controller = {controller!r}: cannot be read ({reason(error)})") from error
+        return hashlib.sha256(read_bytes(place[0])).hexdigest()
+    except DocumentError as error:
+        raise ParameterError(f"controller = {controller!r}: {error}") from error
 
 
 class LibraryClass:

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from hsv.control.design_file import find_design
-from hsv.errors import DesignError
+from hsv.documents import parse_json, read_text
+from hsv.errors import DesignError, DocumentError
 from hsv.parameters import Parameter
 
 CERTIFICATE_PARAMETERS = (
@@ -49,11 +50,9 @@ def read_certificate(path: Path) -> dict[str, Any]:
         DesignError: The file is missing or is not a certificate.
     """
     try:
-        report = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design certificate") from error
-    except ValueError as error:
-        raise DesignError(f"{path}: {error}, expected JSON") from error
+        report = parse_json(read_text(path))
+    except DocumentError as error:
+        raise DesignError(f"{path}: {error}, expected a design certificate in JSON") from error
     if not isinstance(report, dict) or not {"inputs", "feedback", "nominal", "tube"} <= report.keys():
         raise DesignError(f"{path}: expected a design certificate with inputs, feedback, nominal and tube")
     return report

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -20,7 +19,8 @@ from pydantic import (
 )
 
 from hsv.control.design_file import find_file
-from hsv.errors import DesignError, QuantityError
+from hsv.documents import parse_toml, read_text
+from hsv.errors import DesignError, DocumentError, QuantityError
 from hsv.inheritance import follow_extends, is_path
 from hsv.units import parse_quantity
 from hsv.vehicle.actuators import ACTUATOR_SETS
@@ -387,11 +387,9 @@ def read_inputs(path: Path) -> DesignInputs:
 def _read(name: str) -> dict[str, Any]:
     path = Path(name) if is_path(name) else find_inputs(name)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}), expected a design input file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: {error}, expected TOML") from error
+        table = parse_toml(read_text(path))
+    except DocumentError as error:
+        raise DesignError(f"{path}: {error}, expected a design input file in TOML") from error
     vehicle = table.get("vehicle")
     if isinstance(vehicle, str) and is_path(vehicle):
         table["vehicle"] = str(path.parent / vehicle)

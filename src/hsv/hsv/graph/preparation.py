@@ -16,6 +16,7 @@ from hsv.control.design_file import find_design, read_design
 from hsv.control.design_parameters import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.library import library_digest, library_record
 from hsv.design.certificate import certificate_path, find_certificate
+from hsv.documents import read_text
 from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
 from hsv.graph.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
 from hsv.graph.infrastructure_parameters import STEP_TIMEOUT
@@ -211,11 +212,11 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, 
 
 def design_files(design: Path) -> dict[str, str]:
     """Return what a design brings to the attachments of a bag, by name: parameters and certificate."""
-    return {"design.yaml": design.read_text(encoding="utf-8")} | _certificate(certificate_path(design))
+    return {"design.yaml": read_text(design)} | _certificate(certificate_path(design))
 
 
 def _certificate(path: Path | None) -> dict[str, str]:
-    return {"certificate.json": path.read_text(encoding="utf-8")} if path and path.is_file() else {}
+    return {"certificate.json": read_text(path)} if path and path.is_file() else {}
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:

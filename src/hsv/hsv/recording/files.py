@@ -10,7 +10,8 @@ from typing import IO
 import lz4.frame
 import zstandard
 
-from hsv.errors import RecordingError
+from hsv.documents import read_bytes
+from hsv.errors import DocumentError, RecordingError
 from hsv.recording.metadata import file_names, read_metadata
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
@@ -93,10 +94,9 @@ def read_file(path: Path) -> bytes:
         RecordingError: It cannot be read.
     """
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
-    return decompressed(data)[0]
+        return decompressed(read_bytes(path))[0]
+    except DocumentError as error:
+        raise RecordingError(f"{path}: {error}") from None
 
 
 def read_message(data: bytes) -> bytes | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from typing import Any
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from hsv.control.coverage import uncovered
 from hsv.control.design import design_of
+from hsv.documents import parse_json
 from hsv.errors import HsvError, ParameterError, RecordingError
 from hsv.faults.table import FAULT_KINDS, SENSOR
 from hsv.faults.table import fault_parameters as parameters_of
@@ -165,8 +165,8 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
         values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
         report = bag.attachments.get("certificate.json")
         flown = [(fault["channel"], fault["type"], fault["parameters"]) for fault in faults or ()]
-        return uncovered(values, design_of(values), json.loads(report) if report else None, flown)
-    except (HsvError, ValueError, LookupError):
+        return uncovered(values, design_of(values), parse_json(report) if report else None, flown)
+    except (HsvError, ValueError, LookupError, TypeError):
         return None  # what is attached is not of this version, or not whole
 
 

@@ -9,6 +9,9 @@ from typing import Any
 
 import yaml
 
+from hsv.documents import parse_yaml, read_text
+from hsv.errors import DocumentError
+
 CUSTOM_DATA = "custom_data"
 """Name of the MCAP metadata records that hold the custom data; a later record adds to the earlier ones."""
 ROSBAG2 = "rosbag2"
@@ -98,7 +101,7 @@ def information(
                     "name": topic.name,
                     "type": topic.type,
                     "serialization_format": topic.encoding,
-                    "offered_qos_profiles": yaml.safe_load(topic.qos or "[]"),
+                    "offered_qos_profiles": parse_yaml(topic.qos or "[]"),
                     "type_description_hash": _Quoted(topic.type_hash),
                 },
                 "message_count": topic.messages,
@@ -134,16 +137,16 @@ def write_metadata(directory: Path, values: Mapping[str, Any]) -> None:
 def read_metadata(directory: Path) -> dict[str, Any]:
     """Return what metadata.yaml says below its root; nothing if it is missing or cannot be read."""
     try:
-        return parsed((directory / FILE_NAME).read_text(encoding="utf-8"), ROOT)
-    except (OSError, UnicodeDecodeError):
+        return parsed(read_text(directory / FILE_NAME), ROOT)
+    except DocumentError:
         return {}
 
 
 def parsed(text: str, root: str = "") -> dict[str, Any]:
     """Return the mapping that YAML text holds, below its ``root`` if one is given; an empty one if there is none."""
     try:
-        values = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-    except (yaml.YAMLError, ValueError, OverflowError):
+        values = parse_yaml(text)
+    except DocumentError:
         return {}
     if root:
         values = values.get(root) if isinstance(values, dict) else None

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 
-from hsv.errors import RecordingError
+from hsv.documents import parse_json
+from hsv.errors import DocumentError, RecordingError
 from hsv.graph.description import OTHER_TOPICS, ROOT, STATE, TOPICS, resolved
 from hsv.recording.former import FORMER_TYPES
 
@@ -71,8 +72,8 @@ def namespace_of(names: Mapping[str, str]) -> str:
 
 def _remapped(custom_data: Mapping[str, str]) -> dict[str, str]:
     try:
-        values = json.loads(custom_data.get(REMAPPED_KEY, "{}"))
-    except ValueError:
+        values = parse_json(custom_data.get(REMAPPED_KEY, "{}"))
+    except DocumentError:
         return {}
     known = values.items() if isinstance(values, dict) else ()
     return {role: name for role, name in known if role in KINDS and isinstance(name, str)}

@@ -7,6 +7,9 @@ from typing import Any
 
 import yaml
 
+from hsv.documents import parse_yaml
+from hsv.errors import DocumentError
+
 INFINITE = 2**63 - 1
 """An endless duration in nanoseconds; rendered as ROS 2 does: sec 9223372036, nsec 854775807."""
 
@@ -63,8 +66,8 @@ class Qos:
 def readable_profiles(text: str) -> list[dict[str, Any]]:
     """Return the profiles in the metadata of a channel, the default for what a damage has left of no sense."""
     try:
-        profiles = yaml.safe_load(text)
-    except yaml.YAMLError:
+        profiles = parse_yaml(text)
+    except DocumentError:
         return []
     if not isinstance(profiles, list) or not all(isinstance(profile, dict) for profile in profiles):
         return []
@@ -77,7 +80,7 @@ def mended_profiles(text: str) -> str:
     profiles = readable_profiles(text)
     if not profiles:
         return ""
-    return text if profiles == yaml.safe_load(text) else yaml.safe_dump(profiles, sort_keys=False)
+    return text if profiles == parse_yaml(text) else yaml.safe_dump(profiles, sort_keys=False)
 
 
 _WORDS = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from hsv.campaign.capacity import Capacity, evenly, timed
 from hsv.campaign.executors import Executor
 from hsv.campaign.lock import locked
 from hsv.campaign.store import write_whole
+from hsv.documents import parse_json, read_text
 from hsv.errors import CampaignError, reason
 from hsv.resilience.campaign import Case, ResilienceCampaign
 from hsv.resilience.faults import SEVERITIES, Moment
@@ -73,9 +73,9 @@ class CaseStore:
     def read(self, case: Case) -> Outcome | None:
         """Return what a case brought, None where it was not flown or its file is damaged."""
         try:
-            values = json.loads(self._path(case).read_text(encoding="utf-8"))
+            values = parse_json(read_text(self._path(case)))
             return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError):
             return None
 
     def _path(self, case: Case) -> Path:

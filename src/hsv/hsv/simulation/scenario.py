@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -18,7 +17,8 @@ from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
-from hsv.errors import HsvError, ParameterError, ScenarioError, did_you_mean
+from hsv.documents import parse_toml, read_text
+from hsv.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
 from hsv.faults.table import Fault
 from hsv.inheritance import follow_extends, is_path
@@ -208,10 +208,9 @@ def _refused(name: str, why: object) -> ScenarioError:
 def _own_text(name: str) -> str:
     if is_path(name):
         try:
-            return Path(name).read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not text"
-            raise ScenarioError(f"scenario {name!r}: cannot be read ({reason}), expected a TOML file") from error
+            return read_text(Path(name))
+        except DocumentError as error:
+            raise ScenarioError(f"scenario {name!r}: {error}, expected a TOML file") from error
     if name not in scenario_names():
         raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
     return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
@@ -224,8 +223,8 @@ def scenario_table(text: str, name: str) -> dict[str, Any]:
         ScenarioError: It is no TOML, or the vehicle is none.
     """
     try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        table = parse_toml(text)
+    except DocumentError as error:
         raise _refused(name, error) from error
     return _with_named_vehicle(table, name)
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -27,7 +26,8 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.errors import HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
+from hsv.documents import parse_toml, read_text
+from hsv.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
 from hsv.inheritance import EXTENDS, Tables, follow_extends, is_path
 from hsv.parameters import Parameter, check_all
 from hsv.units import parse_quantity
@@ -281,17 +281,15 @@ def vehicle_text(name: str) -> str:
         VehicleError: As :func:`load_vehicle`.
     """
     load_vehicle(name)
-    return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else _path(name).read_text(encoding="utf-8")
+    return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else read_text(_path(name))
 
 
 def _read(name: str) -> Tables:
     path = _path(name)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise VehicleError(f"vehicle {name!r}: cannot be read ({error.strerror}), expected a TOML file") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise VehicleError(f"vehicle {name!r}: {error}, expected TOML") from error
+        return parse_toml(read_text(path))
+    except DocumentError as error:
+        raise VehicleError(f"vehicle {name!r}: {error}, expected a TOML file") from error
 
 
 def _path(name: str) -> Path:

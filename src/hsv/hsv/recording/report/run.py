@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from hsv.control.design_file import parse_parameters
-from hsv.errors import HsvError, RecordingError
+from hsv.documents import parse_json
+from hsv.errors import DocumentError, HsvError, RecordingError
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.graph.node_parameters import NODE_PARAMETERS
 from hsv.recording.bag_warnings import completeness
@@ -135,6 +135,6 @@ def _input_limits(design: dict[str, Any]) -> dict[str, tuple[float, float]]:
 def _certificate(bag: Bag) -> Value | None:
     text = bag.attachments.get("certificate.json")
     try:
-        return None if text is None else tree(json.loads(text))
-    except ValueError as error:
+        return None if text is None else tree(parse_json(text))
+    except DocumentError as error:
         raise RecordingError(f"{bag.path}: attached certificate.json: {error}") from None
