@@ -4,6 +4,7 @@ import pytest
 from hsv.control.coverage import commanded, uncovered_faults, uncovered_hardware
 from hsv.control.design_file import find_design, read_design
 from hsv.control.tube_law import TubeStatusCode
+from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.blocks import steps
 from hsv.simulation.coverage import uncovered_of
@@ -20,6 +21,23 @@ def of(changes, design=BASELINE, scenario="case1"):
 
 def test_the_flight_of_the_certificate_is_covered():
     assert of({}) == []
+
+
+def test_a_design_that_is_not_as_it_was_written_is_not_covered(tmp_path):
+    text = find_design("baseline").read_text()
+    path = tmp_path / "baseline.yaml"
+    path.write_text(text.replace("hash: a", "hash: b"))
+    assert of({}, read_design(path)) == [
+        "design: not as it was written, its parameters do not have the digest design.hash"
+    ]
+
+
+@pytest.mark.parametrize("inputs", [{}, None, {"disturbance": 0.9}, {"disturbance": {"elevator_effectiveness": "0.9"}}])
+def test_a_certificate_that_does_not_say_what_it_covers_is_refused(inputs):
+    with pytest.raises(
+        DesignError, match=r"^certificate: inputs\.disturbance\.elevator_effectiveness = .*: expected a"
+    ):
+        uncovered_of(load_scenario("case1"), BASELINE, {"inputs": inputs})
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import flown_sections
+from hsv.errors import DesignError
 from hsv.faults.table import fault_parameters
 from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.parameters import Parameter, check_all
@@ -136,17 +137,30 @@ def uncovered(
 
     Raises:
         ParameterError: A wrong value, named.
+        DesignError: The certificate does not say which loss of effectiveness it covers.
     """
     controller = str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
     if controller != _LAW or design is None or design.tube is None:
         which = "the design" if controller == _LAW else f"controller {controller}"
         return [f"all of it: {which} has no certified tube"]
-    effectiveness = certificate["inputs"]["disturbance"]["elevator_effectiveness"] if certificate else None
+    effectiveness = _effectiveness(certificate) if certificate else None
+    changed = ["design: not as it was written, its parameters do not have the digest design.hash"]
     return [
+        *(changed if design.modified else []),
         *uncovered_vehicle(values, design),
         *uncovered_hardware(values, design),
         *uncovered_faults(faults, effectiveness),
     ]
+
+
+def _effectiveness(certificate: Mapping[str, Any]) -> float:
+    field = "inputs.disturbance.elevator_effectiveness"
+    value: Any = certificate
+    for key in field.split("."):
+        value = value.get(key) if isinstance(value, Mapping) else None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+        raise DesignError(f"certificate: {field} = {value!r}: expected a number from 0 to 1")
+    return float(value)
 
 
 def commanded(design: ControlDesign) -> np.ndarray:

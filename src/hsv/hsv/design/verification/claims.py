@@ -59,6 +59,8 @@ class Subject:
     def vehicle(self) -> Vehicle:
         """The vehicle in the certificate; where there is none, the default one."""
         values = self.certificate["inputs"].get("vehicle")
+        if not isinstance(values, dict | None):
+            raise DesignError(f"inputs.vehicle = {values!r}: expected the parameters of a vehicle")
         return Vehicle.from_parameters(values) if values else load_vehicle()
 
     @cached_property
