@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -14,8 +15,9 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.lock import locked
-from hsv.campaign.table import CAMPAIGN, COMPRESSION, ENVELOPE, schema
-from hsv.errors import CampaignError, reason
+from hsv.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
+from hsv.documents import open_regular, read_text
+from hsv.errors import CampaignError, DocumentError, reason
 
 _CAMPAIGN_FILE = "campaign.json"
 
@@ -46,7 +48,7 @@ class ResultStore:
                 shutil.rmtree(self.folder, ignore_errors=True)
                 self.out.unlink(missing_ok=True)
             if self.out.exists():
-                self._check(read_campaign(self.out), self.out)
+                self._check(read_result(self.out)[0], self.out)
                 shutil.rmtree(self.folder, ignore_errors=True)
                 yield set(range(self._campaign.batches))
                 return
@@ -71,12 +73,13 @@ class ResultStore:
         envelope = Envelope.empty()
         columns = schema(self._campaign)
         with _writing(self.out, temporary):
-            with pq.ParquetWriter(temporary, columns, compression=COMPRESSION) as writer:
+            with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
                 for batch in range(self._campaign.batches):
                     part, its_envelope = self._read(batch)
                     envelope.merge(its_envelope)
                     writer.write_table(part.cast(columns))
-                writer.add_key_value_metadata({CAMPAIGN: self._campaign.text, ENVELOPE: envelope.encode()})
+                kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
+                writer.add_key_value_metadata(kept | {DIGEST: _digest(kept)})
             _replace(temporary, self.out)
         shutil.rmtree(self.folder)
 
@@ -84,8 +87,8 @@ class ResultStore:
         described = self.folder / _CAMPAIGN_FILE
         if described.exists():
             try:
-                found = Campaign.from_text(described.read_text(encoding="utf-8"))
-            except (CampaignError, OSError, UnicodeDecodeError) as error:
+                found = Campaign.from_text(read_text(described))
+            except (CampaignError, DocumentError) as error:
                 raise CampaignError(f"{described}: {error}; --restart begins anew") from error
             self._check(found, self.folder)
             return
@@ -105,7 +108,7 @@ class ResultStore:
     def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
         path = self._part(batch)
         try:
-            part = pq.read_table(path)
+            part = pq.read_table(path, page_checksum_verification=True)
             return part, Envelope.decode(part.schema.metadata[ENVELOPE].decode())
         except (OSError, ValueError) as error:
             path.unlink(missing_ok=True)
@@ -122,22 +125,50 @@ class ResultStore:
             )
 
 
-def read_campaign(path: Path) -> Campaign:
-    """Return the campaign whose results are in a Parquet file.
+def read_result(path: Path) -> tuple[Campaign, Envelope]:
+    """Return the campaign whose results are in a Parquet file, and the envelope of its flights.
 
     Raises:
-        CampaignError: The file is missing or not the result of a campaign.
+        CampaignError: The file is missing, damaged, not the result of a campaign, or that of another version.
     """
     try:
-        metadata = pq.read_metadata(path).metadata or {}
-    except (OSError, ValueError) as error:
+        with open_regular(path):
+            found = pq.read_metadata(path)
+            metadata, columns = found.metadata or {}, found.schema.to_arrow_schema()
+    except (DocumentError, OSError, ValueError) as error:
         raise CampaignError(f"{path}: cannot be read, expected the Parquet file of a campaign") from error
     if CAMPAIGN not in metadata:
         raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
+    # Results of before there was a digest have none.
+    if metadata.get(DIGEST, b"") not in (b"", _digest(metadata)):
+        raise CampaignError(f"{path}: damaged, expected the result of a campaign")
     try:
-        return Campaign.from_text(metadata[CAMPAIGN].decode())
+        campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
     except (CampaignError, UnicodeDecodeError) as error:
         raise CampaignError(f"{path}: {error}") from error
+    for column in schema(campaign):
+        if not _has(columns, column):
+            raise _foreign(path, f"column {column.name!r}", campaign)
+    try:
+        return campaign, Envelope.decode(metadata[ENVELOPE].decode())
+    except (KeyError, ValueError) as error:
+        raise _foreign(path, "envelope of this version's curves", campaign) from error
+
+
+def _foreign(path: Path, lack: str, campaign: Campaign) -> CampaignError:
+    return CampaignError(
+        f"{path}: has no {lack}, written by commit {campaign.commit}; expected a result of this version"
+    )
+
+
+def _has(columns: pa.Schema, column: pa.Field) -> bool:
+    return columns.get_field_index(column.name) >= 0 and columns.field(column.name).equals(column, check_metadata=True)
+
+
+def _digest(kept: Mapping[bytes, bytes]) -> bytes:
+    """Return the SHA-256, hexadecimal, of what is kept beside the rows."""
+    texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
+    return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()
 
 
 def write_whole(path: Path, content: bytes) -> None:

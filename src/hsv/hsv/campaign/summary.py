@@ -15,8 +15,8 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
-from hsv.campaign.store import read_campaign
-from hsv.campaign.table import ENVELOPE, OUTCOMES, schema
+from hsv.campaign.store import read_result
+from hsv.campaign.table import OUTCOMES
 from hsv.control.controllers import names_code
 from hsv.errors import CampaignError
 from hsv.simulation.trust import require_trust
@@ -72,16 +72,10 @@ class Results:
         """
         self.path = path
         self.trust = trust
-        self.campaign: Campaign = read_campaign(path)
-        found = pq.read_metadata(path)
-        for name in schema(self.campaign).names:
-            if name not in found.schema.names:
-                raise self._foreign(f"has no column {name!r}")
-        try:
-            self.envelope = Envelope.decode(found.metadata[ENVELOPE].decode())
-            """The envelope of all flights."""
-        except (KeyError, ValueError) as error:
-            raise self._foreign("has no envelope of this version's curves") from error
+        self.campaign: Campaign
+        self.envelope: Envelope
+        """The envelope of all flights."""
+        self.campaign, self.envelope = read_result(path)
 
     @property
     def flyable(self) -> bool:
@@ -100,12 +94,12 @@ class Results:
 
     def column(self, name: str) -> np.ndarray:
         """Return a column (flights); numbers that a flight does not define are not a number."""
-        return np.asarray(self._read(columns=[name])[name].to_numpy())
+        return np.asarray(self._column(name).to_numpy())
 
     @property
     def crashed(self) -> np.ndarray:
         """Whether its controller ended a flight (flights)."""
-        return np.asarray(self._read(columns=["crashed"])["crashed"].is_valid())
+        return np.asarray(self._column("crashed").is_valid())
 
     @property
     def samples(self) -> np.ndarray:
@@ -134,16 +128,20 @@ class Results:
         """Return the scenario of a flight as a file, with values ``replaced`` by key; errors as :meth:`row`."""
         return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
 
+    def _column(self, name: str) -> pa.ChunkedArray:
+        column = self._read(columns=[name])[name]
+        if len(column) != self.campaign.samples:
+            raise self._damaged()
+        return column
+
     def _read(self, **what: Any) -> pa.Table:
         try:
-            return pq.read_table(self.path, **what)
+            return pq.read_table(self.path, page_checksum_verification=True, **what)
         except (OSError, ValueError) as error:
-            raise CampaignError(f"{self.path}: damaged, expected the result of a campaign") from error
+            raise self._damaged() from error
 
-    def _foreign(self, lack: str) -> CampaignError:
-        return CampaignError(
-            f"{self.path}: {lack}, written by commit {self.campaign.commit}; expected a result of this version"
-        )
+    def _damaged(self) -> CampaignError:
+        return CampaignError(f"{self.path}: damaged, expected the result of a campaign")
 
 
 def limits(results: Results) -> dict[str, float]:

@@ -21,13 +21,14 @@ from hsv.errors import ControllerError, ScenarioError
 from hsv.simulation.closed_loop import watched
 from hsv.simulation.metrics import METRICS
 
-CAMPAIGN, ENVELOPE = b"hsv.campaign", b"hsv.envelope"
+CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys of the file's metadata."""
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
 """Numbers that are kept of a flight, with their SI units; null where a flight does not define one."""
 
-COMPRESSION = "zstd"
+WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
+"""How results are written: with checksums, which tell of damage that decompresses all the same."""
 
 _SLOW = 2.0
 """Seconds from which on a flight is flown whole once at most to see how long it takes, not sample by sample."""
@@ -140,5 +141,5 @@ def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -
     """Return rows and envelope as a Parquet file."""
     table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
     stream = BytesIO()
-    pq.write_table(table, stream, compression=COMPRESSION)
+    pq.write_table(table, stream, **WRITTEN)
     return stream.getvalue()
