@@ -3,22 +3,37 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
 from typing import Any
 
-from rich.console import Console, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 from hsv.json_text import json_text
 from hsv.units import UnitSystem, in_system, significant, unit_in
 
+_UNPRINTABLE = {code: repr(chr(code))[1:-1] for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
+"""Control characters, with which a title could tell a terminal to do things, and how they are shown."""
+
+
+class _Terminal(Console):
+    """A console on which a text is only text, whatever a file or a node has in it."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Yield what is to be printed, as of the base class, with control characters made visible."""
+        for segment in super().render(renderable, options):
+            text = segment.text if segment.control else segment.text.translate(_UNPRINTABLE)
+            yield Segment(text, segment.style, segment.control)
+
+
 # Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
-console = Console(highlight=False, markup=False, emoji=False)
-errors = Console(stderr=True, highlight=False, markup=False, emoji=False)
+console = _Terminal(highlight=False, markup=False, emoji=False)
+errors = _Terminal(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 class Interrupted(Exception):  # noqa: N818 - what the user did is no error
