@@ -90,6 +90,8 @@ def test_aliases_that_multiply_are_refused_and_others_taken():
         (parse_yaml, "a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
         (parse_toml, f"a = {'9' * 5000}", "Exceeds the limit"),
         (parse_json, "9" * 5000, "Exceeds the limit"),
+        (parse_toml, f"a = 0x{'f' * 5000}", "a whole number of more than 4000 digits"),
+        (parse_yaml, f"a: [-0x{'f' * 5000}]", "a whole number of more than 4000 digits"),
         (parse_json, "[1, 2", "Expecting"),
         (parse_json, b"\xff", "can't decode"),
         (parse_toml, " " * (MOST_BYTES + 1), f"more than {MOST_BYTES} bytes"),

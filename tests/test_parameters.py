@@ -69,6 +69,9 @@ def test_numpy_arrays_are_arrays():
         (ARRAY, [-1.0], "parameter gains[0] = -1.0: expected double array of at least 0"),
         (Parameter("names", ["none"], "names"), [1.0], "parameter names[0] = 1.0: expected string array"),
         (ARRAY, {"a": 1}, "parameter gains = {'a': 1}: expected double array"),
+        (ARRAY, [10**400], "parameter gains[0] = 1000"),
+        (PERIOD, 10**400, "parameter period = 1000"),
+        (Parameter("n", 2, "count"), 10**400, "parameter n = 1000"),
         (ARRAY, None, "parameter gains = None: expected double array"),
     ],
 )

@@ -64,6 +64,7 @@ def test_quantities_become_si(text, unit, value):
         ("inf ft", "m", "no number"),
         ("1e999 ft", "m", "expected a finite quantity"),
         (float("nan"), "1", "expected a finite quantity"),
+        (10**400, "1", "expected a finite quantity"),
         ("5 degC", "m", "cannot be read"),
         # Angles are no bare numbers, nor bare numbers angles; a frequency is no angular frequency.
         ("12", "rad", "the unit is missing"),

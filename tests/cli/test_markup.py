@@ -55,7 +55,7 @@ def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys: pytest.Captur
 
 def test_a_bar_shows_the_name_of_a_scenario_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     written = io.StringIO()
-    monkeypatch.setattr("hsv.cli.progress.errors", Console(file=written, force_terminal=True, highlight=False, width=200))
+    monkeypatch.setattr("hsv.cli.progress.errors", Console(file=written, force_terminal=True, width=200))
     with flight(NAME, 100) as line:
         line.step(50)
     with stages() as progress:

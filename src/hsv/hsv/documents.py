@@ -46,6 +46,9 @@ MOST_LEVELS = 64
 MOST_NODES = 10**6
 """Values of a YAML text, those of aliases counted wherever they stand."""
 
+_MOST_DIGITS = 4000
+_LARGEST = 10**_MOST_DIGITS
+
 _LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}""")
 """A dotted key that nests too deep: the parser takes a time that is the square of its length."""
 
@@ -114,7 +117,7 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise _too_deep() from error
     except ValueError as error:
         raise DocumentError(str(error)) from error
-    _check_levels(values)
+    _check(values)
     return values
 
 
@@ -131,7 +134,7 @@ def parse_json(text: str | bytes) -> Any:
         raise _too_deep() from error
     except ValueError as error:
         raise DocumentError(str(error)) from error
-    _check_levels(values)
+    _check(values)
     return values
 
 
@@ -144,9 +147,11 @@ def parse_yaml(text: str) -> Any:
     """
     _check_length(text)
     try:
-        return yaml.load(text, _Loader)  # type: ignore[arg-type]
+        values = yaml.load(text, _Loader)  # type: ignore[arg-type]
     except (yaml.YAMLError, ValueError, OverflowError) as error:
         raise DocumentError(" ".join(str(error).split()).replace(' in "<unicode string>",', " at")) from error
+    _check(values)
+    return values
 
 
 class _Loader(Composer, _Parser, SafeConstructor, Resolver):
@@ -208,10 +213,12 @@ def _check_length(text: str | bytes) -> None:
         raise DocumentError(f"more than {MOST_BYTES} bytes")
 
 
-def _check_levels(value: object) -> None:
-    """Refuse what is nested too deep for those who walk through it."""
+def _check(value: object) -> None:
+    """Refuse what is nested too deep for those who walk through it, and numbers that Python refuses to print."""
     level = [value]
     for _ in range(MOST_LEVELS + 1):
+        if any(isinstance(one, int) and abs(one) >= _LARGEST for one in level):
+            raise DocumentError(f"a whole number of more than {_MOST_DIGITS} digits")
         level = [
             entry
             for one in level

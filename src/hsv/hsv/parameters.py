@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from hsv.errors import ParameterError, did_you_mean
-from hsv.units import in_unit_of, parse_quantity
+from hsv.units import in_unit_of, is_finite, parse_quantity
 
 Value = bool | int | float | str | list[float] | list[str] | list[int]
 
@@ -96,7 +96,7 @@ class Parameter:
 
     def admits(self, value: object) -> bool:
         """Tell whether a number is finite, within the range, and whole where it has to be."""
-        if not isinstance(value, int | float) or not math.isfinite(value):
+        if not isinstance(value, int | float) or not is_finite(value):
             return False
         return self.minimum <= value <= self.maximum and (not self.whole or float(value).is_integer())
 
@@ -111,7 +111,7 @@ def _range(low: float, high: float) -> str:
 
 
 def _is_whole(value: object) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+    return isinstance(value, int) and not isinstance(value, bool) and is_finite(value)
 
 
 def _shown(value: object) -> str:

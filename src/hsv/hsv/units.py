@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import sys
 from collections.abc import Sequence
 from decimal import Decimal
 from enum import StrEnum
@@ -70,6 +71,11 @@ def registry() -> pint.UnitRegistry:
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
+
+
+def is_finite(value: float) -> bool:
+    """Tell whether ``value`` is a number that a double can hold, which a whole one need not be."""
+    return abs(value) <= sys.float_info.max
 
 
 def rounded(value: float) -> float:
@@ -197,7 +203,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
     if not isinstance(text, str):
         if unit != "1":
             raise QuantityError(f"{field} = {text!r}: the unit is missing, {expected}")
-        if not math.isfinite(text):
+        if not is_finite(text):
             raise QuantityError(f"{field} = {text!r}: {expected}")
         return float(text)
     if not any(map(str.isdigit, text)):
