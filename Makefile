@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-long test-ros test-viewers test-portability lint references bench docs clean
+.PHONY: help setup run test test-long fuzz test-ros test-viewers test-portability lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -26,10 +26,13 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
-	python3 -m pytest -n auto -m "not (graph or long or full_ros or portability)" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
+	python3 -m pytest -n auto -m "not (graph or long or fuzz or full_ros or portability)" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m long $(ARGS)
+
+fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
+	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m fuzz $(ARGS)
 
 # In a shell with the wheels' ROS too, if the tools of an installation built for it are on PATH.
 test-ros: setup ## set up, then run the tests that need a full ROS 2 installation, sourced before (ARGS="-k launch" chooses)
@@ -60,7 +63,7 @@ lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
-	@source ./env.sh && python3 -m pytest -n auto -m "not (reference or long or full_ros or portability or graph)" && \
+	@source ./env.sh && python3 -m pytest -n auto -m "not (reference or long or fuzz or full_ros or portability or graph)" && \
 	python3 -m pytest -n auto --dist loadfile -m "graph and not (reference or long)" && python3 tools/references.py
 
 # Without a package index everything else is measured all the same.

@@ -30,8 +30,9 @@ PICTURES = Path(__file__).parents[1] / "docs" / "images"
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the option to make the documentation's pictures anew."""
+    """Add the options to make the documentation's pictures anew, and to say how much is fuzzed."""
     parser.addoption("--pictures", action="store_true", help="write what the browser shows to docs/images")
+    parser.addoption("--fuzz-inputs", type=int, default=10_000, help="mutated files a reader, with -m fuzz")
 
 
 @pytest.fixture

@@ -1,0 +1,248 @@
+"""Every reader of files on mutated ones: values, or an error of one line; never anything else, and no partial file."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from zlib import crc32
+
+import hypothesis
+import pyarrow.parquet as pq
+import pytest
+from flown_bags import flown_bag, write_bag
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from mutations import Mutated, flipped, mutated
+from node_processes import short_scenario
+
+from hsv.campaign.campaign import plan
+from hsv.campaign.executors import SerialExecutor
+from hsv.campaign.run import run_campaign
+from hsv.campaign.store import ResultStore
+from hsv.campaign.summary import Results, limits, shares, worst_flights
+from hsv.control.design_file import find_design, read_design
+from hsv.design.certificate import certificate_path
+from hsv.design.verification.preflight import preflight
+from hsv.errors import CampaignError, HsvError
+from hsv.graph.description import TOPICS
+from hsv.recording.bag_warnings import bag_warnings
+from hsv.recording.info import describe
+from hsv.recording.reader import Bag
+from hsv.recording.recover import recover
+from hsv.simulation.coverage import uncovered_of
+from hsv.simulation.scenario import load_scenario, scenario_names, scenario_text
+from hsv.units import parse_quantity
+from hsv.vehicle.vehicle import load_vehicle, vehicle_names, vehicle_text
+
+QUICK, LONG = 100, 10_000
+
+Fuzz = Callable[[st.SearchStrategy[Mutated], Callable[[Mutated], object]], None]
+
+
+@pytest.fixture(
+    params=[
+        pytest.param(QUICK, id="short"),
+        pytest.param(LONG, id="long", marks=[pytest.mark.fuzz]),
+    ]
+)
+def fuzz(request: pytest.FixtureRequest) -> Fuzz:
+    """Return what gives mutated files to a reader, in an order that is the same every time in the short form."""
+    examples = request.config.getoption("--fuzz-inputs") if request.param == LONG else QUICK
+
+    def run(files: st.SearchStrategy[Mutated], read: Callable[[Mutated], object]) -> None:
+        @settings(
+            max_examples=examples,
+            derandomize=request.param == QUICK,
+            database=None,
+            phases=[Phase.generate, Phase.shrink],
+            suppress_health_check=list(HealthCheck),
+        )
+        @hypothesis.given(files)
+        def each(file: Mutated) -> None:
+            try:
+                read(file)
+            except HsvError as error:
+                assert str(error) and "\n" not in str(error)
+
+        each()
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown_bag(tmp_path_factory.mktemp("flown") / "bag", duration=0.2, fault=0.1)
+
+
+@pytest.fixture(scope="module")
+def small_bag(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the same without the parameters, which take most of its space."""
+    flown = Bag(bag)
+    tracks = {role: flown.track(role) for role in TOPICS if role in flown.roles}
+    return write_bag(tmp_path_factory.mktemp("small") / "bag", tracks, {}, {})
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Results:
+    folder = tmp_path_factory.mktemp("campaign")
+    planned = plan(str(short_scenario(folder, duration=1, fault=0)), samples=2, commit="test")
+    run_campaign(planned, ResultStore(folder / "flown.parquet", planned), SerialExecutor())
+    return Results(folder / "flown.parquet")
+
+
+def test_a_scenario(fuzz: Fuzz, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+
+    def read(given: Mutated) -> None:
+        path.write_bytes(given.data)
+        scenario = load_scenario(str(path))
+        scenario.parameters()
+        assert [entry.name for entry in tmp_path.iterdir()] == ["mine.toml"]
+
+    fuzz(mutated(*(scenario_text(name).encode() for name in scenario_names())), read)
+
+
+def test_a_vehicle(fuzz: Fuzz, tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+
+    def read(given: Mutated) -> None:
+        path.write_bytes(given.data)
+        load_vehicle(str(path))
+
+    fuzz(mutated(*(vehicle_text(name).encode() for name in vehicle_names())), read)
+
+
+@hypothesis.given(st.text("0123456789.e+-*/^() ftsdegradN%", max_size=60))
+@settings(max_examples=500, derandomize=True, database=None)
+def test_a_quantity(text: str) -> None:
+    with suppress(HsvError):
+        parse_quantity(text, "m", "altitude")
+
+
+def test_a_design(fuzz: Fuzz, tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+
+    def read(given: Mutated) -> None:
+        path.write_bytes(given.data)
+        read_design(path)
+
+    fuzz(mutated(find_design("adjustable").read_bytes()), read)
+
+
+def test_a_certificate(fuzz: Fuzz, tmp_path: Path) -> None:
+    path = tmp_path / "mine.certificate.json"
+    design = find_design("adjustable")
+    shutil.copyfile(design, tmp_path / "mine.yaml")
+    flown = read_design(design)
+    scenario = load_scenario("case2", {"design": str(tmp_path / "mine.yaml")})
+
+    def read(given: Mutated) -> None:
+        path.write_bytes(given.data)
+        uncovered_of(scenario, flown)
+        preflight(flown, str(path))
+
+    fuzz(mutated(certificate_path(design).read_bytes()), read)
+
+
+def test_a_bag(fuzz: Fuzz, small_bag: Path, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    long = request.node.get_closest_marker("fuzz") is not None
+    folder, out = tmp_path / "bag", tmp_path / "recovered"
+    shutil.copytree(small_bag, folder)
+    (file,) = folder.glob("*.mcap")
+
+    def read(given: Mutated) -> None:
+        shutil.rmtree(out, ignore_errors=True)
+        file.write_bytes(given.data)
+        found = Bag(folder)
+        bag_warnings(found)
+        if not long and crc32(given.data) % 5:
+            return  # what follows takes most of the time
+        describe(found)
+        try:
+            recover(folder, out)
+        except HsvError:
+            assert not out.exists()
+            raise
+        assert file.read_bytes() == given.data
+
+    fuzz(mutated(file.read_bytes()), read)
+
+
+def test_the_metadata_of_a_bag(fuzz: Fuzz, small_bag: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "bag"
+    shutil.copytree(small_bag, folder)
+    original = Bag(folder).topics
+
+    def read(given: Mutated) -> None:
+        (folder / "metadata.yaml").write_bytes(given.data)
+        assert Bag(folder).topics == original
+
+    fuzz(mutated((folder / "metadata.yaml").read_bytes()), read)
+
+
+def test_the_attachments_of_a_bag(fuzz: Fuzz, bag: Path) -> None:
+    found = Bag(bag)
+    found.attachments["certificate.json"] = certificate_path(find_design("baseline")).read_bytes()
+    found.media_types["certificate.json"] = "application/json"
+    originals = {content: name for name, content in found.attachments.items()}
+
+    def read(given: Mutated) -> None:
+        name = originals[given.source]
+        found.attachments[name] = given.data
+        try:
+            describe(found)
+        finally:
+            found.attachments[name] = given.source
+
+    fuzz(mutated(*originals), read)
+
+
+def test_the_result_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path) -> None:
+    path = tmp_path / "mine.parquet"
+    rows = pq.read_table(campaign.path).to_pylist()
+
+    def read(given: Mutated) -> None:
+        path.write_bytes(given.data)
+        found = Results(path)
+        limits(found), shares(found), worst_flights(found, 2)
+        assert repr([found.row(flight) for flight in range(len(rows))]) == repr(rows)
+        assert found.campaign == campaign.campaign and found.envelope.encode() == campaign.envelope.encode()
+
+    fuzz(mutated(campaign.path.read_bytes()), read)
+
+
+def test_no_flipped_bit_of_a_campaign_passes_as_another_result(campaign: Results, tmp_path: Path) -> None:
+    """Every byte once: what is read is what was flown, or it is refused."""
+    from random import Random
+
+    path, data = tmp_path / "mine.parquet", campaign.path.read_bytes()
+    rows = repr(pq.read_table(campaign.path).to_pylist())
+    refused = 0
+    random = Random(1)
+    for _ in range(200):
+        path.write_bytes(flipped(data, random))
+        try:
+            found = Results(path)
+            assert repr([found.row(flight) for flight in range(2)]) == rows
+            assert found.campaign == campaign.campaign
+        except CampaignError:
+            refused += 1
+    assert refused > 100
+
+
+def test_the_description_of_a_campaign(fuzz: Fuzz, campaign: Results, tmp_path: Path) -> None:
+    out = tmp_path / "mine.parquet"
+    store = ResultStore(out, campaign.campaign)
+    store.folder.mkdir()
+    described = store.folder / "campaign.json"
+
+    def read(given: Mutated) -> None:
+        described.write_bytes(given.data)
+        with store.opened() as there:
+            assert there == set()
+        assert not out.exists()
+
+    fuzz(mutated(json.dumps(json.loads(campaign.campaign.text), indent=1).encode()), read)
