@@ -135,9 +135,10 @@ def read_number(parameter: Parameter, text: object, field: str) -> float:
         ParameterError, QuantityError: No quantity in its unit, not whole, or out of its range, which is told in the
             unit given.
     """
-    value = parse_quantity(text, parameter.unit or "1", field)
+    whole = " a whole number" if parameter.whole else ""
+    # To Python a truth value is a number.
+    value = math.nan if whole and isinstance(text, bool) else parse_quantity(text, parameter.unit or "1", field)
     if not parameter.admits(value):
-        whole = " a whole number" if parameter.whole else ""
         raise ParameterError(f"{field} = {_shown(text)}: expected{whole}{limits_in_words(parameter, text)}")
     return value
 

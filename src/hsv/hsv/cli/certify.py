@@ -46,7 +46,10 @@ def certify(
     turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
     density: Annotated[str, typer.Option(help="Largest difference of the density from the model's.")] = "0 %",
     scenario: Annotated[
-        str, typer.Option(help="Also the actuators, sensors and air of this scenario, by name or path.")
+        str,
+        typer.Option(
+            help="Also the actuators, sensors and air of this scenario, by name or path, beside what else is given."
+        ),
     ] = "",
     reach: Annotated[
         float, typer.Option(help="Standard deviations that bound noise and turbulence; 8.572 is beyond all of ours.")

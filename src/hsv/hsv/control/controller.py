@@ -139,7 +139,7 @@ class Controller(ABC):
 
     def failure(self, step: int, what: str) -> ControllerError:
         """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
-        expected = f"expected a finite number for {' and '.join(INPUT_NAMES)}"
+        expected = f"expected {len(INPUT_NAMES)} finite numbers: {' and '.join(INPUT_NAMES)}"
         return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
 
 

@@ -37,7 +37,8 @@ def _verdict(runs: Sequence[ReportedRun], system: UnitSystem) -> str:
     if not judged:
         return "there are no limits to judge these flights by"
     good = [run for run in judged if run.good]
-    parts = [f"{len(good)} of {len(judged)} flights are within all of their limits"]
+    which = " that have limits" if len(judged) < len(runs) else ""
+    parts = [f"within all of their limits: {len(good)} of {len(judged)} flights{which}"]
     parts += [f"{run.label}: {_whole(run, limits_kept(run.verdicts, system))}" for run in judged if not run.good]
     for run in judged:
         if free := criteria_not_judged(run.verdicts, run.metrics, system):

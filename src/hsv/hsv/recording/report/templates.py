@@ -33,6 +33,7 @@ def environment_of(package: str, *, escaped: bool = True) -> Environment:
         "percent": text.percent,
         "words": in_words,
         "breakable": text.breakable,
+        "counted": text.counted,
     }
     environment.globals |= {
         "asset": asset,

@@ -70,6 +70,11 @@ def percent(share: float) -> str:
     return f"{number(float(f'{100.0 * share:.2g}'), 15)} %"
 
 
+def counted(count: int, name: str) -> str:
+    """Return how many there are of what has a regular plural."""
+    return f"{count} {name}" if count == 1 else f"{count} {name}s"
+
+
 def capitalised(text: str) -> str:
     """Return a text as a sentence begins."""
     return text[:1].upper() + text[1:]
