@@ -162,7 +162,7 @@ def test_settings_reach_the_controller_in_si_units():
 @pytest.mark.parametrize(
     ("controller", "answer", "message"),
     [
-        ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected a finite"),
+        ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected 2 finite"),
         ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected 2 finite numbers: fuel"),
         ("Late", None, r"Late, step 20: answered None"),
         ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain"),

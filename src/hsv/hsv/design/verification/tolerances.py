@@ -156,7 +156,9 @@ def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:
         states = np.array([table["state_scale"][name] for name in STATE_NAMES])
         inputs = np.array([table["input_scale"][name] for name in INPUT_NAMES])
         rows, columns = {"model.a": (states, states), "model.b": (states, inputs)}.get(parameter, (inputs, states))
-        return np.asarray(rows[:, None] / columns)
+        # A certificate may have any scales.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(rows[:, None] / columns)
     described = certificate["tube"]["invariant_set"]
     seen = sum(not name.startswith(INPUT_NAMES) for name in described["states"])
     if kind == "ellipsoids":
