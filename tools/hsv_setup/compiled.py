@@ -6,7 +6,9 @@ that a function it calls from another file has changed: so all caches go when an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 from hsv_setup.console import Stage
@@ -38,13 +40,19 @@ def is_current() -> bool:
     return not _PROGRAM.exists() or (read_stamp(_STAMP) == _key() and bool(_caches()))
 
 
-def warm(env: Mapping[str, str], stage: Stage) -> None:
-    """Compile everything once, as `python -m hsv.warm` does it.
+@contextmanager
+def warming(env: Mapping[str, str], stage: Stage) -> Iterator[None]:
+    """Compile everything that is outdated once, as `python -m hsv.warm` does it, beside what is done in the block.
 
     Raises:
         SetupError: the numerical code does not compile.
     """
+    if is_current():
+        yield
+        return
     for path in _caches():
         path.unlink()
-    stage.run(["bash", "-c", 'source ./env.sh && exec "$0" -m hsv.warm', PYTHON], env)
+    paths = [str(_LIBRARY.parent), *filter(None, [env.get("PYTHONPATH")])]
+    with stage.running([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)}):
+        yield
     write_stamp(_STAMP, _key())

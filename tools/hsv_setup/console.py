@@ -7,7 +7,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from hsv_setup.paths import LOG, ROOT
@@ -56,6 +57,21 @@ class Stage:
         Raises:
             SetupError: the command failed; names the log and quotes its end.
         """
+        with self.running(command, env, progress):
+            pass
+
+    @contextmanager
+    def running(
+        self,
+        command: Sequence[str | Path],
+        env: Mapping[str, str],
+        progress: Callable[[str], str] = lambda _: "",
+    ) -> Iterator[None]:
+        """Run a command as :meth:`run` does, beside what is done in the block; its end is waited for behind it.
+
+        Raises:
+            SetupError: the command failed; names the log and quotes its end.
+        """
         with self.log.open("ab") as out:
             out.write(("+ " + " ".join(map(str, command)) + "\n").encode())
             out.flush()
@@ -70,6 +86,7 @@ class Stage:
                 start_new_session=True,
             )
             try:
+                yield
                 while process.poll() is None:
                     time.sleep(_POLL_PERIOD)
                     if self._live:

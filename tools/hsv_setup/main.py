@@ -9,7 +9,7 @@ import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import FrameType
 
 from hsv_setup import bytecode, checks, compiled, completion, environment, interpreter, routes, workspace
@@ -55,18 +55,21 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
             environment.install(route, python, env, stage)
             stage.done("installed in .venv")
         wanted = workspace.outdated(route)
-        if wanted or workspace.removed():
-            checks.require(route, python, env)
-            stage = Stage("[2/3] Workspace", "build")
-            workspace.build(route, wanted, env, stage)
-            stage.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
-        if not (bytecode.sources_are_current() and compiled.is_current()):
-            stage = Stage("[3/3] Compiled caches", "compile")
-            completion.write(environment.PYTHON, env, stage)
-            bytecode.compile_sources(environment.PYTHON, env, stage)
-            if not compiled.is_current():
-                compiled.warm(env, stage)
-            stage.done("byte code and numerical code compiled")
+        compiling = not (bytecode.sources_are_current() and compiled.is_current())
+        with ExitStack() as beside:
+            if compiling:
+                caches = Stage("[2/3] Compiled caches", "compile")
+                # The numerical code needs no package of the workspace to be built, and one core each is enough.
+                beside.enter_context(compiled.warming(env, caches))
+            if wanted or workspace.removed():
+                checks.require(route, python, env)
+                stage = Stage("[3/3] Workspace", "build")
+                workspace.build(route, wanted, env, stage)
+                stage.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
+        if compiling:
+            completion.write(environment.PYTHON, env, caches)
+            bytecode.compile_sources(environment.PYTHON, env, caches)
+            caches.done("byte code and numerical code compiled")
     print(f"Set up ({time.monotonic() - start:.1f} s). To use it in this shell: source env.sh", flush=True)
 
 
