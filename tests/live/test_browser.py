@@ -38,7 +38,7 @@ def until(browser, flight, condition):
 
 def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, screen, tmp_path, pictures):
     bag = tmp_path / "bag"
-    flight, page, _ = fly(processes, short_scenario(tmp_path, 90, fault=85), "--bag", bag)
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 120, fault=115), "--bag", bag)
     driver = browser.driver
     screen(1280)
     browser.console()
@@ -70,15 +70,18 @@ def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, proces
     browser.run(f"{limits}.scrollIntoView()")
     until(browser, flight, f"{limits}.layout && {limits}.layout.shapes.filter((s) => s.type === 'line').length === 2")
     pace = driver.find_element("css selector", "[name=pace]")
+    # In the middle of the window: at its edge something else may lie above it.
+    browser.run("document.querySelector('[name=pace]').scrollIntoView({ block: 'center', behavior: 'instant' })")
+    wait_until(pace.is_displayed, [flight.pid])
     pace.clear()
     pace.send_keys("0\n")
     until(browser, flight, "live.status.ending")
     state = browser.run("return document.getElementById('state').textContent")
-    assert state == f"Flight finished at t = 90.00 s · verdict, metrics and report: {bag}/report.html"
+    assert state == f"Flight finished at t = 120.00 s · verdict, metrics and report: {bag}/report.html"
     wait_until(lambda: flight.poll() is not None, [flight.pid])
     # The server has left; the curves stay.
     until(browser, flight, "live.over")
-    assert browser.run("return live.charts.now") == pytest.approx(90.0)
+    assert browser.run("return live.charts.now") == pytest.approx(120.0)
     assert browser.run("return document.querySelector('fieldset.flight').disabled")
     assert browser.console() == []
     assert {address.split("/")[2] for address in browser.requests() if ":" in address} <= {page.split("/")[2]}
