@@ -3,8 +3,6 @@ import time
 import pytest
 
 from hsv.bench.figure import Figure, interleaved
-from hsv.bench.page import BEGIN, END, Page
-from hsv.errors import QuantityError
 
 
 def figure(*ours, theirs=(1.0, 1.0, 1.0), **promise):
@@ -38,20 +36,3 @@ def test_the_two_sides_are_measured_in_turn():
     ours, theirs = interleaved(lambda: order.append("a"), lambda: order.append("b"), 3, time.perf_counter)
     assert "".join(order) == "ab" * 4
     assert len(ours) == len(theirs) == 3
-
-
-def test_the_table_replaces_the_one_before(tmp_path):
-    page = tmp_path / "page.md"
-    page.write_text(f"# Before\n{BEGIN}\nold\n{END}\nAfter\n")
-    for _ in range(2):
-        rows = [figure(1.4, theirs=(1.0,), bound="most", limit=1.5, note="noted")]
-        Page(page).write("a machine", rows, {"jsbsim": "not installed"})
-    text = page.read_text()
-    assert text.startswith("# Before\n") and text.endswith("\nAfter\n")
-    assert "old" not in text
-    assert text.count("| ours | theirs | 1.4 s") == 1
-    assert "within 1.5; noted" in text
-    assert "a machine" in text and "Not measured: jsbsim, not installed." in text
-    page.write_text("nothing")
-    with pytest.raises(QuantityError, match="marks"):
-        Page(page)

@@ -42,11 +42,16 @@ class Figure:
         return float(low), float(high)
 
     @property
+    def is_rate(self) -> bool:
+        """Whether more is better."""
+        return self.bound == "least"
+
+    @property
     def verdict(self) -> str:
         """How the median stands to limit and goal, in words; empty where nothing is promised."""
         if self.limit is None:
             return ""
-        sign = 1.0 if self.bound == "most" else -1.0
+        sign = -1.0 if self.is_rate else 1.0
         if sign * self.median > sign * self.limit:
             return f"WORSE than the limit, at {self.bound} {self.limit:g}"
         if self.goal is not None and sign * self.median > sign * self.goal:

@@ -1,17 +1,28 @@
-"""The table of one run, in a page of the documentation."""
+"""The tables of one run and of all runs, in a page of the documentation."""
 
 from __future__ import annotations
 
 import datetime
-import os
-import platform
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hsv.bench.figure import Figure
+from hsv.bench.machine import hardware
 from hsv.errors import QuantityError
+from hsv.graph.preparation import commit
 
-BEGIN, END = "<!-- table: made by hsv bench -->", "<!-- end of table -->"
+TABLE = "<!-- table: made by hsv bench -->", "<!-- end of table -->"
+HISTORY = "<!-- history: made by hsv bench -->", "<!-- end of history -->"
+
+FOLLOWED = {
+    "in_process": "compiled loop / C",
+    "graph": "lap / bare ring",
+    "composed": "composed lap / bare loop",
+    "montecarlo": "flights a second, all workers / as many times one",
+    "corners": "1024 corners [s]",
+}
+"""Figures that the table of all runs has, by name, and what it calls them."""
 
 
 def cells(figure: Figure) -> tuple[str, ...]:
@@ -32,34 +43,11 @@ def _quantity(values: Sequence[float], unit: str) -> str:
 def table(figures: Sequence[Figure]) -> str:
     """Return the figures as a Markdown table."""
     head = ("what", "against", "ours", "theirs", "ratio", "spread (10 to 90 %)", "promise")
-    rows = [head, ("---",) * len(head), *map(cells, figures)]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
-
-
-def machine() -> str:
-    """Return processor, cores, system, Python and how busy it is just now, in one line."""
-    name = platform.processor() or platform.machine()
-    info = Path("/proc/cpuinfo")
-    if info.exists():
-        models = [line for line in info.read_text().splitlines() if line.startswith("model name")]
-        name = models[0].split(":", 1)[1].strip() if models else name
-    load = f", load average before {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-    return f"{name}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}{load}"
-
-
-def busy() -> str:
-    """Return a warning if other programs keep this machine from showing what it can; else nothing."""
-    cores = os.cpu_count() or 1
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    if load < 0.5 * cores:
-        return ""
-    return (
-        f"load average {load:.1f} on {cores} cores: figures of several processes will be worse than on an idle machine"
-    )
+    return "\n".join(map(_row, (head, ("---",) * len(head), *map(cells, figures))))
 
 
 class Page:
-    """A page of the documentation with marks, between which the table of a whole run is kept."""
+    """A page of the documentation with marks, between which the table of a whole run and that of all runs are kept."""
 
     def __init__(self, path: Path) -> None:
         """Read ``path``.
@@ -67,17 +55,39 @@ class Page:
         Raises:
             QuantityError: The page has no marks.
         """
-        text = path.read_text(encoding="utf-8") if path.exists() else ""
         self._path = path
-        self._before, begin, rest = text.partition(BEGIN)
-        _, end, self._after = rest.partition(END)
-        if not (begin and end):
-            raise QuantityError(f"out = {str(path)!r}: expected a page with the marks {BEGIN!r} and {END!r}")
+        self._text = path.read_text(encoding="utf-8") if path.exists() else ""
+        for begin, end in (TABLE, HISTORY):
+            if not re.search(f"{begin}.*{end}", self._text, re.DOTALL):
+                raise QuantityError(f"out = {str(path)!r}: expected a page with the marks {begin!r} and {end!r}")
 
     def write(self, measured_on: str, figures: Sequence[Figure], skipped: Mapping[str, str]) -> None:
-        """Put the table of ``figures`` there, the machine above, what was not measured and why below."""
+        """Put the table of ``figures`` there, the machine above, what was not measured and why below; and a row of it.
+
+        The row goes to the table of all runs, in place of one of the same commit on the same hardware.
+        """
         day = datetime.datetime.now(datetime.UTC).date().isoformat()
         lines = [f"{day}, {measured_on}.", "", table(figures), ""]
         lines += [f"Not measured: {name}, {reason}." for name, reason in skipped.items()]
-        text = "\n".join(lines).rstrip()
-        self._path.write_text(f"{self._before}{BEGIN}\n{text}\n{END}{self._after}", encoding="utf-8")
+        self._replace(TABLE, "\n".join(lines).rstrip())
+        medians = {figure.name: f"{figure.median:.3g}" for figure in figures}
+        run = f"| {commit()} | {hardware()} |"
+        head = ("day", "commit", "machine", *FOLLOWED.values())
+        before = [line for line in self._between(HISTORY).splitlines()[2:] if run not in line]
+        rows = [_row(head), _row(("---",) * len(head)), *before]
+        rows.append(f"| {day} {run} {' | '.join(medians.get(name, '') for name in FOLLOWED)} |")
+        self._replace(HISTORY, "\n".join(rows))
+        self._path.write_text(self._text, encoding="utf-8")
+
+    def _between(self, marks: tuple[str, str]) -> str:
+        begin, end = marks
+        return self._text.partition(begin)[2].partition(end)[0].strip()
+
+    def _replace(self, marks: tuple[str, str], text: str) -> None:
+        begin, end = marks
+        before, _, rest = self._text.partition(begin)
+        self._text = f"{before}{begin}\n{text}\n{end}{rest.partition(end)[2]}"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"

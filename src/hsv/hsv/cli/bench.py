@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
@@ -11,22 +11,31 @@ from rich.text import Text
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, errors, folded, print_json
 from hsv.cli.targets import check_target
+from hsv.units import significant
 
 if TYPE_CHECKING:
     from hsv.bench.figure import Figure
+    from hsv.bench.record import Change
 
 
 def bench(
     only: Annotated[list[str] | None, typer.Option(help="Measure this group only; may be repeated.")] = None,
     scale: Annotated[float, typer.Option(help="Factor on the number of repetitions.")] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Page whose table to replace, e.g. docs/benchmarks.md.")] = None,
+    compare: Annotated[
+        Path | None, typer.Option(help="Say what became slower or faster since this run, kept by --json > FILE.")
+    ] = None,
     json: JsonOption = False,
 ) -> None:
     """Measure this machine: every figure a ratio, both sides measured in turn; worse than promised is said plainly.
 
+    Exit code 1 where something became slower since the run given to --compare.
+
     Example: hsv bench --only in_process --only mcap
     """
-    from hsv.bench.page import Page, busy, machine
+    from hsv.bench.machine import busy, machine
+    from hsv.bench.page import Page
+    from hsv.bench.record import as_json, changes, read_run
     from hsv.bench.suite import groups
     from hsv.cli.progress import stages
     from hsv.errors import QuantityError, RunError
@@ -39,6 +48,7 @@ def bench(
     if out:
         check_target(out, "out")
         page = Page(out)
+    recorded = read_run(compare) if compare else None
     available = groups(scale)
     for name in only or ():
         if name not in available:
@@ -61,32 +71,20 @@ def bench(
             if not measured:
                 skipped[name] = "not installed"
             figures += measured
+    since = changes(figures, recorded) if recorded else []
     if json:
-        print_json({"figures": [_as_json(figure) for figure in figures], "skipped": skipped})
+        slower = {change.figure.name: change.slower for change in since}
+        print_json(as_json(figures, skipped) | ({"slower_than_recorded": slower} if recorded else {}))
     else:
         _print(figures)
         for name, reason in skipped.items():
             errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
+        if recorded:
+            _print_changes(since, recorded.commit, len(figures))
     if page:
         page.write(measured_on, figures, skipped)
-
-
-def _as_json(figure: Figure) -> dict[str, Any]:
-    return {
-        "name": figure.name,
-        "what": figure.what,
-        "against": figure.against or None,
-        "unit": figure.unit,
-        "ours": list(figure.ours),
-        "theirs": list(figure.theirs),
-        "ratio" if figure.theirs else "value": figure.median,
-        "spread": figure.spread,
-        "bound": figure.bound or None,
-        "limit": figure.limit,
-        "goal": figure.goal,
-        "verdict": figure.verdict or None,
-        "note": figure.note or None,
-    }
+    if any(change.slower > 0.0 for change in since):
+        raise typer.Exit(1)
 
 
 def _print(figures: list[Figure]) -> None:
@@ -102,3 +100,17 @@ def _print(figures: list[Figure]) -> None:
         if promise:
             style = "bold red" if "WORSE" in promise else ""
             console.print(Text(folded(promise, 4, first=4), style), soft_wrap=True)
+
+
+def _print_changes(since: list[Change], commit: str, measured: int) -> None:
+    """Print what became slower or faster since a recorded run of a ``commit``, and of how many nothing can be said."""
+    console.print(Text(f"since {commit}", "bold"))
+    for change in since:
+        if change.slower:
+            word, style = ("SLOWER", "bold red") if change.slower > 0.0 else ("faster", "green")
+            said = f"{word} by {abs(change.slower):.0%}, {significant(change.before)} before: {change.figure.what}"
+            console.print(Text(folded(said, 4, first=4), style), soft_wrap=True)
+    same = sum(not change.slower for change in since)
+    alone = measured - len(since)
+    said = f"as before: {same} of {measured}{f'; {alone} not in that run, or of other hardware' if alone else ''}"
+    console.print(folded(said, 4, first=4), soft_wrap=True)

@@ -1,0 +1,114 @@
+"""Runs of the bench as JSON, and what became slower or faster from one to another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pydantic
+
+from hsv.bench.figure import Figure
+from hsv.bench.machine import hardware, machine
+from hsv.documents import parse_json, read_text
+from hsv.errors import DocumentError, QuantityError
+from hsv.graph.preparation import commit
+
+RESOLUTION = 0.05
+"""Relative change that is none: what the same commit shows from run to run on an idle machine."""
+
+
+class RecordedFigure(pydantic.BaseModel):
+    """What a comparison needs of a figure in a recorded run."""
+
+    name: str
+    spread: tuple[float, float]
+    ratio: float | None = None
+    value: float | None = None
+
+
+class RecordedRun(pydantic.BaseModel):
+    """A run of the bench as ``hsv bench --json`` prints it."""
+
+    commit: str
+    hardware: str
+    figures: list[RecordedFigure]
+
+
+@dataclass(frozen=True)
+class Change:
+    """How a figure stands to the recorded one: the share that it became slower, negative where it became faster."""
+
+    figure: Figure
+    before: float
+    slower: float
+
+
+def as_json(figures: Sequence[Figure], skipped: Mapping[str, str]) -> dict[str, Any]:
+    """Return a run for :func:`read_run`: commit, machine, figures with every sample, what was not measured and why."""
+    return {
+        "commit": commit(),
+        "hardware": hardware(),
+        "machine": machine(),
+        "figures": [_as_json(figure) for figure in figures],
+        "skipped": dict(skipped),
+    }
+
+
+def read_run(path: Path) -> RecordedRun:
+    """Return the run in a file.
+
+    Raises:
+        QuantityError: It cannot be read, or is no output of ``hsv bench --json``.
+    """
+    expected = "expected the output of hsv bench --json"
+    try:
+        return RecordedRun.model_validate(parse_json(read_text(path)))
+    except DocumentError as error:
+        raise QuantityError(f"compare = {str(path)!r}: {error}, {expected}") from error
+    except pydantic.ValidationError as error:
+        first = error.errors()[0]
+        field = ".".join(map(str, first["loc"])) or "all of it"
+        raise QuantityError(f"compare = {str(path)!r}: {field}: {first['msg']}, {expected}") from error
+
+
+def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
+    """Return how figures stand to those of a recorded run, for those that can be compared.
+
+    Ratios of two sides hold on any machine; a figure of one side alone is compared on the same hardware only. A change
+    counts as one where it is more than :data:`RESOLUTION` and the spreads do not overlap; else it is zero.
+    """
+    before = {figure.name: figure for figure in run.figures}
+    found = []
+    for figure in figures:
+        old = before.get(figure.name)
+        if old is None or not (figure.theirs or run.hardware == hardware()):
+            continue
+        value = old.ratio if figure.theirs else old.value
+        if value is None or not value > 0.0:
+            continue
+        apart = figure.spread[0] > old.spread[1] or figure.spread[1] < old.spread[0]
+        # Of a rate the smaller number is the slower one.
+        relation = value / figure.median if figure.is_rate else figure.median / value
+        counts = apart and abs(relation - 1.0) > RESOLUTION
+        found.append(Change(figure, value, relation - 1.0 if counts else 0.0))
+    return found
+
+
+def _as_json(figure: Figure) -> dict[str, Any]:
+    return {
+        "name": figure.name,
+        "what": figure.what,
+        "against": figure.against or None,
+        "unit": figure.unit,
+        "ours": list(figure.ours),
+        "theirs": list(figure.theirs),
+        "ratio" if figure.theirs else "value": figure.median,
+        "spread": figure.spread,
+        "bound": figure.bound or None,
+        "limit": figure.limit,
+        "goal": figure.goal,
+        "verdict": figure.verdict or None,
+        "note": figure.note or None,
+    }
