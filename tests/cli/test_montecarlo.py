@@ -24,7 +24,7 @@ def test_a_campaign_by_the_command_and_one_flight_again(campaign, hsv, tmp_path)
     assert ran.code == 0
     assert values["flown_now"] == 12
     assert {share["name"] for share in values["limits"]} == {"flown_to_the_end", "tube_level"}
-    assert "flights on 1 cores" in ran.err
+    assert "flights on 1 core" in ran.err
     result = tmp_path / values["result"]
     assert result.exists() and (tmp_path / values["page"]).read_text().startswith("<!DOCTYPE html>")
     again = hsv("montecarlo", "replay", str(result), "--flight", "7", "--json").json

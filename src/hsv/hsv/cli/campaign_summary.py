@@ -30,10 +30,12 @@ _LISTED = 5
 def announce(capacity: Capacity) -> None:
     """Say what a campaign is going to take."""
     hours, minutes = divmod(capacity.wall_time / 60.0, 60.0)
-    duration = f"{hours:.0f} h {minutes:.0f} min" if hours else f"{capacity.wall_time:.0f} s"
+    duration = f"{hours:.0f} h {minutes:.0f} min" if hours else f"{significant(capacity.wall_time, 2)} s"
+    cores = "core" if capacity.cores == 1 else "cores"
     errors.print(
-        f"{capacity.flights} flights on {capacity.cores} cores: about {duration} "
-        f"({capacity.wall_time * capacity.cores / 3600.0:.2g} core hours), {capacity.bytes / 1e6:.2g} MB on the disk"
+        f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration} "
+        f"({significant(capacity.wall_time * capacity.cores / 3600.0, 2)} core hours), "
+        f"{significant(capacity.bytes / 1e6, 2)} MB on the disk"
     )
 
 
