@@ -1,5 +1,5 @@
 // A program: step exported blocks through all their branches, with numbers that count what is computed with them, and
-// print the most that a step of each block took: name, multiplications, additions, comparisons.
+// print the most that a step of each block took: name, multiplications and divisions, additions, comparisons.
 
 #include <cfloat>
 #include <cmath>
@@ -25,6 +25,7 @@ struct Counted {
     friend Counted operator+(Counted a, Counted b) { return a += b; }
     friend Counted operator-(Counted a, Counted b) { return count.additions++, a.value - b.value; }
     friend Counted operator*(Counted a, Counted b) { return count.multiplications++, a.value * b.value; }
+    friend Counted operator/(Counted a, Counted b) { return count.multiplications++, a.value / b.value; }
     friend bool operator<(Counted a, Counted b) { return count.comparisons++, a.value < b.value; }
     friend bool operator>(Counted a, Counted b) { return count.comparisons++, a.value > b.value; }
     friend bool operator<=(Counted a, Counted b) { return count.comparisons++, a.value <= b.value; }
@@ -64,6 +65,14 @@ int main()
             most_of(*block, in, state, most);
             in[HSV_ALTITUDE] = altitude_breakpoints[ALTITUDE_PIECES];
             in[HSV_VELOCITY] = velocity_breakpoints[VELOCITY_PIECES];
+            most_of(*block, in, state, most);
+        }
+        // Of the nominal trajectory: x_n in the outermost ellipsoid, along one of its axes in no other.
+        for (int axis = 0; axis < RIGID; axis++) {
+            Counted in[100], state[100];
+            for (int i = 0; i < 100; i++)
+                in[i] = state[i] = 0.0;
+            in[axis] = 0.999 / std::sqrt(nominal_ellipsoids[0][axis][axis].value);
             most_of(*block, in, state, most);
         }
         std::printf("%s %ld %ld %ld\n", block->name, most.multiplications, most.additions, most.comparisons);

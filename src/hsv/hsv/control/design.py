@@ -59,6 +59,8 @@ class ControlDesign:
     """Factor (5) of each rigid state's feedback that the design flies with."""
     tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
     """Least factor (5) for which the feedback is certified, up to 1."""
+    interpolated: bool = False
+    """Whether the nominal gain between two ellipsoids is one between theirs: then u_n is continuous."""
     filtered: bool = False
     """Whether the feedback acts on the filtered pitch rate less that of the plan through the same filter (eq. 48)."""
     modified: bool = False
@@ -105,6 +107,8 @@ class ControlDesign:
         values |= {name: compact(tau) for name, tau in adjustable.items() if np.any(tau != 1.0)}
         if self.filtered:
             values["nominal.filtered"] = True
+        if self.interpolated:
+            values["nominal.interpolated"] = True
         if self.actuators:
             values["design.actuators"] = " ".join(self.actuators)
         if self.vehicle:
@@ -157,6 +161,7 @@ class ControlDesign:
             plan_bounds=_plan_bounds(v),
             tau=tau,
             tau_minimum=tau_minimum,
+            interpolated=v["nominal.interpolated"],
             filtered=v["nominal.filtered"],
             modified=v["design.hash"] != digest(v),
             **{

@@ -32,6 +32,7 @@ DESIGN_PARAMETERS = (
     Parameter("nominal.filtered", False, "feedback on q_f less the filtered rate of the plan (paper eq. 48)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
+    Parameter("nominal.interpolated", False, "whether the gain is interpolated between two ellipsoids, or switched"),
     Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
     Parameter("design.actuators", "", "actuators that the tube is certified for, by name; empty: ideal ones"),
     Parameter("design.vehicle", "", "digest of the vehicle that the design is for; empty: the default one"),
@@ -68,7 +69,7 @@ def digest(values: Mapping[str, Any]) -> str:
     Left out are ``design.hash``, ``feedback.tau``, which may be anything certified, and what is empty or as if absent.
     """
     known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash", TAU.name}
-    absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False}
+    absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False, "nominal.interpolated": False}
     said = {name: values[name] for name in sorted(known & values.keys()) if values[name] != absent.get(name, "")}
     text = json.dumps({name: value for name, value in said.items() if value != []})
     return hashlib.sha256(text.encode()).hexdigest()

@@ -29,16 +29,23 @@ class NominalStatus(IntFlag):
 
 
 class NominalData(NamedTuple):
-    """Polytope, gains K (g, 2, n) and ellipsoids P (g, s, s) for compiled functions, outermost first."""
+    """Polytope, gains K (g, 2, n) and ellipsoids P (g, s, s) for compiled functions, outermost first.
+
+    ``interpolated``: whether the gain between two ellipsoids is one between theirs, or that of the outer one.
+    """
 
     polytope: PolytopeData
     gains: np.ndarray
     ellipsoids: np.ndarray
+    interpolated: bool
 
 
 @dataclass(frozen=True)
 class LawResult:
-    """u_n (2); the gain K (2, 9) in it and its index in the family, ``NOT_IN_FAMILY`` if found in flight; status."""
+    """u_n (2); the gain K (2, 9) in it and its index in the family, ``NOT_IN_FAMILY`` if found in flight; status.
+
+    Of an interpolated family, gain and index are those of the smallest ellipsoid that holds x_n.
+    """
 
     input: np.ndarray
     gain: np.ndarray
@@ -75,29 +82,46 @@ def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
 def nominal_input(data: Any, deviation: np.ndarray, u_n: np.ndarray) -> tuple[int, bool]:
     """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one.
 
-    Without gains u_n is zero.
+    Interpolated, K = a K_i + (1 - a) K_j, of that ellipsoid i and the next one inside, j, which does not hold x_n: with
+    x' (a P_i + (1 - a) P_j) x = 1, a is 1 on the boundary of i and 0 on that of j, so that u_n is continuous (Wan and
+    Kothare, Automatica 39, 2003). Without gains u_n is zero.
     """
     if len(data.gains) == 0:
         for i in range(len(u_n)):
             u_n[i] = 0.0
         return 0, True
+    boundary = 1.0 + MEMBERSHIP_TOLERANCE
     index = 0
     inside = False
+    held, beyond = 0.0, 0.0
     for g in range(len(data.ellipsoids) - 1, -1, -1):
-        if level(data.ellipsoids[g], deviation) <= 1.0 + MEMBERSHIP_TOLERANCE:
+        held = level(data.ellipsoids[g], deviation)
+        if held <= boundary:
             index = g
             inside = True
             break
+        beyond = held
     gain = data.gains[index]
     for i in range(gain.shape[0]):
         u_n[i] = 0.0
         for j in range(gain.shape[1]):
             u_n[i] += gain[i, j] * deviation[j]
+    if data.interpolated and inside and index + 1 < len(data.gains):
+        share = (beyond - boundary) / (beyond - held)
+        inner = data.gains[index + 1]
+        for i in range(gain.shape[0]):
+            total = 0.0
+            for j in range(gain.shape[1]):
+                total += inner[i, j] * deviation[j]
+            u_n[i] = total + share * (u_n[i] - total)
     return index, inside
 
 
 class FamilyLaw:
-    """The nested family: the gain of the smallest ellipsoid that holds x_n, the outermost where none does."""
+    """The nested family: the gain of the smallest ellipsoid that holds x_n, the outermost where none does.
+
+    Or, interpolated, one between it and that of the next ellipsoid inside.
+    """
 
     compiled_with_loop = True
 

@@ -155,13 +155,14 @@ NO_NOMINAL = NominalData(
     PolytopeData(np.zeros((0, N_STATES * (N_STATES + N_INPUTS))), _FLAT, _FLAT),
     np.zeros((0, N_INPUTS, N_STATES)),
     np.zeros((0, N_RIGID, N_RIGID)),
+    False,
 )
 """In place of a nominal system, where there is no design: x_n and u_n stay zero."""
 
 
 def nominal_data(design: ControlDesign) -> NominalData:
     """Return the nominal system and the nested family of ``design`` for compiled functions."""
-    return NominalData(design.polytope.data(), design.nominal_gains, design.nominal_ellipsoids)
+    return NominalData(design.polytope.data(), design.nominal_gains, design.nominal_ellipsoids, design.interpolated)
 
 
 def _law(values: Mapping[str, Any], design: ControlDesign, reference: ReferenceTrajectory) -> NominalLaw | None:

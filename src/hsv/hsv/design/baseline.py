@@ -128,6 +128,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         notch=notch,
         actuators=inputs.actuators,
         vehicle=vehicle.digest,
+        interpolated=bool(inputs.nominal.interpolated),
     )
     return DesignResult(design, model, _report(inputs, design, model, feedback, nominal))
 
@@ -148,7 +149,11 @@ def nominal_family(inputs: DesignInputs, problem: NominalProblem, progress: Prog
     """Return the nested nominal gains along the design's step; errors as for :func:`nested_gains`."""
     deviation = initial_deviation(inputs)
     return nested_gains(
-        problem, deviation, inputs.nominal.scales, lambda done, total: progress("nominal gains", done, total)
+        problem,
+        deviation,
+        inputs.nominal.scales,
+        interpolated=bool(inputs.nominal.interpolated),
+        progress=lambda done, total: progress("nominal gains", done, total),
     )
 
 

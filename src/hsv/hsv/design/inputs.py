@@ -172,6 +172,9 @@ class FeedbackInputs(_Table):
 class NominalInputs(_Table):
     """The nominal gains K (paper eq. 32 to eq. 35): one for each of ``scales`` times ``start`` to ``target``."""
 
+    interpolated: bool | None = None
+    """Whether the gain is interpolated between two ellipsoids; none: it is switched"""
+
     start: FlightPoint
     target: FlightPoint
     scales: list[Annotated[float, Field(gt=0.0, le=1.0)]] = Field(min_length=1, max_length=20)

@@ -70,6 +70,18 @@ def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: 
     return gamma, residuals
 
 
+def decrease_between(problem: NominalProblem, K: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Return by how much the level in the ellipsoid ``outside`` falls under ``K``, the gain of the next one inside.
+
+    The smallest eigenvalue of 1 - M' M at each vertex (r), M = A + B K in the coordinates of ``outside`` (n, n). Where
+    all are above zero the level decreases under every gain between the two, at every point of the polytope: it does
+    under the gain of ``outside`` by (34), and M' M is convex in M. So x_n never leaves it, and comes to the next one.
+    """
+    factor = np.linalg.cholesky(outside)
+    M = np.linalg.solve(factor, (problem.A + problem.B @ K) @ factor)
+    return smallest_eigenvalues(np.eye(len(outside)) - np.swapaxes(M, 1, 2) @ M)
+
+
 def _decrease_blocks(contraction: np.ndarray, weighted: np.ndarray) -> np.ndarray:
     r, n, _ = contraction.shape
     k = n + len(weighted)

@@ -26,6 +26,7 @@ class StepBound:
     """The most that a step of a block computes, step 0 included, and the numbers that it keeps in its state."""
 
     multiplications: int
+    """And divisions."""
     additions: int
     """And subtractions."""
     comparisons: int
@@ -95,11 +96,13 @@ def step_bounds(design: ControlDesign, notch: Sequence[NotchSection] = ()) -> di
     vertices, width = len(design.polytope.A), n * (n + m)
     membership, weights = rigid * rigid + rigid, 3 * sum(count for _, count in axes)
     filtered = sections if design.filtered else 0
+    # Between two gains: the input of the inner one, the share of the outer one, and their sum.
+    products, sums = (m * n + 1 + m, m * n + 2 + 2 * m) if design.interpolated and gains > 1 else (0, 0)
     return {
         "notch_filter": StepBound((9 + 2) * sections, 6 * sections, 0, 2 * sections),
         "nominal_trajectory": StepBound(
-            multiplications=gains * membership + m * n + weights + vertices * (1 + width) + width,
-            additions=n + gains * membership + m * n + weights + len(axes) + vertices * width + width + n,
+            multiplications=gains * membership + m * n + products + weights + vertices * (1 + width) + width,
+            additions=n + gains * membership + m * n + sums + weights + len(axes) + vertices * width + width + n,
             comparisons=gains + sum(3 + pieces - 1 for pieces, _ in axes),
             state_size=n,
         ),

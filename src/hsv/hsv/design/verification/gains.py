@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
+from hsv.control.design import ControlDesign
+from hsv.control.nominal_law import MEMBERSHIP_TOLERANCE, FamilyLaw
+from hsv.control.nominal_trajectory import nominal_data
 from hsv.design.lmi import smallest_eigenvalues, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.nominal_problem import NominalProblem, certified_cost, step_deviation
+from hsv.design.nominal_problem import NominalProblem, certified_cost, decrease_between, step_deviation
 from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
 from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
+
+_POINTS, _SEED = 100, 11
+"""Points of the boundary of an ellipsoid where an interpolated input is compared on both sides, and their seed."""
+
+_BESIDE, _JUMP = 1e-9, 1e-4
+"""How far beside the boundary, relative, and by which share of its bound the input may differ there."""
 
 
 def feedback_claims(subject: Subject) -> Iterable[Claim]:
@@ -70,6 +80,41 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         factor = np.linalg.inv(np.linalg.cholesky(outer))
         room = float(smallest_eigenvalues(np.eye(len(outer)) - factor @ inner @ factor.T))
         yield above(f"ellipsoid {i + 1} inside the one before", room, 0.0)
+    interpolated = bool(inputs.get("interpolated"))
+    yield required(
+        Claim("nominal.interpolated", str(design.interpolated), str(interpolated), design.interpolated == interpolated)
+    )
+    if design.interpolated:
+        yield from _interpolation_claims(design, problem, stored, ellipsoids)
+
+
+def _interpolation_claims(
+    design: ControlDesign, problem: NominalProblem, stored: list[dict[str, Any]], ellipsoids: list[np.ndarray]
+) -> Iterable[Claim]:
+    """Recompute what holds between two ellipsoids: the level decreases, inputs keep their bounds, and do not jump.
+
+    The bounds follow from (35) at both ends, which is linear in gain and P; the flown function is asked nevertheless.
+    """
+    for i, outside in enumerate(ellipsoids[:-1], start=1):
+        between = decrease_between(problem, design.nominal_gains[i][:, :N_RIGID], outside)
+        name = f"decrease in ellipsoid {i - 1} under gain {i}"
+        yield required(above(f"{name}, smallest eigenvalue", between.min(), 0.0))
+        yield same(f"{name} as certified", between, stored[i]["between_smallest_eigenvalues"], "eigenvalues")
+    law, draw = FamilyLaw(nominal_data(design)), np.random.default_rng(_SEED)
+    largest, jump = 0.0, 0.0
+    boundary = np.sqrt(1.0 + MEMBERSHIP_TOLERANCE)
+    for Q in ellipsoids[1:]:
+        directions = draw.normal(size=(_POINTS, N_RIGID))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+        for x in boundary * directions @ np.linalg.cholesky(Q).T:
+            inner, outer = (
+                law.step(np.append((1.0 + side) * x, np.zeros(N_STATES - N_RIGID))).input / problem.input_bound
+                for side in (-_BESIDE, _BESIDE)
+            )
+            largest = max(largest, float(np.abs(outer).max()))
+            jump = max(jump, float(np.abs(outer - inner).max()))
+    yield at_most("largest input between ellipsoids over its bound", largest, 1.0 + MEMBERSHIP_TOLERANCE)
+    yield at_most("jump of the input at the boundary of an ellipsoid over its bound", jump, _JUMP)
 
 
 def input_bound(subject: Subject) -> np.ndarray:
