@@ -24,6 +24,7 @@ needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C com
         "case1_no_notch",
         "case1_second_mode_notch",
         "case1_single_k",
+        "case1_smooth",
         "case1_uncertain",
         "case2",
     ],

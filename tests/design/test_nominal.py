@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import initial_deviation
 from hsv.design.nominal import nested_gains
-from hsv.design.nominal_problem import NominalProblem, certified_cost
+from hsv.design.nominal_problem import NominalProblem, certified_cost, decrease_between
 from hsv.errors import DesignError
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
@@ -121,3 +122,34 @@ def test_unreachable_bound_is_refused_by_name(problem, state):
     )
     with pytest.raises(DesignError, match="nominal gain 1 of 1"):
         nested_gains(tight, state, [1.0])
+
+
+def test_gains_between_two_of_an_interpolated_family_shrink_the_outer_ellipsoid_and_keep_the_input_bounds(problem):
+    family = read_design(find_design("smooth"))
+    rng = np.random.default_rng(6)
+    for i, outside in enumerate(np.linalg.inv(family.nominal_ellipsoids[:-1])):
+        inner, outer = family.nominal_gains[[i + 1, i], :, :5]
+        factor = np.linalg.cholesky(outside)
+        for share in rng.uniform(size=4):
+            K = share * outer + (1.0 - share) * inner
+            P = share * family.nominal_ellipsoids[i] + (1.0 - share) * family.nominal_ellipsoids[i + 1]
+            for A, B in zip(problem.A, problem.B, strict=True):
+                assert np.linalg.norm(np.linalg.solve(factor, (A + B @ K) @ factor), 2) < 1.0
+            assert np.all(np.sqrt(np.einsum("ij,jk,ik->i", K, np.linalg.inv(P), K)) <= problem.input_bound)
+
+
+def test_the_gains_of_a_switched_family_do_not_shrink_the_ellipsoid_before_them(design, problem):
+    Q = np.linalg.inv(design.nominal_ellipsoids)
+    between = [decrease_between(problem, K[:, :5], q).min() for K, q in zip(design.nominal_gains[1:], Q, strict=False)]
+    assert np.all(np.array(between[:4]) < 0.0)
+
+
+def test_an_interpolated_family_is_certified_between_its_ellipsoids(problem, state):
+    outer, inner = nested_gains(problem, state, [1.0, 0.6], interpolated=True)
+    assert outer.between is None and "between_smallest_eigenvalues" not in outer.report()
+    assert inner.report()["between_smallest_eigenvalues"] == inner.between.tolist()
+    assert_allclose(inner.between, decrease_between(problem, inner.K, outer.Q), rtol=1e-9)
+    assert inner.between.min() > 0.0 and inner.decrease.min() >= 0.0 and inner.nesting >= 0.0
+    switched = nested_gains(problem, state, [1.0, 0.6])[1]
+    # One more inequality cannot make the certified cost less: here it takes a third more.
+    assert switched.gamma < inner.gamma < 1.5 * switched.gamma

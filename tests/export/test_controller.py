@@ -35,7 +35,7 @@ from hsv.simulation.fingerprint import as_published, fingerprint
 from hsv.simulation.scenario import load_scenario
 from hsv.vehicle.vehicle import load_vehicle
 
-DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable")}
+DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable", "smooth")}
 BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law")
 REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02, load_vehicle().decoupled)
 
@@ -49,7 +49,7 @@ def built(request, tmp_path_factory):
 
 
 @needs_compiler
-@pytest.mark.parametrize("scenario", ["case1", "case2", "case1_integral_heavy"])
+@pytest.mark.parametrize("scenario", ["case1", "case2", "case1_integral_heavy", "case1_smooth"])
 def test_flown_in_place_of_the_blocks_it_has_the_published_fingerprint(scenario, tmp_path):
     flown = step_by_step(with_exported_blocks(components(scenario), tmp_path))
     digested = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "command", "actuator")

@@ -24,7 +24,9 @@ def with_entry(values, name, index, factor):
     return ControlDesign.from_parameters(values | {name: changed})
 
 
-@pytest.mark.parametrize("name", ["baseline", "baseline_single_k", "baseline_derived", "adjustable", "realistic"])
+@pytest.mark.parametrize(
+    "name", ["baseline", "baseline_single_k", "baseline_derived", "adjustable", "realistic", "smooth"]
+)
 def test_shipped_designs_fly_without_a_word(name):
     assert preflight(read_design(find_design(name))) == ""
 

@@ -11,7 +11,7 @@ from hsv.simulation.scenario import load_scenario
 from hsv.units import to_paper
 
 ROBUST_AND_TUBE = ("case1_rmpc", "case1_tube_dm", "case1_rmpc_last_k", "case1_tube_dm_family")
-NOMINAL_LAWS = ("case1_single_k", "case1", "case1_kothare_online", "case1_qp")
+NOMINAL_LAWS = ("case1_single_k", "case1", "case1_smooth", "case1_kothare_online", "case1_qp")
 INTEGRAL = ("case1_integral_heavy", "case1_integral_light")
 
 _PAGE = """# Controllers and nominal laws side by side
