@@ -111,3 +111,63 @@ def test_a_ramp_that_no_input_flies_is_refused_with_its_time(seconds):
     with pytest.raises(TrimError, match=r"reference at 20 s: .*climb rate = "):
         ReferenceTrajectory(times, *RAMP[1:])
     ReferenceTrajectory(times, *RAMP[1:], "static")
+
+
+def test_blended_corners_are_the_ramp_averaged_by_a_triangle():
+    blend = 2.0
+    points = (20.0, 40.0, 60.0), (LOW[0], HIGH[0], HIGH[0]), (LOW[1], LOW[1], HIGH[1])
+    state, *_ = along(ReferenceTrajectory(*points, PERIOD, VEHICLE, blend=blend), 3200)
+    offsets = np.linspace(-blend, blend, 2001)
+    weights = blend - np.abs(offsets)
+    for k in range(850, 3150, 37):
+        for column in (0, 1):
+            around = np.interp(k * PERIOD + offsets, points[0], points[1 + column])
+            assert_allclose(state[k, column], np.average(around, weights=weights), rtol=1e-9)
+
+
+def test_a_blended_ramp_is_limited_in_jerk_and_comes_to_rest_exactly():
+    blend, length = 2.0, 25.0
+    times = (20.0, 20.0 + length)
+    state, _, defect = along(ReferenceTrajectory(times, *RAMP[1:], blend=blend), 2600)
+    for column in (0, 1):
+        slope = (HIGH[column] - LOW[column]) / length
+        rate = np.diff(state[:, column]) / PERIOD
+        bend = np.diff(rate) / PERIOD
+        assert_allclose(rate.max(), slope, rtol=1e-9)
+        assert_allclose(bend.max(), slope / blend, rtol=0.02)
+        assert np.abs(np.diff(bend) / PERIOD).max() < 1.01 * slope / blend**2 + 1e-3
+    begun, ended = round((times[0] - blend) / PERIOD), round((times[1] + blend) / PERIOD)
+    assert_array_equal(state[: begun + 1], np.tile(trim(VEHICLE, *LOW).state, (begun + 1, 1)))
+    assert_array_equal(state[ended:], np.tile(trim(VEHICLE, *HIGH).state, (2600 - ended, 1)))
+    assert np.all(defect[ended:] == 0.0) and np.all(defect[:begun] == 0.0)
+    # A corner at once is a jump of the attitude; blended, it is spread over many periods.
+    _, _, jumps = along(ReferenceTrajectory(times, *RAMP[1:]), 2600)
+    assert np.abs(defect[:, 3]).max() < 0.15 * np.abs(jumps[:, 3]).max()
+
+
+def test_a_blended_corner_is_a_steady_pull_up():
+    state, inputs, _ = along(ReferenceTrajectory((20.0, 45.0), *RAMP[1:], blend=4.0), 2600)
+    rates = np.empty(9)
+    path = np.arcsin(np.gradient(state[:, 0], PERIOD) / state[:, 1])
+    turn = np.gradient(path, PERIOD)
+    assert turn.max() > 7e-4
+    for k in range(850, 1150, 23):
+        derivative(state[k], inputs[k], VEHICLE, rates)
+        # The velocity grows, too, which turns the path a little less: a hundredth of it is left out.
+        assert_allclose(state[k, 4], turn[k], atol=0.01 * turn.max())
+        assert rates[3] == state[k, 4]
+        assert_allclose(rates[[2, 4]], 0.0, atol=1e-12)
+    static = along(ReferenceTrajectory((20.0, 45.0), *RAMP[1:], "static", 4.0), 2600)[0]
+    assert np.all(static[:, 4] == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ((1.0, 30.0), r"reference\.blend = 2: expected at most the time of the first command, 1 s"),
+        ((5.0, 5.0), r"reference\.blend = 2: expected 0 with a step, as at 5 s, or a ramp in its place"),
+    ],
+)
+def test_what_cannot_be_blended_is_refused(times, message):
+    with pytest.raises(ParameterError, match=message):
+        ReferenceTrajectory(times, *RAMP[1:], blend=2.0)

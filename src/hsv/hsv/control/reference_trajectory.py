@@ -9,6 +9,12 @@ the defect: the jump of a step or of a ramp's corner, and on a ramp the little b
 flight. The nominal system is driven by it, x_n(k+1) = A(p) x_n + B(p) u_n + d_r(k). To drive it by x_r(k) - x_r(k+1)
 would take the climb itself, some 6 cm a period, for a disturbance: that is right for a static trim alone, which stays
 where it is, phi_T(x_r) = x_r. Where the reference is constant the defect is exactly zero.
+
+Corners may be blended: the piecewise-linear commands averaged over time by a triangle of half-width w. Within w of a
+corner, where the rate changes by s, that adds s (w - |t|)^3 / (6 w^2), t the time from it. The rate is then
+continuous, and so is its own rate, at most s / w; the next is at most s / w^2: the reference is limited in jerk. There
+the flight path turns, and x_r is the trim of a steady pull-up: q_r = h'' / (V cos gamma), the rate of the flight-path
+angle. In trims that do not turn, q_r = 0, all of the turn would be left to d_r.
 """
 
 from __future__ import annotations
@@ -36,6 +42,7 @@ REFERENCE_PARAMETERS = (
     Parameter("reference.times", [0.0], "times of the commands, two equal ones: a step", "s", 0.0, 1e5),
     Parameter("reference.altitudes", [26243.28], "commanded altitudes there, linear between", "m"),
     Parameter("reference.velocities", [2484.12], "commanded velocities there, linear between", "m/s"),
+    Parameter("reference.blend", 0.0, "half the time in which the rate changes at a corner; 0: at once", "s", 0.0, 1e3),
     Parameter("reference.trim", "climbing", "equilibrium of a ramp: climbing, or static as if it stood", choices=TRIMS),
 )
 
@@ -60,6 +67,7 @@ def _trimmed(
     rigid: Any,
     command: np.ndarray,
     rate: np.ndarray,
+    bend: np.ndarray,
     period: float,
     guess: np.ndarray,
     state: np.ndarray,
@@ -68,7 +76,10 @@ def _trimmed(
     size: np.ndarray,
     work: np.ndarray,
 ) -> None:
-    """Fill x_r, u_r, d_r and the imbalance (r) of the equilibria from altitude and velocity (r, 2) and their rates."""
+    """Fill x_r, u_r, d_r and the imbalance (r) of the equilibria.
+
+    They are those of altitude and velocity (r, 2), their rates, and ``bend`` (r), the rate of the climb rate.
+    """
     rows = len(command)
     for k in range(rows):
         if k > 0 and np.all(command[k] == command[k - 1]) and np.all(rate[k] == rate[k - 1]):
@@ -81,7 +92,8 @@ def _trimmed(
             continue
         # The trim next to this one is near, but only a fixed start gives the same bits whatever came before.
         unknown = guess.copy()
-        size[k] = balance(rigid, arcsine(sine), rate[k, 1], unknown, state[k], inputs[k])
+        turn = bend[k] / (command[k, 1] * np.sqrt(1.0 - sine * sine))
+        size[k] = balance(rigid, arcsine(sine), rate[k, 1], unknown, state[k], inputs[k], turn)
     for k in range(rows):
         defect[k] = 0.0
         if k + 1 < rows and not (
@@ -104,6 +116,7 @@ class ReferenceTrajectory:
         period: float,
         rigid: VehicleParameters,
         trim: str = "climbing",
+        blend: float = 0.0,
     ) -> None:
         """Trim the nominal decoupled vehicle at all points of the commands.
 
@@ -114,24 +127,31 @@ class ReferenceTrajectory:
             period: Control period, s.
             rigid: Parameters of the nominal decoupled vehicle.
             trim: One of :data:`TRIMS`; ``"static"`` takes climb rate and acceleration of a ramp for zero.
+            blend: Half the time in which the rate changes at a corner, s.
 
         Raises:
-            ParameterError: Arrays of different lengths, or times that decrease.
+            ParameterError: Arrays of different lengths, times that decrease, or commands that cannot be blended.
             TrimError: No equilibrium, or one outside the input limits; the time is named.
         """
         commands = _commands(times, altitudes, velocities)
         instants = _in_steps(np.asarray(times, float), period)
-        first = max(0, math.ceil(instants[0]) - 2)
-        steps = np.arange(first, max(first, math.ceil(instants[-1])) + 1)
+        _check_blend(times, blend)
+        half = blend / period if len(times) > 1 else 0.0
+        first = max(0, math.ceil(instants[0] - half) - 2)
+        steps = np.arange(first, max(first, math.ceil(instants[-1] + half)) + 1)
         command, slope = _evaluate(instants, commands, steps)
-        rate = slope / period if trim == "climbing" else np.zeros_like(slope)
+        bend = np.zeros(len(steps))
+        if half > 0.0:
+            _blend(instants, commands, steps, half, command, slope, bend)
+        # What a static trim does not know of.
+        rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
         rows = len(steps)
         self.data = ReferenceData(
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
         size = np.full(rows, np.inf)
         _, state, inputs, defect = self.data
-        _trimmed(rigid, command, rate, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
+        _trimmed(rigid, command, rate, bend, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
         good = (size < CONVERGED) & np.all((inputs >= rigid.input_minimum) & (inputs <= rigid.input_maximum), axis=1)
         for row in np.flatnonzero(~good)[:1]:
             climb, acceleration = rate[row]
@@ -149,7 +169,7 @@ class ReferenceTrajectory:
         vehicle = Vehicle.from_parameters(values)
         vehicle.check_envelope(REFERENCE_PARAMETERS, v)
         times, altitudes, velocities = (v[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
-        return cls(times, altitudes, velocities, period, vehicle.decoupled, v["reference.trim"])
+        return cls(times, altitudes, velocities, period, vehicle.decoupled, v["reference.trim"], v["reference.blend"])
 
     def row(self, step: int) -> int:
         """Return the row of :attr:`data` that holds ``step``."""
@@ -177,6 +197,45 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
         if after < before:
             raise ParameterError(f"parameter reference.times[{index}] = {after:g}: expected at least {before:g}")
     return np.column_stack((np.asarray(altitudes, float), np.asarray(velocities, float)))
+
+
+def _check_blend(times: Sequence[float], blend: float) -> None:
+    """Refuse a blend of a step, or one that would begin before the flight."""
+    if blend == 0.0 or len(times) < 2:
+        return
+    where = f"parameter reference.blend = {blend:g}"
+    if times[0] < blend:
+        raise ParameterError(f"{where}: expected at most the time of the first command, {times[0]:g} s")
+    for before, after in itertools.pairwise(times):
+        if before == after:
+            raise ParameterError(f"{where}: expected 0 with a step, as at {before:g} s, or a ramp in its place")
+
+
+def _blend(
+    instants: np.ndarray,
+    commands: np.ndarray,
+    steps: np.ndarray,
+    half: float,
+    command: np.ndarray,
+    slope: np.ndarray,
+    bend: np.ndarray,
+) -> None:
+    """Average ``command`` (r, 2) and ``slope`` (r, 2) about every corner; ``half`` the width of the triangle, steps.
+
+    To ``bend`` (r), add the change of the first slope per step.
+    """
+    before = np.zeros(commands.shape[1])
+    for index in range(len(instants)):
+        after = np.zeros_like(before)
+        if index + 1 < len(instants):
+            after = (commands[index + 1] - commands[index]) / (instants[index + 1] - instants[index])
+        change = after - before
+        before = after
+        gone = steps - instants[index]
+        left = np.maximum(half - np.abs(gone), 0.0)[:, None]
+        command += change * (left * left * left / (6.0 * half * half))
+        slope += np.where(gone[:, None] < 0.0, change, -change) * (left * left / (2.0 * half * half))
+        bend += change[0] * (left[:, 0] / (half * half))
 
 
 def _in_steps(times: np.ndarray, period: float) -> np.ndarray:

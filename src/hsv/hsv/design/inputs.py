@@ -193,10 +193,14 @@ class NotchInputs(_Table):
 
 
 class RampInputs(_Table):
-    """When the commands leave the start, and when they reach the target."""
+    """When the commands leave the start, and when they reach the target.
+
+    ``blend``: half the time in which the rate changes at either corner; none: at once.
+    """
 
     start: Duration = Field(ge=0.0)
     end: Duration = Positive
+    blend: Duration | None = Field(default=None, gt=0.0)
 
     @field_validator("end")
     @classmethod

@@ -85,9 +85,10 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
     ``share``: of the lost elevator effectiveness.
     """
     region, start, target = inputs.disturbance, inputs.nominal.start, inputs.nominal.target
-    times, points = [0.0], [target]
+    times, points, blend = [0.0], [target], {}
     if region.ramp:
         times, points = [region.ramp.start, region.ramp.end], [start, target]
+        blend = {"reference.blend": region.ramp.blend} if region.ramp.blend else {}
     return {
         "duration": region.duration,
         **inputs.flown_vehicle.to_parameters(),
@@ -97,6 +98,7 @@ def region_parameters(inputs: DesignInputs, share: float = 1.0) -> dict[str, Any
         "reference.times": times,
         "reference.altitudes": [point.altitude for point in points],
         "reference.velocities": [point.velocity for point in points],
+        **blend,
         "fault.channels": ["elevator_deflection"],
         "fault.types": ["loss_of_effectiveness"],
         "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - region.elevator_effectiveness)!r}"],

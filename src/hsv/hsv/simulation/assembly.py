@@ -23,6 +23,7 @@ _FIELDS = {
     r"^parameter tau_change\.values\b(\[\d+\])?": r"tube.change\1.tau",
     r"(parameter )?\bnotch\.flown\.": "notch.",
     r"^parameter (integral|robust_mpc)\.": r"\1.",
+    r"^parameter reference\.blend\b": "reference.blend",
 }
 """Parameters as a scenario calls them."""
 

@@ -106,6 +106,8 @@ class Scenario(Table):
             "robust_mpc.gain_index": self.robust_mpc.gain_index,
         }
         values |= {f"reference.{name}": list(column) for name, column in self.commands._asdict().items()}
+        if self.reference.blend:
+            values["reference.blend"] = self.reference.blend
         flown = self.notch.model_dump(exclude={"enabled"})
         values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
         values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}

@@ -45,9 +45,10 @@ class InitialTable(Table):
 
 
 class ReferenceTable(Table):
-    """The equilibrium of a ramp: that of the climb, or static, as if its point stood still."""
+    """The equilibrium of a ramp, that of the climb or as if its point stood; half the time of a blended corner."""
 
     trim: Literal["climbing", "static"] = "climbing"
+    blend: Time = 0.0
 
 
 class NotchTable(Table):

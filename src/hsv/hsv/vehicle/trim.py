@@ -35,7 +35,13 @@ class Trim:
 
 @njit(cache=True)
 def balance(
-    rigid: Any, path_angle: float, acceleration: float, unknown: np.ndarray, x: np.ndarray, u: np.ndarray
+    rigid: Any,
+    path_angle: float,
+    acceleration: float,
+    unknown: np.ndarray,
+    x: np.ndarray,
+    u: np.ndarray,
+    pitch_rate: float = 0.0,
 ) -> float:
     """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the largest remaining imbalance.
 
@@ -51,12 +57,14 @@ def balance(
         unknown: First guess.
         x: Altitude and velocity given; the others are written.
         u: Written.
+        pitch_rate: That of a steady pull-up, the rate of the flight-path angle; the angle of attack does not change.
     """
     rates = np.empty(N_STATES)
     slope, right = np.empty((3, 3)), np.empty((3, 1))
     trial = unknown.copy()
     best_size = np.inf
     x[4:] = 0.0
+    x[4] = pitch_rate
     for _ in range(60):
         x[2], x[3] = trial[0], trial[0] + path_angle
         u[0], u[1] = trial[1], trial[2]
