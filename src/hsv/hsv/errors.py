@@ -33,6 +33,10 @@ class DesignError(HsvError, ValueError):
     """A design file, or a parameter of a controller, that is missing, malformed or does not stabilise."""
 
 
+class GovernorError(HsvError, ValueError):
+    """A command for which no reference fits into the inputs of the nominal plan."""
+
+
 class RecordingError(HsvError, ValueError):
     """A bag that is missing, foreign or damaged."""
 

@@ -25,6 +25,7 @@ from hsv.cli.export_controller import export_controller
 from hsv.cli.fault import fault
 from hsv.cli.faults import faults
 from hsv.cli.figures import figures
+from hsv.cli.govern import govern
 from hsv.cli.include import include
 from hsv.cli.info import info
 from hsv.cli.linearise import linearise
@@ -96,6 +97,7 @@ for command in (
     certify,
     check,
     scenarios,
+    govern,
     vehicles,
     equipment,
     faults,

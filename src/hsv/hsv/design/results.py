@@ -9,7 +9,16 @@ from hsv.control.design_file import find_design
 from hsv.design.certificate import certificate_path, read_certificate
 from hsv.units import to_paper
 
-DESIGNS = ("baseline", "baseline_single_k", "baseline_derived", "adjustable", "stiffened", "realistic", "smooth")
+DESIGNS = (
+    "baseline",
+    "baseline_single_k",
+    "baseline_derived",
+    "adjustable",
+    "stiffened",
+    "realistic",
+    "smooth",
+    "governed",
+)
 
 _HEADER = """# Results of the shipped designs
 Made by `python -m hsv.design.results > offline_design/results.md` from the certificates that `hsv design NAME` writes
