@@ -3,6 +3,7 @@ import time
 import pytest
 
 from hsv.bench.figure import Figure, interleaved
+from hsv.bench.page import cells
 
 
 def figure(*ours, theirs=(1.0, 1.0, 1.0), **promise):
@@ -29,6 +30,12 @@ def test_ratios_are_taken_pair_by_pair():
 def test_what_is_worse_than_promised_is_said_plainly(value, bound, verdict):
     limit, goal = (1.5, 1.3)
     assert figure(value, theirs=(1.0,), bound=bound, limit=limit, goal=goal).verdict == verdict
+
+
+def test_a_figure_of_one_side_has_its_unit():
+    alone = Figure("f", "ours", "", "s", (2e-6, 4e-6, 3e-6), bound="most", limit=5e-6)
+    assert alone.verdict == "within 5e-06 s"
+    assert cells(alone)[2:6] == ("3 us", "", "", "2.2 to 3.8")
 
 
 def test_the_two_sides_are_measured_in_turn():

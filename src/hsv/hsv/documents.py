@@ -12,6 +12,8 @@ import os
 import re
 import stat
 import tomllib
+from collections.abc import Callable
+from functools import partial
 from io import BufferedReader
 from pathlib import Path
 from typing import Any
@@ -111,14 +113,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
         raise DocumentError(f"a key nested more than {MOST_LEVELS} levels deep (at line {line})")
-    try:
-        values = tomllib.loads(text)
-    except RecursionError as error:
-        raise _too_deep() from error
-    except ValueError as error:
-        raise DocumentError(str(error)) from error
-    _check(values)
-    return values
+    return _parsed(text, tomllib.loads)
 
 
 def parse_json(text: str | bytes) -> Any:
@@ -128,14 +123,7 @@ def parse_json(text: str | bytes) -> Any:
         DocumentError: It is none, too long or nested too deep, or a key stands twice in an object.
     """
     _check_length(text)
-    try:
-        values = json.loads(text, object_pairs_hook=_without_doubles)
-    except RecursionError as error:
-        raise _too_deep() from error
-    except ValueError as error:
-        raise DocumentError(str(error)) from error
-    _check(values)
-    return values
+    return _parsed(text, partial(json.loads, object_pairs_hook=_without_doubles))
 
 
 def parse_yaml(text: str) -> Any:
@@ -194,6 +182,17 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
                     raise _refused(f"the key {key.value!r} stands there twice", key)
                 seen.add((key.tag, key.value))
         return node
+
+
+def _parsed(text: Any, parse: Callable[[Any], Any]) -> Any:
+    try:
+        values = parse(text)
+    except RecursionError as error:
+        raise _too_deep() from error
+    except ValueError as error:
+        raise DocumentError(str(error)) from error
+    _check(values)
+    return values
 
 
 def _refused(why: str, where: Any) -> yaml.MarkedYAMLError:

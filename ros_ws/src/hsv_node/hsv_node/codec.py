@@ -145,7 +145,7 @@ def _kind(field_type: str) -> _Kind:
     elif "/" in of:
         kind = _message("/msg/".join(of.split("/")))
     else:
-        raise NotImplementedError(f"field type {field_type}: expected numbers, text or messages")
+        raise TypeError(f"field type {field_type}: expected numbers, text or messages")
     if field_type.startswith("sequence<"):
         return _Many(kind, None)
     return _Many(kind, int(found["count"])) if found and found["count"] else kind

@@ -53,10 +53,13 @@ class Figure:
             return ""
         sign = -1.0 if self.is_rate else 1.0
         if sign * self.median > sign * self.limit:
-            return f"WORSE than the limit, at {self.bound} {self.limit:g}"
+            return f"WORSE than the limit, at {self.bound} {self._written(self.limit)}"
         if self.goal is not None and sign * self.median > sign * self.goal:
-            return f"within the limit {self.limit:g}, short of the goal {self.goal:g}"
-        return f"within {self.goal if self.goal is not None else self.limit:g}"
+            return f"within the limit {self._written(self.limit)}, short of the goal {self._written(self.goal)}"
+        return f"within {self._written(self.limit if self.goal is None else self.goal)}"
+
+    def _written(self, value: float) -> str:
+        return f"{value:g}" if self.theirs else f"{value:g} {self.unit}"
 
 
 def interleaved(

@@ -27,17 +27,27 @@ FOLLOWED = {
 
 def cells(figure: Figure) -> tuple[str, ...]:
     """Return what, against, ours, theirs (medians), ratio, its spread, and how it stands to what is promised."""
-    low, high = figure.spread
-    spread = f"{low:.3g} to {high:.3g}" if len(figure.ours) > 1 else ""
     ours = _quantity(figure.ours, figure.unit)
-    remark = "; ".join(filter(None, (figure.verdict, figure.note)))
     theirs = _quantity(figure.theirs, figure.unit) if figure.theirs else ""
+    # A ratio is a pure number; what has no other side has the unit of what was measured.
+    scale = 1.0 if figure.theirs else _readable(figure.median, figure.unit)[0]
+    low, high = (scale * end for end in figure.spread)
+    spread = f"{low:.3g} to {high:.3g}" if len(figure.ours) > 1 else ""
+    remark = "; ".join(filter(None, (figure.verdict, figure.note)))
     return figure.what, figure.against, ours, theirs, f"{figure.median:.3g}" if figure.theirs else "", spread, remark
 
 
 def _quantity(values: Sequence[float], unit: str) -> str:
     value = sorted(values)[len(values) // 2]
-    return f"{1e3 * value:.3g} ms" if unit == "s" and value < 1.0 else f"{value:.3g} {unit}"
+    scale, name = _readable(value, unit)
+    return f"{scale * value:.3g} {name}"
+
+
+def _readable(value: float, unit: str) -> tuple[float, str]:
+    """Return the factor to the unit in which people read ``value``, and that unit."""
+    if unit != "s" or value >= 1.0:
+        return 1.0, unit
+    return (1e3, "ms") if value >= 1e-3 else (1e6, "us")
 
 
 def table(figures: Sequence[Figure]) -> str:
