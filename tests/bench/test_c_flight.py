@@ -5,7 +5,8 @@ from flights import components
 
 from hsv.bench.c_flight import FLAGS, CFlight, largest_difference
 from hsv.errors import RunError
-from hsv.simulation.closed_loop import History, fly
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.history import History
 
 TOLERANCE = 1e-9
 """Relative. The C library's sines and exponentials, which the processor chooses, differ from ours by an ulp, 1e-16; the
@@ -60,8 +61,8 @@ def test_another_flight_is_seen():
 
 def test_what_is_no_number_or_another_zero_is_a_difference():
     zeros, others = History.empty(2), History.empty(2)
-    for column in (*zeros, *others):
-        column[:] = 0.0
+    for matrix in (*zeros, *others):
+        matrix[:] = 0.0
     assert largest_difference(zeros, others) == 0.0
     others.state[1, 3] = -0.0
     assert 0.0 < largest_difference(zeros, others) < 1e-300

@@ -14,7 +14,7 @@ def test_ratios_are_taken_pair_by_pair():
     measured = figure(2.0, 6.0, 4.0, theirs=(1.0, 2.0, 4.0))
     assert measured.ratios.tolist() == [2.0, 3.0, 1.0]
     assert measured.median == 2.0
-    assert measured.spread == pytest.approx((1.2, 2.8))
+    assert measured.percentiles == pytest.approx((1.2, 2.8))
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,13 @@ import logging
 import os
 import signal
 import socket
+import subprocess
+import sys
+from contextlib import contextmanager
 
 import pytest
 from distributed import LocalCluster
+from waiting import wait_until
 
 from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
@@ -85,6 +89,39 @@ def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, o
         run_campaign(campaign, store, workers, progress=lose)
     with store.opened() as finished:
         assert finished
+
+
+@contextmanager
+def dask_worker(address, folder, environment, *flags):
+    """A worker started by hand, as on another machine."""
+    module = "-m", "distributed.cli.dask_worker"
+    command = [sys.executable, *flags, *module, "--nthreads", "1", "--no-dashboard", address]
+    popen = subprocess.Popen(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        popen.terminate()
+        popen.wait()
+
+
+def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_address(cluster, tmp_path):
+    other = tmp_path / "other" / "hsv"
+    (other / "campaign").mkdir(parents=True)
+    (other / "__init__.py").write_text("")
+    (other / "campaign" / "__init__.py").write_text("")
+    (other / "campaign" / "program.py").write_text("def program():\n    return 'hsv 0.0.1, sources 0'\n")
+    path = os.pathsep.join((str(other.parent), os.environ.get("PYTHONPATH", "")))
+    address = cluster.scheduler_address
+    # Isolated, Python does not look where the workspace is.
+    for flags, has in (["-I"], "no hsv"), ([], "hsv 0.0.1, sources 0"):
+        expected = rf"^scheduler = '{address}': worker tcp://127\.0\.0\.1:\d+ has {has}, expected hsv .*, as here$"
+        with (
+            dask_worker(address, tmp_path, os.environ | {"PYTHONPATH": path}, *flags),
+            pytest.raises(CampaignError, match=expected),
+            make_executor(0, address),
+        ):
+            pass
+        wait_until(lambda: not cluster.scheduler.workers)
 
 
 @pytest.mark.parametrize("workers", [-1, 100_000])

@@ -68,8 +68,8 @@ def test_envelopes_hold_every_flight(results, planned):
     curves = [
         signals(runner.fly(flight, sample).data()) for flight, sample in enumerate(runner.sampler.draw(range(44))[0])
     ]
-    assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=0) for c in curves], axis=0))
-    assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=0) for c in curves], axis=0))
+    assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=1) for c in curves], axis=0))
+    assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=1) for c in curves], axis=0))
     assert np.all(envelope.count[:151] == len(curves))
 
 

@@ -21,7 +21,7 @@ def test_steps_equal_the_compiled_loop_bit_for_bit(name):
     flown = parts(name)
     compiled, stepwise = fly(flown), step_by_step(flown)
     assert stepwise["plant_status"][-1] == compiled.status
-    for column, values in compiled.history._asdict().items():
+    for column, values in compiled.history.columns().items():
         assert np.array_equal(values, stepwise[column]), column
     assert compiled.fingerprint != fly(assemble_flight(load_scenario("case1", SHORT))).fingerprint
 

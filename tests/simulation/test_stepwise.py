@@ -24,7 +24,7 @@ def test_steps_equal_the_compiled_loop_bit_for_bit(scenario):
     parts = components(scenario, duration=104.0)
     compiled, stepwise = fly(parts), step_by_step(parts)
     assert stepwise["plant_status"][-1] == compiled.status
-    for name, column in compiled.history._asdict().items():
+    for name, column in compiled.history.columns().items():
         assert np.array_equal(column, stepwise[name]), name
 
 

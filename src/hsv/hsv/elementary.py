@@ -7,7 +7,7 @@ error is at most one unit in the last place (ulp) in the ranges stated; outside 
 
 :func:`sine_cosine` and :func:`exponential` also take a complex argument whose imaginary part is so small (1e-20 at
 most) that its square vanishes: the result is then the value and, as its imaginary part, the derivative times that of
-the argument, which is what the complex step needs.
+the argument, which is what the complex step needs. Both take lanes, too (:mod:`hsv.lanes`).
 """
 
 from __future__ import annotations
@@ -17,6 +17,8 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+
+from hsv.lanes import choose, every, lane, lanes_in, power_of_two, with_lane
 
 ANGLE_RANGE = 1e5
 """Largest magnitude (rad) of an argument of sine, cosine and tangent."""
@@ -32,7 +34,7 @@ _HALF_PI_1 = 1.5707963267341256
 _HALF_PI_2 = 6.077100506303966e-11
 """The next 33 bits of pi / 2."""
 _HALF_PI_3 = 2.0222662487959506e-21
-"""What is left of pi / 2."""
+"""Remainder of pi / 2."""
 _HALF_PI_HIGH, _HALF_PI_LOW = 1.5707963267948966, 6.123233995736766e-17
 """pi / 2 as the sum of two numbers."""
 _QUARTER_PI_HIGH, _QUARTER_PI_LOW = 0.7853981633974483, 3.061616997868383e-17
@@ -158,13 +160,25 @@ def _small_sine_cosine(x: float) -> tuple[float, float]:
 
 
 @njit(cache=True)
+def _lane_by_lane(x: Any) -> Any:
+    sin, cos = x, x
+    for i in range(lanes_in(x)):
+        own = lane(x, i)
+        s, c = _small_sine_cosine(own) if abs(own) <= _QUARTER_PI_HIGH else _any_sine_cosine(own)
+        sin, cos = with_lane(sin, i, s), with_lane(cos, i, c)
+    return sin, cos
+
+
+@njit(cache=True)
 def sine_cosine(x: Any) -> Any:
     """Return the sine and the cosine of ``x`` (rad), real with |x| up to 1e5, or complex as the module says."""
     a = x.real
-    if abs(a) <= _QUARTER_PI_HIGH:
+    if every(abs(a) <= _QUARTER_PI_HIGH):
         sin, cos = _small_sine_cosine(a)
+    elif lanes_in(a) == 1:
+        sin, cos = _any_sine_cosine(lane(a, 0))
     else:
-        sin, cos = _any_sine_cosine(a)
+        sin, cos = _lane_by_lane(a)
     step = x - a  # zero where x is real
     return sin + cos * step, cos - sin * step
 
@@ -249,28 +263,25 @@ def arctangent2(y: float, x: float) -> float:
 
 
 @njit(cache=True)
-def _power_of_two(exponent: int) -> float:
-    """Return 2^``exponent`` for -1022 to 1023, by the bits of a normal number."""
-    return np.int64((exponent + 1023) << 52).view(np.float64)
+def _exponential(x: Any) -> Any:
+    whole = (x * _LOG_2_INVERSE + _TO_WHOLE) - _TO_WHOLE
+    high, low = x - whole * _LOG_2_HIGH, whole * _LOG_2_LOW
+    r = high - low
+    rest = (high - r) - low
+    z = r * r
+    w = z * z
+    v = w * w
+    series = ((_E2 + r * _E3) + z * (_E4 + r * _E5)) + w * ((_E6 + r * _E7) + z * (_E8 + r * _E9))
+    series += v * ((_E10 + r * _E11) + z * (_E12 + r * _E13))
+    return (1.0 + (r + (z * series + rest))) * power_of_two(whole)
 
 
 @njit(cache=True)
 def exponential(x: Any) -> Any:
     """Return e to the power ``x``, real with |x| up to 700, or complex as the module says."""
     a = x.real
-    if not abs(a) <= EXPONENT_RANGE:
-        value = np.nan
-    else:
-        whole = (a * _LOG_2_INVERSE + _TO_WHOLE) - _TO_WHOLE
-        high, low = a - whole * _LOG_2_HIGH, whole * _LOG_2_LOW
-        r = high - low
-        rest = (high - r) - low
-        z = r * r
-        w = z * z
-        v = w * w
-        series = ((_E2 + r * _E3) + z * (_E4 + r * _E5)) + w * ((_E6 + r * _E7) + z * (_E8 + r * _E9))
-        series += v * ((_E10 + r * _E11) + z * (_E12 + r * _E13))
-        value = (1.0 + (r + (z * series + rest))) * _power_of_two(int(whole))
+    inside = abs(a) <= EXPONENT_RANGE
+    value = _exponential(a) if every(inside) else choose(inside, _exponential(choose(inside, a, 0.0)), np.nan)
     return value * (1.0 + (x - a))  # the last factor is one where x is real
 
 
@@ -282,7 +293,7 @@ def logarithm(x: float) -> float:
     exponent = int(np.float64(x).view(np.int64) >> 52) - 1023
     # In two factors: 2^1023 has no inverse among the normal numbers.
     half = exponent >> 1
-    mantissa = x * _power_of_two(-half) * _power_of_two(half - exponent)
+    mantissa = x * power_of_two(-half) * power_of_two(half - exponent)
     if mantissa > 2.0 * _SQUARE_ROOT_HALF:
         mantissa *= 0.5
         exponent += 1

@@ -1,1 +1,1 @@
-"""What the bench is measured against: the same work done by other means, timed in the same run."""
+"""Benchmarks: the bench is compared with the same work done by other means, timed in the same run."""

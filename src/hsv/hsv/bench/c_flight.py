@@ -21,7 +21,8 @@ from hsv.errors import RunError
 from hsv.export.controller import SOURCE, controller_source
 from hsv.faults.laws import CHANNEL, CODE, OCCURRENCE, PARAMETER, START, STOP, FaultRows
 from hsv.faults.table import COMMAND, LOSS
-from hsv.simulation.closed_loop import Components, History
+from hsv.simulation.closed_loop import Components
+from hsv.simulation.history import History
 
 FLAGS = ("-O3", "-ffp-contract=off")
 """No contraction: a fused multiply-add rounds once where the compiled loop rounds twice."""
@@ -51,7 +52,7 @@ class _Reference(Structure):
 
 
 class _History(Structure):
-    _fields_ = [("rows", c_int64), *((name, _Doubles) for name in History._fields)]
+    _fields_ = [("rows", c_int64), ("flown", _Doubles), ("beside", _Doubles)]
 
 
 def _losses(components: Components) -> FaultRows:
@@ -124,11 +125,11 @@ class CFlight:
 
     def fly(self) -> History:
         """Return what happened, to compare with the history of the compiled loop."""
-        history = History.empty(self._rows)
+        history = History.empty(self._rows, estimated=False)
         x = self._initial.copy()
-        outputs = _History(self._rows, *(column.ctypes.data_as(_Doubles) for column in history))
+        outputs = _History(self._rows, *(matrix.ctypes.data_as(_Doubles) for matrix in history[:2]))
         rows = self._library.fly(*self._arguments, x.ctypes.data_as(_Doubles), ctypes.byref(outputs))
-        return History(*(column[:rows] for column in history))
+        return history.cut(rows)
 
     def _doubles(self, values: np.ndarray) -> Any:
         return self._pointer(values, np.float64, _Doubles)
@@ -167,7 +168,7 @@ def largest_difference(a: History, b: History) -> float:
     Infinity where they differ in length, or one has a number where the other has none.
     """
     largest = 0.0
-    for x, y in zip(a, b, strict=True):
+    for x, y in zip(a.columns().values(), b.columns().values(), strict=True):
         if x.shape != y.shape:
             return float("inf")
         if x.tobytes() == y.tobytes():

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import tempfile
 import time
+from functools import cache
 from pathlib import Path
 
+from hsv.bench.c_flight import FLAGS, CFlight
 from hsv.bench.figure import Figure
 from hsv.campaign.campaign import plan
 from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
+from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
+from hsv.lanes import WIDTH
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.scenario import load_scenario
 
 
 def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:
@@ -35,16 +41,65 @@ def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure
     ]
 
 
-def corners(workers: int) -> list[Figure]:
-    """Return the wall time of the 1024 corners of Case 1, start of the workers included."""
+def corners(repeats: int, workers: int) -> list[Figure]:
+    """Return the wall time of the 1024 corners of Case 1, alone and against as many flights of the C build.
+
+    The campaign is timed with its metrics and its file, in the first figure also with the start of its workers. The C
+    build flies alone, on as many workers.
+    """
+    campaign = plan("case1", method="corners")
+    ours, theirs = [], []
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
+
+        def fly(name: str) -> None:
+            run_campaign(campaign, ResultStore(Path(folder, name), campaign), flying)
+
         started = time.perf_counter()
-        campaign = plan("case1", method="corners")
         with make_executor(workers) as flying:
-            run_campaign(campaign, ResultStore(Path(folder, "corners.parquet"), campaign), flying)
-        seconds = time.perf_counter() - started
-    what = f"1024 corners of Case 1, {workers} workers, their start included"
-    return [Figure("corners", what, "", "s", (seconds,), (), "most", 15.0)]
+            fly("first.parquet")
+            first = time.perf_counter() - started
+            list(flying.fly(_build_c, campaign.text, range(workers)))
+            for repeat in range(repeats):
+                started = time.perf_counter()
+                fly(f"{repeat}.parquet")
+                ours.append(time.perf_counter() - started)
+                started = time.perf_counter()
+                list(flying.fly(_fly_c, campaign.text, range(campaign.batches)))
+                theirs.append(time.perf_counter() - started)
+    what = f"1024 corners of Case 1, {workers} workers"
+    against = f"as many flights of the C build, {' '.join(FLAGS)}, alone on as many workers"
+    limit, goal = (0.4, None) if WIDTH == 8 else (0.6, 0.35)
+    return [
+        Figure("corners", f"{what}, their start included", "", "s", (first,), (), "most", 15.0),
+        Figure(
+            "corners_c",
+            f"{what}, metrics and file included",
+            against,
+            "s",
+            tuple(ours),
+            tuple(theirs),
+            "most",
+            limit,
+            goal,
+            f"{WIDTH} flights side by side",
+        ),
+    ]
+
+
+@cache
+def _c_flight() -> CFlight:
+    return CFlight(assemble_flight(load_scenario("case1")))
+
+
+def _build_c(text: str, number: int) -> bytes:
+    _c_flight().fly()
+    return b""
+
+
+def _fly_c(text: str, batch: int) -> bytes:
+    for _ in sample_runner(text).campaign.flights(batch):
+        _c_flight().fly()
+    return b""
 
 
 def _pace(folder: Path, workers: int, samples: int, repeat: int) -> float:

@@ -1,4 +1,4 @@
-"""What controllers of one's own cost, beside the law that the compiled loop has in itself."""
+"""Cost of custom controllers, compared with the law that is built into the compiled loop."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Holding:
 
 
 def a_step_in_python(repeats: int) -> list[Figure]:
-    """Return what a step of a class in Python costs: of one that does nothing, and of the example where it is there."""
+    """Return the cost of a step of Python classes: of one that does nothing, and of the example if it is installed."""
     flight = assemble_flight(load_scenario("case1", {"duration": f"{_DURATION} s", "fault": []}))
     held = flight.plant.initial.input
 
@@ -86,7 +86,7 @@ _LQR = {"controller": "lqr", "design": "", "notch.enabled": False}
 
 
 def compiled_laws(repeats: int) -> list[Figure]:
-    """Return Case 1 under the shipped law as a compiled function of one's own, against the loop that has it in itself.
+    """Return Case 1 with the shipped law as a foreign compiled function, against the loop with the built-in law.
 
     The function is that of the exported controller: the same work, and the same bits.
     """

@@ -11,7 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Figure:
-    """What was measured, against what, in ``unit``; where there is no other side, ``theirs`` is empty."""
+    """A measured figure and what it is compared with, in ``unit``; without a comparison, ``theirs`` is empty."""
 
     name: str
     what: str
@@ -36,7 +36,7 @@ class Figure:
         return float(np.median(self.ratios))
 
     @property
-    def spread(self) -> tuple[float, float]:
+    def percentiles(self) -> tuple[float, float]:
         """10th and 90th percentile of the ratios."""
         low, high = np.percentile(self.ratios, (10.0, 90.0))
         return float(low), float(high)
@@ -48,7 +48,7 @@ class Figure:
 
     @property
     def verdict(self) -> str:
-        """How the median stands to limit and goal, in words; empty where nothing is promised."""
+        """Comparison of the median with limit and goal, in words; empty if nothing is promised."""
         if self.limit is None:
             return ""
         sign = -1.0 if self.is_rate else 1.0

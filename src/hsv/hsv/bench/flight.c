@@ -48,7 +48,7 @@ typedef struct {
 
 typedef struct {
     int64_t rows;
-    double *state, *measurement, *filtered_pitch_rate, *deviation, *nominal_input, *gain_index, *u_unsaturated, *command, *actuator;
+    double *flown, *beside; /* 25 and 3 numbers a row */
 } History;
 
 static void derivative(const double *x, const double *u, const Vehicle *p, double *out)
@@ -204,15 +204,15 @@ int64_t fly(const Vehicle *vehicle, double period, int64_t substeps, double angl
         }
         apply_faults(faults, k, u, actuator);
 
-        memcpy(history->state + k * N, x, sizeof(double[N]));
-        memcpy(history->measurement + k * N, x, sizeof(double[N]));
-        history->filtered_pitch_rate[k] = filtered[0];
-        memcpy(history->deviation + k * N, nominal, sizeof(double[N]));
-        memcpy(history->nominal_input + k * M, nominal + N, sizeof(double[M]));
-        history->gain_index[k] = nominal[N + M];
-        memcpy(history->u_unsaturated + k * M, wanted, sizeof wanted);
-        memcpy(history->command + k * M, u, sizeof u);
-        memcpy(history->actuator + k * M, actuator, sizeof actuator);
+        double *flown = history->flown + k * (2 * N + 1 + 3 * M), *beside = history->beside + k * (1 + M);
+        memcpy(flown, x, sizeof(double[N]));
+        flown[N] = filtered[0];
+        memcpy(flown + N + 1, nominal, sizeof(double[N]));
+        memcpy(flown + 2 * N + 1, nominal + N, sizeof(double[M]));
+        memcpy(flown + 2 * N + 1 + M, u, sizeof u);
+        memcpy(flown + 2 * N + 1 + 2 * M, actuator, sizeof actuator);
+        beside[0] = nominal[N + M];
+        memcpy(beside + 1, wanted, sizeof wanted);
         if (!in_model_range(x, angle_limit))
             return k + 1;
     }

@@ -84,7 +84,7 @@ def against_scipy(repeats: int) -> list[Figure]:
 
 
 def against_jsbsim(repeats: int) -> list[Figure]:
-    """Return a step of the plant against one of JSBSim's c172x, where JSBSim is installed."""
+    """Return a step of the plant against one of JSBSim's c172x, if JSBSim is installed."""
     if find_spec("jsbsim") is None:
         return []
     aircraft = import_module("jsbsim").FGFDMExec(None)

@@ -1,4 +1,4 @@
-"""What it costs to watch a flight: processor time of a graph at real-time pace, with a live view and without."""
+"""Cost of watching a flight: processor time of a graph in real time, with a live view and without."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What machine the bench measures, and whether others use it."""
+"""Description of the machine that is measured, and of its load by other programs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def machine() -> str:
 
 
 def busy() -> str:
-    """Return a warning if other programs keep this machine from showing what it can; else nothing."""
+    """Return a warning if other programs slow this machine down; else nothing."""
     cores = os.cpu_count() or 1
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
     if load < 0.5 * cores:

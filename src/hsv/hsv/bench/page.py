@@ -26,15 +26,23 @@ FOLLOWED = {
 
 
 def cells(figure: Figure) -> tuple[str, ...]:
-    """Return what, against, ours, theirs (medians), ratio, its spread, and how it stands to what is promised."""
+    """Return what, against, ours, theirs (medians), ratio, its percentiles, and how it compares with the promise."""
     ours = _quantity(figure.ours, figure.unit)
     theirs = _quantity(figure.theirs, figure.unit) if figure.theirs else ""
     # A ratio is a pure number; what has no other side has the unit of what was measured.
     scale = 1.0 if figure.theirs else _readable(figure.median, figure.unit)[0]
-    low, high = (scale * end for end in figure.spread)
-    spread = f"{low:.3g} to {high:.3g}" if len(figure.ours) > 1 else ""
+    low, high = (scale * end for end in figure.percentiles)
+    percentiles = f"{low:.3g} to {high:.3g}" if len(figure.ours) > 1 else ""
     remark = "; ".join(filter(None, (figure.verdict, figure.note)))
-    return figure.what, figure.against, ours, theirs, f"{figure.median:.3g}" if figure.theirs else "", spread, remark
+    return (
+        figure.what,
+        figure.against,
+        ours,
+        theirs,
+        f"{figure.median:.3g}" if figure.theirs else "",
+        percentiles,
+        remark,
+    )
 
 
 def _quantity(values: Sequence[float], unit: str) -> str:
@@ -52,7 +60,7 @@ def _readable(value: float, unit: str) -> tuple[float, str]:
 
 def table(figures: Sequence[Figure]) -> str:
     """Return the figures as a Markdown table."""
-    head = ("what", "against", "ours", "theirs", "ratio", "spread (10 to 90 %)", "promise")
+    head = ("what", "against", "ours", "theirs", "ratio", "10th to 90th percentile", "promise")
     return "\n".join(map(_row, (head, ("---",) * len(head), *map(cells, figures))))
 
 
@@ -72,7 +80,7 @@ class Page:
                 raise QuantityError(f"out = {str(path)!r}: expected a page with the marks {begin!r} and {end!r}")
 
     def write(self, measured_on: str, figures: Sequence[Figure], skipped: Mapping[str, str]) -> None:
-        """Put the table of ``figures`` there, the machine above, what was not measured and why below; and a row of it.
+        """Write the table of ``figures`` into the page, the machine above it, omissions below, and a row of history.
 
         The row goes to the table of all runs, in place of one of the same commit on the same hardware.
         """

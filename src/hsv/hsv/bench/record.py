@@ -20,7 +20,7 @@ RESOLUTION = 0.05
 
 
 class RecordedFigure(pydantic.BaseModel):
-    """What a comparison needs of a figure in a recorded run."""
+    """Data of a figure in a recorded run that are needed for a comparison."""
 
     name: str
     spread: tuple[float, float]
@@ -38,7 +38,7 @@ class RecordedRun(pydantic.BaseModel):
 
 @dataclass(frozen=True)
 class Change:
-    """How a figure stands to the recorded one: the share that it became slower, negative where it became faster."""
+    """Relative change of a figure since the recorded run; positive if it became slower."""
 
     figure: Figure
     before: float
@@ -46,7 +46,7 @@ class Change:
 
 
 def as_json(figures: Sequence[Figure], skipped: Mapping[str, str]) -> dict[str, Any]:
-    """Return a run for :func:`read_run`: commit, machine, figures with every sample, what was not measured and why."""
+    """Return a run for :func:`read_run`: commit, machine, figures with all samples, what was not measured and why."""
     return {
         "commit": commit(),
         "hardware": hardware(),
@@ -74,10 +74,10 @@ def read_run(path: Path) -> RecordedRun:
 
 
 def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
-    """Return how figures stand to those of a recorded run, for those that can be compared.
+    """Return the changes of figures since a recorded run, for those that can be compared.
 
     Ratios of two sides hold on any machine; a figure of one side alone is compared on the same hardware only. A change
-    counts as one where it is more than :data:`RESOLUTION` and the spreads do not overlap; else it is zero.
+    counts as one where it is more than :data:`RESOLUTION` and the percentiles do not overlap; else it is zero.
     """
     before = {figure.name: figure for figure in run.figures}
     found = []
@@ -88,7 +88,7 @@ def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
         value = old.ratio if figure.theirs else old.value
         if value is None or not value > 0.0:
             continue
-        apart = figure.spread[0] > old.spread[1] or figure.spread[1] < old.spread[0]
+        apart = figure.percentiles[0] > old.spread[1] or figure.percentiles[1] < old.spread[0]
         # Of a rate the smaller number is the slower one.
         relation = value / figure.median if figure.is_rate else figure.median / value
         counts = apart and abs(relation - 1.0) > RESOLUTION
@@ -105,7 +105,7 @@ def _as_json(figure: Figure) -> dict[str, Any]:
         "ours": list(figure.ours),
         "theirs": list(figure.theirs),
         "ratio" if figure.theirs else "value": figure.median,
-        "spread": figure.spread,
+        "spread": figure.percentiles,
         "bound": figure.bound or None,
         "limit": figure.limit,
         "goal": figure.goal,

@@ -17,7 +17,7 @@ def ring_lap(laps: int, loop: str, *, composed: bool = False) -> float:
     """Return the mean time (s) of a lap of the bare ring, its recorder running.
 
     Args:
-        laps: How many.
+        laps: Number of laps.
         loop: ``"events"`` (rclpy's EventsExecutor), ``"wait_set"`` (none) or ``"ordered"`` (none, one process).
         composed: All in one process.
 

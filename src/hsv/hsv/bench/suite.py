@@ -24,6 +24,9 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "mcap": lambda: writing.against_mcap(times(10)),
         "graph": lambda: graph.against_rings(times(5)),
         "live": lambda: live.watched(times(2)),
-        "montecarlo": lambda: [*campaigns.over_workers(times(3), max(cores, 2)), *campaigns.corners(max(cores, 2))],
+        "montecarlo": lambda: [
+            *campaigns.over_workers(times(3), max(cores, 2)),
+            *campaigns.corners(times(3), max(cores, 2)),
+        ],
         "offline": offline.design_and_verify,
     }

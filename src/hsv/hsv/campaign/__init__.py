@@ -1,1 +1,1 @@
-"""Monte Carlo campaigns: many flights of one scenario, each of which can be flown again alone."""
+"""Monte Carlo campaigns: many flights of one scenario, each of which can be repeated by itself."""

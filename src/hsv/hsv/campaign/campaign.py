@@ -1,4 +1,4 @@
-"""What a campaign flies: a scenario, a design, and the factors that are drawn anew for every flight."""
+"""Definition of a campaign: a scenario, a design, and the factors that are drawn for every flight."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Campaign:
     design: Mapping[str, Any]
     """Flat parameters of the controller's design, kept whole: its file may change later."""
     method: str
-    """How samples are drawn, one of :data:`METHODS`."""
+    """Sampling method, one of :data:`METHODS`."""
     samples: int
     """Number of flights."""
     seed: int

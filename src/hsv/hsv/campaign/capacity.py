@@ -1,4 +1,4 @@
-"""What a campaign is going to take, by flights that its executor flies as it is going to fly them all."""
+"""Expected duration of a campaign, estimated from test flights of its own executor."""
 
 from __future__ import annotations
 

@@ -1,12 +1,14 @@
-"""Between which values the curves of all flights lie, kept while they are flown: the curves themselves are not."""
+"""Envelopes of the curves of all flights, updated while they are flown; the curves themselves are not stored."""
 
 from __future__ import annotations
 
 import base64
+import math
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
+from numba import njit
 
 from hsv.simulation.metrics import FlightData
 
@@ -34,9 +36,41 @@ SIGNALS = (
 
 
 def signals(flight: FlightData) -> np.ndarray:
-    """Return the curves (steps, signals) of a flight."""
-    error = flight.state[:, :2] - flight.reference[:, :2]
-    return np.column_stack((error, flight.state[:, [2, 3, 6, 8]], flight.command))
+    """Return the curves of a flight (signals, steps)."""
+    curves = np.empty((len(SIGNALS), len(flight.state)))
+    for i, column in enumerate((0, 1, 2, 3, 6, 8)):
+        curves[i] = flight.state[:, column]
+    curves[:2] -= flight.reference[:, :2].T
+    curves[6:] = flight.command.T
+    return curves
+
+
+@njit(cache=True)
+def _add(
+    curves: np.ndarray, starts: np.ndarray, low: np.ndarray, high: np.ndarray, total: np.ndarray, count: np.ndarray
+) -> None:
+    """Take ``curves`` (signals, steps) into least and largest value, and, of whole windows, into sum and number."""
+    sums = np.empty(len(curves))
+    steps = curves.shape[1]
+    for window in range(len(starts)):
+        start, stop = starts[window], steps
+        if window + 1 < len(starts):
+            stop = min(starts[window + 1], steps)
+        if start >= stop:
+            return
+        whole = True
+        for i in range(len(curves)):
+            sums[i] = 0.0
+            for k in range(start, stop):
+                value = curves[i, k]
+                sums[i] += value
+                if math.isfinite(value):
+                    low[window, i], high[window, i] = min(low[window, i], value), max(high[window, i], value)
+            whole = whole and math.isfinite(sums[i])
+        if whole:
+            for i in range(len(curves)):
+                total[window, i] += sums[i] / (stop - start)
+            count[window] += 1.0
 
 
 @dataclass
@@ -56,18 +90,8 @@ class Envelope:
 
     def add(self, flight: FlightData, steps: int) -> None:
         """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
-        curves = signals(flight)
-        curves[~np.isfinite(curves)] = np.nan
         starts = window_starts(steps, len(self.count))
-        starts = starts[starts < len(curves)]
-        n = len(starts)
-        lengths = np.diff(np.append(starts, len(curves)))
-        self.low[:n] = np.fmin(self.low[:n], np.fmin.reduceat(curves, starts))
-        self.high[:n] = np.fmax(self.high[:n], np.fmax.reduceat(curves, starts))
-        means = np.add.reduceat(curves, starts) / lengths[:, None]
-        whole = np.all(np.isfinite(means), axis=1)
-        self.total[:n] += np.where(whole[:, None], means, 0.0)
-        self.count[:n] += whole
+        _add(signals(flight), starts, self.low, self.high, self.total, self.count)
 
     def merge(self, other: Envelope) -> None:
         """Take in all flights of ``other``."""

@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager
 from itertools import islice
 from typing import Any, Protocol
 
+from hsv.campaign.program import check_workers
 from hsv.campaign.scheduler import connected
 from hsv.errors import CampaignError, RunError, reason
 from hsv.threads import ctrl_c_held_back
@@ -42,6 +43,9 @@ class Executor(Protocol):
 
     def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield number and content of each batch of the campaign in ``text``, as ``job`` flies it, in any order."""
+
+
+_KEPT = "what is finished is kept"
 
 
 class SerialExecutor:
@@ -90,15 +94,15 @@ class DaskExecutor:
         try:
             for future, content in running:
                 if not isinstance(content, bytes):
-                    raise RunError(f"campaign: the scheduler is lost ({future.status}); what is finished is kept")
+                    raise RunError(f"campaign: the scheduler is lost ({future.status}); {_KEPT}")
                 submit(1)
                 yield numbers.pop(future.key), content
         except KilledWorker as error:
-            raise RunError(
-                f"campaign: several workers died of the same batch ({error}); what is finished is kept"
-            ) from error
+            raise RunError(f"campaign: several workers died of the same batch ({error}); {_KEPT}") from error
+        except ImportError as error:
+            raise RunError(f"campaign: a worker that came later has another program ({error}); {_KEPT}") from error
         except OSError as error:
-            raise RunError(f"campaign: the scheduler is lost ({reason(error)}); what is finished is kept") from error
+            raise RunError(f"campaign: the scheduler is lost ({reason(error)}); {_KEPT}") from error
 
 
 @contextmanager
@@ -111,7 +115,8 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
         on_wait: Called if the scheduler has no workers yet, before they are waited for.
 
     Raises:
-        CampaignError: The number or the address is not admissible, no scheduler answers there, or it has no workers.
+        CampaignError: The number or the address is not admissible, no scheduler answers there, it has no workers, or
+            one of them has another program.
     """
     if not 0 <= workers <= 4096:
         raise CampaignError(f"workers = {workers}: expected 0 to 4096")
@@ -119,6 +124,7 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
         if workers:
             raise CampaignError(f"workers = {workers}: expected no --workers with --scheduler, whose workers fly")
         with connected(scheduler, on_wait) as client:
+            check_workers(client, scheduler)
             yield DaskExecutor(client)
         return
     workers = workers or os.cpu_count() or 1

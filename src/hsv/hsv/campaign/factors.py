@@ -1,4 +1,4 @@
-"""What varies from flight to flight, and the scenario of a flight."""
+"""Quantities that vary from flight to flight, and the scenario of a flight."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ _PERTURBATION = "vehicle.perturbation."
 
 @dataclass(frozen=True, kw_only=True)
 class Factor(Distribution):
-    """What is drawn for one field of the scenario; uncertain parameters are relative changes."""
+    """Range or distribution of one field of the scenario; uncertain parameters are relative changes."""
 
     name: str
-    """Of an uncertain parameter, or the field"""
+    """Name of an uncertain parameter, or the field."""
 
     @property
     def field(self) -> str:
@@ -34,7 +34,7 @@ def with_factors(table: dict[str, Any], name: str, ranges: Mapping[str, tuple[ob
 
     Args:
         table: A scenario as a file has it.
-        name: What it is called.
+        name: Name of the parameter.
         ranges: By field, values as a file has them.
 
     Raises:

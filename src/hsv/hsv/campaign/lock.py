@@ -1,4 +1,4 @@
-"""One process at a time, by a locked file beside what it guards: this may then be deleted and made anew."""
+"""Mutual exclusion of processes by a lock file next to what it guards, which may then be deleted and recreated."""
 
 from __future__ import annotations
 

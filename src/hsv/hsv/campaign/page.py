@@ -43,7 +43,7 @@ POINTS = 2000
 BINS = 60
 
 RUN = "run"
-"""What numbers tell about that are no metrics: when a flight ended, and how far in its tube it stayed."""
+"""Group of the numbers that are not metrics: when a flight ended, and its largest level in the tube."""
 
 
 PICTURED = ("altitude_error", "velocity_error", "angle_of_attack", "elevator_deflection")
@@ -202,7 +202,7 @@ def histogram(values: np.ndarray) -> dict[str, list[float]]:
 
 
 def _flown(results: Results, worst: int) -> dict[str, Flight]:
-    """Return the flight of the unchanged scenario and the worst one, flown again where that may be, by their names."""
+    """Return the flight of the unchanged scenario and the worst one, if they may be flown, by their names."""
     flights = {}
     if results.flyable:
         runner = results.sample_runner
@@ -266,7 +266,7 @@ def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
-    curve = signals(flight.data())[:, index]
+    curve = signals(flight.data())[index]
     return np.asarray(curve[windows[windows < len(curve)]])
 
 

@@ -36,7 +36,7 @@ class ReplayedFlight:
 
 
 def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
-    """Fly ``flight`` again with the design kept in the results.
+    """Repeat ``flight`` with the design stored in the results.
 
     Raises:
         CampaignError: No such flight.
@@ -45,7 +45,8 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     row, runner = results.row(flight), results.sample_runner
     try:
         flown = runner.fly(flight, runner.sample(flight))
-        repeated = runner.outcome(flown.data(), flown.fingerprint)
+        data = flown.data()
+        repeated = runner.outcome(data, runner.level(data), flown.fingerprint)
     except ControllerError as error:
         repeated = runner.crashed(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
@@ -54,7 +55,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
 def replay_over_dds(
     results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
 ) -> ReplayedFlight:
-    """Fly ``flight`` again with the node processes, recorded to ``bag``.
+    """Repeat ``flight`` with the node processes, recorded to ``bag``.
 
     Args:
         results: The campaign.
@@ -82,7 +83,7 @@ def replay_over_dds(
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
-    repeated = runner.outcome(data, flight_fingerprint(recorded))
+    repeated = runner.outcome(data, runner.level(data), flight_fingerprint(recorded))
     told = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.equipment.get(ESTIMATOR_ENABLED.name)

@@ -1,11 +1,13 @@
-"""Flies the samples of a campaign one at a time; components that all flights share are built once."""
+"""Flies the samples of a campaign; components that all flights share are built once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+
+import numpy as np
 
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.sampling import Sampler
@@ -13,9 +15,11 @@ from hsv.campaign.tube_levels import TubeLevels
 from hsv.campaign.variants import FlightVariants
 from hsv.control.controller import Controller
 from hsv.control.library import library_digest
-from hsv.errors import CampaignError, ControllerError
-from hsv.simulation.closed_loop import Flight, fly
+from hsv.errors import CampaignError, ControllerError, ScenarioError
+from hsv.lanes import WIDTH
+from hsv.simulation.closed_loop import Components, Flight, fly
 from hsv.simulation.metrics import FlightData, flight_metrics
+from hsv.simulation.side_by_side import FlightGroup
 from hsv.vehicle.envelope import in_model_range
 
 Outcome = dict[str, float | bool | str | None]
@@ -47,8 +51,49 @@ class SampleRunner:
         return list(sample.tolist())
 
     def fly(self, flight: int, sample: Sequence[float]) -> Flight:
-        """Fly a flight with its sample (one value a factor)."""
-        return fly(self._variants.components(self.campaign.flown(flight, sample)))
+        """Fly a flight with its sample (one value a factor).
+
+        Raises:
+            ControllerError: A controller of one's own ended it.
+            ScenarioError: The scenario does not admit the values of the flight together; it is named.
+        """
+        return fly(self._components(flight, sample))
+
+    def fly_all(
+        self, flights: Sequence[int], samples: np.ndarray
+    ) -> Iterator[tuple[Flight, float | None] | ControllerError]:
+        """Fly ``flights`` with their ``samples`` (flights, factors), side by side where that can be.
+
+        With each, which is valid until the next one, comes its worst level in the tube, where there is one.
+
+        In place of a flight that its controller ended comes what it said.
+
+        Raises:
+            ScenarioError: As above.
+        """
+        for start in range(0, len(flights), WIDTH):
+            drawn = zip(flights[start : start + WIDTH], samples[start : start + WIDTH], strict=True)
+            components = [self._components(flight, sample) for flight, sample in drawn]
+            if FlightGroup.takes(components):
+                group = self._group.fly(components)
+                yield from zip(group.flights, self._levels.worst_of(group), strict=True)
+                continue
+            for own in components:
+                try:
+                    flown = fly(own)
+                    yield flown, self.level(flown.data())
+                except ControllerError as error:
+                    yield error
+
+    @cached_property
+    def _group(self) -> FlightGroup:
+        return FlightGroup(self.steps)
+
+    def _components(self, flight: int, sample: Sequence[float]) -> Components:
+        try:
+            return self._variants.components(self.campaign.flown(flight, sample))
+        except ScenarioError as error:
+            raise ScenarioError(f"flight {flight}: {error}") from error
 
     def fly_unchanged(self) -> Flight:
         """Fly the scenario itself."""
@@ -62,16 +107,25 @@ class SampleRunner:
         return len(fly(replace(parts, plant=plant)).time) - 1
 
     @property
+    def at_once(self) -> int:
+        """How many flights of the scenario are flown at once."""
+        return WIDTH if FlightGroup.takes([self._variants.unchanged] * 2) else 1
+
+    @property
     def controller(self) -> Controller:
         """The controller that flies."""
         return self._variants.unchanged.controller
 
-    def outcome(self, flight: FlightData, fingerprint: str | None) -> Outcome:
-        """Return what a campaign records of a flight: its end, worst tube level, metrics (SI), ``fingerprint``."""
+    def level(self, flight: FlightData) -> float | None:
+        """Return the worst level of a flight in the tube, ``None`` where no set holds for it."""
+        return self._levels.worst(flight)
+
+    def outcome(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
+        """Return what a campaign records of a flight: its end, worst tube ``level``, metrics (SI), ``fingerprint``."""
         return {
             "diverged": not in_model_range(flight.state[-1], self._variants.unchanged.plant.vehicle.angle_limit),
             "end_time": float(flight.time[-1]),
-            "tube_level": self._levels.worst(flight),
+            "tube_level": level,
             **flight_metrics(flight),
             "crashed": None,
             "fingerprint": fingerprint,

@@ -1,4 +1,4 @@
-"""What a campaign shows: the share of flights within each limit, with its confidence, and the worst flights."""
+"""Summary of a campaign: the share of flights within each limit, with its confidence, and the worst flights."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hsv.simulation.trust import require_trust
 CONFIDENCE = 0.95
 
 CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
-"""In place of a limit: how a flight ended that did not come to its end."""
+"""Rows that replace a limit: how a flight ended that did not finish."""
 
 TUBE_LIMIT = 1.0
 """Level of e - c up to which the error is in the set."""
@@ -32,7 +32,7 @@ TUBE_LIMIT = 1.0
 
 @dataclass(frozen=True)
 class Share:
-    """How many of the flights satisfy a limit (SI, ``None`` for a yes-or-no statement), and the interval (95 %)."""
+    """Number of flights that satisfy a limit (SI, ``None`` for a yes-or-no statement), and the interval (95 %)."""
 
     name: str
     limit: float | None
@@ -79,7 +79,7 @@ class Results:
 
     @property
     def flyable(self) -> bool:
-        """Whether flights may be flown again: the controller is registered here, or the file is trusted."""
+        """Whether flights may be repeated: the controller is registered here, or the file is trusted."""
         return self.trust or not names_code(self.campaign.scenario.controller)
 
     @cached_property

@@ -17,7 +17,7 @@ from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Job
 from hsv.campaign.sample_runner import SampleRunner, sample_runner
 from hsv.control.library import LibraryController
-from hsv.errors import ControllerError, ScenarioError
+from hsv.errors import ControllerError
 from hsv.simulation.closed_loop import watched
 from hsv.simulation.metrics import METRICS
 
@@ -28,7 +28,7 @@ OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, m
 """Numbers that are kept of a flight, with their SI units; null where a flight does not define one."""
 
 WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
-"""How results are written: with checksums, which tell of damage that decompresses all the same."""
+"""Options for writing results: with checksums, which detect damage that can be decompressed without an error."""
 
 _SLOW = 2.0
 """Seconds from which on a flight is flown whole once at most to see how long it takes, not sample by sample."""
@@ -90,9 +90,12 @@ def _flown_here(text: str, batch: int) -> bytes:
 def _timed_here(text: str, flight: int) -> bytes:
     expected = _flight_time(text)
     if expected < _SLOW:
+        runner = sample_runner(text)
+        # As many as are flown at once: one of them alone would take longer.
+        flights = range(flight, min(flight + runner.at_once, runner.campaign.samples))
         started = time.perf_counter()
-        _rows(sample_runner(text), range(flight, flight + 1))
-        expected = time.perf_counter() - started
+        _rows(runner, flights)
+        expected = (time.perf_counter() - started) / len(flights)
     return repr(expected).encode()
 
 
@@ -117,16 +120,16 @@ def _flight_time(text: str) -> float:
 
 def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], Envelope]:
     campaign, envelope, rows = runner.campaign, Envelope.empty(), []
-    for flight, sample, seed in zip(flights, *runner.sampler.draw(flights), strict=True):
-        try:
-            flown = runner.fly(flight, sample)
-            data = flown.data()
+    samples, seeds = runner.sampler.draw(flights)
+    drawn = zip(flights, samples, seeds, runner.fly_all(flights, samples), strict=True)
+    for flight, sample, seed, flown in drawn:
+        if isinstance(flown, ControllerError):
+            outcome = runner.crashed(flown)
+        else:
+            own, level = flown
+            data = own.data()
             envelope.add(data, runner.steps)
-            outcome = runner.outcome(data, flown.fingerprint)
-        except ControllerError as error:
-            outcome = runner.crashed(error)
-        except ScenarioError as error:
-            raise ScenarioError(f"flight {flight}: {error}") from error
+            outcome = runner.outcome(data, level, own.fingerprint)
         rows.append(row(sample, flight, int(seed), campaign, outcome))
     return rows, envelope
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,34 +12,58 @@ from numba import njit
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import filter_step, rest
 from hsv.control.tube_law import TubeLaw
+from hsv.lanes import LaneArray, choose
 from hsv.simulation.closed_loop import Components
+from hsv.simulation.history import X_N
 from hsv.simulation.metrics import FlightData
-from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
+from hsv.simulation.side_by_side import FlightsSideBySide
+from hsv.vehicle.dynamics import PITCH_RATE
 
 
 @njit(cache=True, nogil=True)
 def _worst(
-    notch: Any, shape: np.ndarray, centre: np.ndarray, error: np.ndarray, rate: np.ndarray, planned_rate: np.ndarray
-) -> float:
-    size, rigid = len(centre), error.shape[1]
-    actual = np.zeros(size - rigid)
-    rest(notch, rate[0], actual)
-    planned = actual.copy()
-    deviation = np.empty(size)
-    worst = -math.inf
-    for k in range(len(error)):
+    notch: Any,
+    shape: np.ndarray,
+    centre: np.ndarray,
+    work: Any,
+    reference: np.ndarray,
+    state: Any,
+    deviation: Any,
+    first: int,
+    rows: Any,
+    worst: Any,
+) -> None:
+    """Write into ``worst`` (1) the largest level of the steps before ``rows`` (1).
+
+    Args:
+        notch: The filter.
+        shape: P (s, s).
+        centre: c (s).
+        work: Scratch, three arrays: of the error (s) and of the filters (2 s each).
+        reference: x_r (n + 1, 9).
+        state: Has x in its first columns.
+        deviation: Has x_n in its columns from the ``first`` on.
+        first: See there.
+        rows: Of each lane.
+        worst: Written; not a number where a level is none.
+    """
+    error, actual, planned = work
+    size, rigid = len(centre), len(centre) - len(actual)
+    rest(notch, state[0, PITCH_RATE], actual)
+    for i in range(len(actual)):
+        planned[i] = actual[i]
+    worst[0] = -math.inf
+    for k in range(len(reference)):
         for i in range(rigid):
-            deviation[i] = error[k, i] - centre[i]
+            error[i] = state[k, i] - reference[k, i] - deviation[k, first + i] - centre[i]
         for i in range(size - rigid):
-            deviation[rigid + i] = actual[i] - planned[i] - centre[rigid + i]
-        value = level(shape, deviation)
-        if not value <= worst:
-            worst = value
-        if math.isnan(worst):
-            return worst
-        filter_step(notch, actual, rate[k])
-        filter_step(notch, planned, planned_rate[k])
-    return worst
+            error[rigid + i] = actual[i] - planned[i] - centre[rigid + i]
+        value = level(shape, error)
+        # What is no number stays it.
+        kept = (value <= worst[0]) | (worst[0] != worst[0]) | (rows[0] <= k)
+        worst[0] = choose(kept, worst[0], value)
+        filter_step(notch, actual, state[k, PITCH_RATE])
+        filter_step(notch, planned, reference[k, PITCH_RATE] + deviation[k, first + PITCH_RATE])
 
 
 class TubeLevels:
@@ -54,16 +79,24 @@ class TubeLevels:
         """Return the largest level (e - c)' P (e - c) of the flight, ``None`` where no set holds for it."""
         if self._tube is None:
             return None
-        state, reference, deviation = (a[:, :N_RIGID] for a in (flight.state, flight.reference, flight.deviation))
-        error = state - reference - deviation
-        planned_rate = flight.reference[:, PITCH_RATE] + flight.deviation[:, PITCH_RATE]
-        return float(
-            _worst(
-                self._notch,
-                self._tube.shape,
-                self._tube.centre,
-                error,
-                np.ascontiguousarray(flight.state[:, PITCH_RATE]),
-                np.ascontiguousarray(planned_rate),
-            )
-        )
+        flown = (np.ascontiguousarray(a) for a in (flight.reference, flight.state, flight.deviation))
+        worst = np.empty(1)
+        self._find(np.empty, *flown, 0, np.array([float(len(flight.state))]), worst)
+        return float(worst[0])
+
+    def worst_of(self, group: FlightsSideBySide) -> list[float | None]:
+        """Return the same of flights that were flown side by side."""
+        first = group.flights[0]
+        if self._tube is None or any(flight.trajectory is not first.trajectory for flight in group.flights):
+            return [self.worst(flight.data()) for flight in group.flights]
+        longest = max(group.flights, key=lambda flight: len(flight.time))
+        worst = LaneArray.zeros(1)
+        rows = LaneArray(group.rows.astype(float)[None])
+        self._find(LaneArray.zeros, longest.reference, group.flown, group.flown, X_N, rows, worst)
+        return [float(found) for found in worst.array[0, : len(group.flights)]]
+
+    def _find(self, room: Callable[..., Any], *flown: Any) -> None:
+        tube, states = self._tube, 2 * len(self._notch.D)
+        assert tube is not None
+        work = room(len(tube.centre)), room(states), room(states)
+        _worst(self._notch, tube.shape, tube.centre, work, *flown)

@@ -10,13 +10,21 @@ from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.faults.injector import FaultInjector
+from hsv.noise import SEED_PARAMETER
+from hsv.parameters import check_all
 from hsv.simulation.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
-from hsv.vehicle.plant import Plant
+from hsv.vehicle.initial import initial_trim
+from hsv.vehicle.plant import PLANT_PARAMETERS, Plant
 
 _NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
 """Beginnings of parameters on which the bench's own controllers do not depend."""
+
+_PERTURBATION = "vehicle.perturbation."
+
+_VARIED = (*(p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)), SEED_PARAMETER)
+"""What most campaigns vary: cheap, as nothing else depends on it."""
 
 
 class FlightVariants:
@@ -26,7 +34,7 @@ class FlightVariants:
         """Assemble the flight.
 
         Args:
-            scenario: Of the flight that is varied.
+            scenario: Scenario of the flight that is varied.
             design: Flat parameters of the controller's design.
 
         Raises:
@@ -38,6 +46,7 @@ class FlightVariants:
         self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
         self.unchanged: Components = assemble_flight(scenario, self._design)
         """Components of the flight itself"""
+        self._vehicle, _ = initial_trim(self._nominal)
 
     def components(self, scenario: Scenario) -> Components:
         """Return the components of the flight of another ``scenario`` with the same design.
@@ -50,6 +59,8 @@ class FlightVariants:
         changed = [name for name in names if values.get(name) != self._nominal.get(name)]
         if not all(name.startswith(self._kept_for) for name in changed):
             return assemble(values)
+        if all(name.startswith(_PERTURBATION) or name == SEED_PARAMETER.name for name in changed):
+            return self._varied(values)
         trajectory = self.unchanged.nominal_trajectory
         if any(name.startswith("reference.") for name in changed):
             trajectory = NominalTrajectory.from_parameters(values, self._design)
@@ -58,4 +69,15 @@ class FlightVariants:
             plant=Plant.from_parameters(values),
             nominal_trajectory=trajectory,
             fault_injector=FaultInjector.from_parameters(values),
+        )
+
+    def _varied(self, values: Mapping[str, Any]) -> Components:
+        """Return the components of a flight that differs in its perturbation and its seed alone."""
+        checked = check_all(_VARIED, values)
+        seed = checked.pop(SEED_PARAMETER.name)
+        vehicle = self._vehicle.perturbed({name.removeprefix(_PERTURBATION): v for name, v in checked.items()})
+        return replace(
+            self.unchanged,
+            plant=self.unchanged.plant.varied(vehicle, seed),
+            fault_injector=self.unchanged.fault_injector.with_seed(seed),
         )

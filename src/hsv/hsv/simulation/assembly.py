@@ -1,4 +1,4 @@
-"""From flat parameters to the components of the loop: the one way, for simulation, checks and replay."""
+"""Assembly of the loop from flat parameters, used by simulation, checks and replay."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
-from hsv.control.adjustable import TAU
 from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.tube_factor import TAU
 from hsv.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
 from hsv.parameters import table_values
 from hsv.simulation.blocks import LOOP

@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # a node imports its own component alone
 
 
 class Signals:
-    """What the blocks say to one another in a step, SI units and radians; each writes what it gives.
+    """Signals between the blocks in a step, SI units and radians; each block writes its outputs.
 
     The attributes beside step, period and header are the signals of :mod:`hsv.signals`, by name.
     """
@@ -43,7 +43,7 @@ class Signals:
     period: float
     """T, s"""
     header: Any = None
-    """Of the messages that brought the signals, if messages did."""
+    """Header of the messages that carried the signals, if any."""
 
     state: np.ndarray
     """x (9), the truth"""
@@ -76,7 +76,7 @@ class Signals:
     gain: np.ndarray
     """K (2, 9) if it was found in flight, else empty"""
     gain_index: int
-    """Of the nested family, 0 the outermost"""
+    """Index of the nested gain, 0 for the outermost ellipsoid."""
     nominal_status: int
     """:class:`hsv.control.nominal_law.NominalStatus`"""
 
@@ -85,23 +85,21 @@ class Signals:
     saturated: np.ndarray
     """(2) whether the limits have changed it"""
     diagnostics: ControllerResult
-    """What the controller says beside its input"""
+    """Output of the controller besides its input."""
     actuator: np.ndarray
     """(2), what becomes of the command"""
     active_faults: tuple[ActiveFault, ...]
-    """Of this step"""
+    """Faults of this step."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """What is stepped once a period."""
+    """Interface of what is stepped once per period."""
 
     name: str
     component: str
-    """Its class, ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``, imported when it is needed.
-
-    Empty where the parameters choose it.
-    """
+    """Class, ``module:Class``, with PARAMETERS, ``from_parameters`` and ``reset``, imported when it is needed; empty if
+    the parameters choose it."""
     inputs: tuple[SignalType, ...]
     """Signals of the same step that it needs: what it gives feeds through from them."""
     outputs: tuple[SignalType, ...]

@@ -23,15 +23,27 @@ from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import memory_of, no_tube, tube_step
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
-from hsv.faults.laws import START, apply_command_faults, fault_memory
+from hsv.faults.laws import START, FaultRows, apply_command_faults, fault_memory
 from hsv.faults.table import COMMAND
+from hsv.lanes import LaneArray, every, lane, room
 from hsv.links import receive
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
 from hsv.simulation.foreign import NO_CALL, NOTHING, Callback, call_of, call_step
+from hsv.simulation.history import (
+    ACTUATOR,
+    GAIN_INDEX,
+    Q_F,
+    U_N,
+    U_UNSATURATED,
+    X_N,
+    History,
+    U,
+    X,
+)
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.timing import NEVER
-from hsv.vehicle.dynamics import N_INPUTS, PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance
 from hsv.vehicle.plant import FlightStatus, Plant, PlantFaults, advance_plant, sense
@@ -50,61 +62,6 @@ class Components:
     def perturbed(self, perturbation: Mapping[str, float]) -> Components:
         """Return the loop around the perturbed vehicle, relative changes by parameter name; the rest is shared."""
         return replace(self, plant=self.plant.perturbed(perturbation))
-
-
-class History(NamedTuple):
-    """Rows k = 0 ... n of everything that a flight produced, SI."""
-
-    state: np.ndarray
-    """x (n + 1, 9)"""
-    estimate: np.ndarray
-    """(n + 1, 9), what the controller was given for the state: the measurement, or what an estimator makes of it"""
-    filtered_pitch_rate: np.ndarray
-    """q_f (n + 1), rad/s"""
-    deviation: np.ndarray
-    """x_n (n + 1, 9)"""
-    nominal_input: np.ndarray
-    """u_n (n + 1, 2)"""
-    gain_index: np.ndarray
-    """(n + 1)"""
-    u_unsaturated: np.ndarray
-    """(n + 1, 2)"""
-    command: np.ndarray
-    """(n + 1, 2)"""
-    actuator: np.ndarray
-    """(n + 1, 2)"""
-
-    @classmethod
-    def empty(cls, rows: int) -> History:
-        """Return room for ``rows`` steps."""
-        return cls.over(np.empty(rows * cls.numbers()), rows)
-
-    @classmethod
-    def over(cls, memory: np.ndarray, rows: int) -> History:
-        """Return ``rows`` steps that lie in ``memory``, one column after the other."""
-        ends = [*accumulate(rows * max(width, 1) for width in _COLUMNS)]
-        columns = zip(np.split(memory[: ends[-1]], ends[:-1]), _COLUMNS, strict=True)
-        return cls(*(column.reshape(rows, width) if width else column for column, width in columns))
-
-    @staticmethod
-    def numbers() -> int:
-        """Return how many numbers a step has."""
-        return [*accumulate(max(width, 1) for width in _COLUMNS)][-1]
-
-    def copy(self) -> History:
-        """Return a copy, one column after the other in new memory."""
-        copied = History.empty(len(self.filtered_pitch_rate))
-        for column, own in zip(copied, self, strict=True):
-            column[:] = own
-        return copied
-
-    def cut(self, rows: int) -> History:
-        """Return the first ``rows`` steps."""
-        return History(*(column[:rows] for column in self))
-
-
-_COLUMNS = (9, 9, 0, 9, 2, 0, 2, 2, 2)
-"""Widths of the columns of a :class:`History`; 0: a number a step."""
 
 
 class LoopArrays(NamedTuple):
@@ -127,6 +84,46 @@ class LoopArrays(NamedTuple):
     memory: np.ndarray
 
 
+class Workspace(NamedTuple):
+    """Arrays that the compiled loop writes to beside; of a flight alone they are its own, which makes it faster."""
+
+    measurement: LaneArray | None = None
+    filter_state: LaneArray | None = None
+    defect: LaneArray | None = None
+    weights: LaneArray | None = None
+    schedule: LaneArray | None = None
+    advanced: LaneArray | None = None
+    feedback: LaneArray | None = None
+    total: LaneArray | None = None
+    command: LaneArray | None = None
+    actuator: LaneArray | None = None
+
+    @classmethod
+    def of_lanes(cls, filter_states: int, vertices: int) -> Workspace:
+        """Return those of flights side by side, with 2 s ``filter_states`` and r ``vertices``."""
+        n, m = N_STATES, N_INPUTS
+        return cls(*map(LaneArray.zeros, (n, filter_states, n, vertices, n * (n + m), n, m, m, m, m)))
+
+
+class CommandFaults(NamedTuple):
+    """Faults on the command of a flight, what they remember, and the seed of the flight."""
+
+    rows: FaultRows
+    memory: np.ndarray
+    seed: int
+
+    @classmethod
+    def of(cls, components: Components) -> CommandFaults:
+        """Return those of a flight, before they act."""
+        rows = components.fault_injector.rows((COMMAND,))
+        return cls(rows, fault_memory(rows), components.plant.data.seed)
+
+    @property
+    def first(self) -> int:
+        """The step in which the first may act."""
+        return int(self.rows.table[:, START].min()) if len(self.rows.table) else NEVER
+
+
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -140,8 +137,8 @@ def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, li
 
 
 @njit(cache=True, nogil=True)
-def _fly(
-    x: np.ndarray,
+def fly_loop(
+    x: Any,
     plant: Any,
     plant_memory: Any,
     plant_faults: Any,
@@ -154,21 +151,33 @@ def _fly(
     link: Any,
     link_state: Any,
     faults: Any,
-    remembered: np.ndarray,
+    first_fault: int,
     reference: Any,
     arrays: Any,
+    work: Any,
     history: Any,
+    ended: np.ndarray,
 ) -> int:
     """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
 
     Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without ``plant_faults``
     the plant is ideal, and so is the ``link`` of the command, without ``estimator`` there is none; other functions are
-    compiled for these, as what is not used would take a tenth of the time.
+    compiled for these, as what is not used would take a tenth of the time. Of lanes each is a flight, whose rows are
+    written to ``ended`` (lanes), which holds those of a flight that does not diverge.
+
+    Args:
+        faults: :class:`CommandFaults` of each lane.
+        first_fault: Step before which the command arrives as it is: what a call takes is a twentieth of the loop's
+            time.
     """
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory = arrays
     n, m = len(x), len(u_n)
-    filter_state = np.zeros(len(s))
-    measurement = np.empty(n)
+    measurement, filter_state, defect = room(work.measurement, n), room(work.filter_state, len(s)), room(work.defect, n)
+    weights, S = room(work.weights, len(nominal.polytope.S)), room(work.schedule, n * (n + m))
+    new = room(work.advanced, n)
+    u_feedback, total = room(work.feedback, m), room(work.total, m)
+    u, actuator = room(work.command, m), room(work.actuator, m)
+    estimator_state, estimator_work = np.zeros(n + m), np.empty((4, n))
     if plant_faults is None:
         for i in range(n):
             measurement[i] = x[i]
@@ -176,41 +185,37 @@ def _fly(
         sense(x, plant, plant_memory, plant_faults, 0, measurement)
     vehicle, period, substeps = plant.vehicle, plant.period, plant.substeps
     lowest, highest = plant.actuators.minimum, plant.actuators.maximum
-    effector, work = plant_memory.effector, plant_memory.work
+    effector, integration = plant_memory.effector, plant_memory.work
     rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
-    S, new = np.empty(n * (n + m)), np.empty(n)
     planned = len(nominal.gains) > 0
-    estimated, estimator_work = np.zeros(n + m), np.empty((4, n))
     for i in range(n):
         x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
-    u_feedback, total, u, actuator = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     # Copied when another row holds: views of rows in every step take a twentieth of the loop's time.
-    defect, row = np.empty(n), -1
-    rows = len(history.filtered_pitch_rate)
-    # Before, the command arrives as it is: what a call would take is a twentieth of the loop's time.
-    first_fault = faults.table[:, START].min() if len(faults.table) > 0 else rows
+    row = -1
+    flown, beside, estimated = history
+    rows = len(flown)
     for k in range(rows):
         if k > 0:
             if plant_faults is None:
                 for i in range(m):
                     effector[i] = min(max(actuator[i], lowest[i]), highest[i])
-                advance(x, effector, vehicle, period, substeps, work)
+                advance(x, effector, vehicle, period, substeps, integration)
                 for i in range(n):
                     measurement[i] = x[i]
             else:
                 advance_plant(x, actuator, plant, plant_memory, plant_faults, k - 1)
                 sense(x, plant, plant_memory, plant_faults, k, measurement)
         for i in range(n):
-            history.state[k, i] = x[i]
-            history.estimate[k, i] = measurement[i]
+            flown[k, X + i] = x[i]
             estimate[i] = measurement[i]
         if estimator is not None:
-            estimate_step(estimator, estimated, k, measurement, u, estimator_work, estimate)
-            for i in range(n):
-                history.estimate[k, i] = estimate[i]
+            estimate_step(estimator, estimator_state, k, measurement, u, estimator_work, estimate)
             if k == 0:
                 rest(notch, estimate[PITCH_RATE], filter_state)
+        if plant_faults is not None:
+            for i in range(n):
+                estimated[k, i] = estimate[i]
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
@@ -222,47 +227,63 @@ def _fly(
         for i in range(len(s)):
             s[i] = filter_state[i]
         q_f[0] = filter_step(notch, filter_state, estimate[PITCH_RATE])
-        history.filtered_pitch_rate[k] = q_f[0]
+        flown[k, Q_F] = q_f[0]
         for i in range(n):
-            history.deviation[k, i] = x_n[i]
-        if nominal_call.function != NOTHING:
-            if call_step(nominal_call.function, k, 0, 0, 0, 0) != 0:
+            flown[k, X_N + i] = x_n[i]
+        called = False
+        if nominal_call is not None:
+            called = nominal_call.function != NOTHING
+            if called and call_step(nominal_call.function, k, 0, 0, 0, 0) != 0:
                 return -1 - k
-        elif planned:
+        if planned and not called:
             gain_index[0], _ = nominal_input(nominal, x_n, u_n)
-        history.gain_index[k] = gain_index[0]
+        beside[k, GAIN_INDEX] = gain_index[0]
         for i in range(m):
-            history.nominal_input[k, i] = u_n[i]
-        if controller_call.function != NOTHING:
-            _, inputs, outputs, state, parameters = controller_call
-            for i in range(m):
-                wanted[i] = math.nan  # what is not answered is no answer, not the one before
-            returned[0] = call_step(controller_call.function, k, inputs, outputs, state, parameters)
-            if returned[0] != 0:
-                return -1 - k
-            for i in range(m):
-                if not math.isfinite(wanted[i]):
+            flown[k, U_N + i] = u_n[i]
+        called = False
+        if controller_call is not None:
+            function, inputs, outputs, state, parameters = controller_call
+            called = function != NOTHING
+            if called:
+                for i in range(m):
+                    wanted[i] = math.nan  # what is not answered is no answer, not the one before
+                returned[0] = call_step(function, k, inputs, outputs, state, parameters)
+                if returned[0] != 0:
                     return -1 - k
-                total[i] = wanted[i]
-                u[i] = min(max(total[i], tube.minimum[i]), tube.maximum[i])
-        else:
+                for i in range(m):
+                    if not math.isfinite(wanted[i]):
+                        return -1 - k
+                    total[i] = wanted[i]
+                    u[i] = min(max(total[i], tube.minimum[i]), tube.maximum[i])
+        if not called:
             tube_step(tube, memory, k, False, estimate, q_f[0], x_r, u_r, x_n, u_n, s, u_feedback, total, u)
         for i in range(m):
-            history.u_unsaturated[k, i] = total[i]
+            beside[k, U_UNSATURATED + i] = total[i]
         for i in range(m):
-            history.command[k, i] = u[i]
+            flown[k, U + i] = u[i]
         if planned:
-            nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, S, new)
+            nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, weights, S, new)
         for i in range(m):
             actuator[i] = u[i]
         if plant_faults is not None:
             receive(link, link_state, k, plant.seed, actuator)
         if k >= first_fault:
-            apply_command_faults(faults, remembered, k, plant.seed, actuator, actuator)
+            for i in range(len(ended)):
+                own = lane(actuator, i)
+                apply_command_faults(faults[i].rows, faults[i].memory, k, faults[i].seed, own, own)
         for i in range(m):
-            history.actuator[k, i] = actuator[i]
-        if not in_model_range(x, vehicle.angle_limit):
-            return k + 1
+            flown[k, ACTUATOR + i] = actuator[i]
+        inside = in_model_range(x, vehicle.angle_limit)
+        if not every(inside):
+            flying = 0
+            for i in range(len(ended)):
+                if ended[i] == rows:
+                    if lane(inside, i):
+                        flying += 1
+                    else:
+                        ended[i] = k + 1
+            if flying == 0:
+                return k + 1
     return rows
 
 
@@ -281,29 +302,25 @@ class Flight:
         """Simulated time (n + 1), s."""
         return np.arange(len(self.history.state)) * self.period
 
-    @cached_property
+    @property
     def reference(self) -> np.ndarray:
         """x_r (n + 1, 9)."""
-        return self._along(self.trajectory.data.state)
+        return self.trajectory.along(len(self.history.flown)).state
 
-    @cached_property
+    @property
     def reference_input(self) -> np.ndarray:
         """u_r (n + 1, 2)."""
-        return self._along(self.trajectory.data.input)
+        return self.trajectory.along(len(self.history.flown)).input
 
-    @cached_property
+    @property
     def defect(self) -> np.ndarray:
         """d_r (n + 1, 9), see :mod:`hsv.control.reference_trajectory`."""
-        return self._along(self.trajectory.data.defect)
-
-    def _along(self, rows: np.ndarray) -> np.ndarray:
-        return np.asarray(rows[self.trajectory.rows(len(self.history.state))])
+        return self.trajectory.along(len(self.history.flown)).defect
 
     @property
     def fingerprint(self) -> str:
         """The digest of all its bits, see :mod:`hsv.simulation.fingerprint`."""
-        h = self.history
-        return fingerprint(h.state, h.filtered_pitch_rate, h.deviation, h.nominal_input, h.command, h.actuator)
+        return fingerprint(self.history.flown)
 
     @cached_property
     def metrics(self) -> dict[str, float]:
@@ -340,9 +357,18 @@ def fly(components: Components) -> Flight:
     if components.controller.library is not None:
         with watched(components.controller, rows) as (history, request):
             flown = request("fly", rows, kept=vars(components))
-            return _flight(components, history.copy().cut(flown))
-    history = History.empty(rows)
-    return _flight(components, history.cut(fly_into(history, components)))
+            return flight_of(components, history.copy().cut(flown))
+    history = History.empty(rows, estimated=not is_ideal(components))
+    return flight_of(components, history.cut(fly_into(history, components)))
+
+
+def is_ideal(components: Components) -> bool:
+    """Tell whether equipment, links and air are ideal, and what the controller is given is the state."""
+    injector = components.fault_injector
+    # Of an estimator, whose sensors are hardly ideal, one function is enough.
+    return (
+        components.plant.is_ideal(injector.known) and injector.link.ideal and components.notch_filter.estimator is None
+    )
 
 
 @contextmanager
@@ -375,7 +401,7 @@ def fly_into(history: History, components: Components) -> int:
     """
     plant, nominal, controller = components.plant, components.nominal_trajectory, components.controller
     notch, injector = components.notch_filter, components.fault_injector
-    commanded = injector.rows((COMMAND,))
+    faults = CommandFaults.of(components)
     tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
     given, cuts, arrays = _loop_arrays(2 * len(notch.data.D), memory_of(tube))
     nominal_call = controller_call = NO_CALL
@@ -391,13 +417,12 @@ def fly_into(history: History, components: Components) -> int:
             address, state, parameters = controller.kernel
             memory = state.copy()
             controller_call = call_of(address, given, arrays.wanted, memory, parameters)
-    # Of an estimator, whose sensors are hardly ideal, one function is enough.
-    ideal = plant.is_ideal(injector.known) and injector.link.ideal and notch.estimator is None
+    ideal = is_ideal(components)
     with _ONE_AT_A_TIME if callbacks else nullcontext():
         if callbacks:
             nominal.law.reset()
             controller.reset()
-        rows = _fly(
+        rows = fly_loop(
             plant.initial.state.copy(),
             plant.data,
             plant.memory(),
@@ -410,11 +435,13 @@ def fly_into(history: History, components: Components) -> int:
             controller_call,
             None if ideal else injector.link,
             None if ideal else injector.link_state(),
-            commanded,
-            fault_memory(commanded),
+            (faults,),
+            faults.first,
             nominal.reference.data,
             arrays,
-            history,
+            Workspace(),
+            history._replace(estimated=None) if ideal else history,
+            np.full(1, len(history.flown)),
         )
     for callback in callbacks:
         if callback.error is not None:
@@ -423,6 +450,8 @@ def fly_into(history: History, components: Components) -> int:
         if code := int(arrays.returned[0]):
             raise ControllerError(f"{controller.name}, step {-1 - rows}: returned {code}, expected 0")
         raise controller.failure(-1 - rows, f"answered {arrays.wanted.tolist()}")
+    if ideal and history.estimated is not None:
+        history.estimated[:rows] = history.state[:rows]
     return rows
 
 
@@ -445,7 +474,8 @@ def _controlling(controller: Controller, given: np.ndarray, cuts: list[slice], w
     return Callback(control)
 
 
-def _flight(components: Components, history: History) -> Flight:
+def flight_of(components: Components, history: History) -> Flight:
+    """Return what the ``components`` flew."""
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED

@@ -1,4 +1,4 @@
-"""Controllers and nominal laws side by side: ``python -m hsv.simulation.comparison > docs/comparison.md``."""
+"""Comparison of controllers and nominal laws: ``python -m hsv.simulation.comparison > docs/comparison.md``."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ ROBUST_AND_TUBE = ("case1_rmpc", "case1_tube_dm", "case1_rmpc_last_k", "case1_tu
 NOMINAL_LAWS = ("case1_single_k", "case1", "case1_smooth", "case1_kothare_online", "case1_qp")
 INTEGRAL = ("case1_integral_heavy", "case1_integral_light")
 
-_PAGE = """# Controllers and nominal laws side by side
-Made by `python -m hsv.simulation.comparison > docs/comparison.md`; every row is one scenario, flown in process as
-`hsv simulate NAME --units paper` does. Errors are what altitude and velocity lack of, or have above, their command.
+_PAGE = """# Comparison of controllers and nominal laws
+Made by `python -m hsv.simulation.comparison > docs/comparison.md`; every row is one scenario, flown in one process as
+by `hsv simulate NAME --units paper`. Errors are the deviations of altitude and velocity from their commands.
 
 ## Robust MPC and the tube
-The traditional robust MPC of the paper's section 5.2 is u = K x + u_r, without a notch filter; decoupled vehicle,
-elevator effectiveness 0.9 from 100 s. What it leaves of the altitude is the size of K: with the single K of the whole
-step a thousand feet, with the last gain of the nested family some twenty, and that one runs into the limits of the
-inputs at the step. The tube leaves the same few feet with either. (Under the tube the family has come to its last gain
-long before the fault.)
+The traditional robust MPC of the paper's section 5.2 is u = K x + u_r, without a notch filter; the vehicle is
+decoupled, with an elevator effectiveness of 0.9 from 100 s. Its altitude error depends on K: with the single K for the
+whole step it is a thousand feet, with the last gain of the nested family about twenty, but that gain saturates the
+inputs at the step. With the tube the error is the same few feet for both. (With the tube, the nested family has reached
+its last gain long before the fault.)
 
 {robust}
 ## Nominal laws
-The tube about nominal plans of different laws; coupled vehicle with the paper-like coupling.
+The tube about the nominal trajectories of different laws, for the coupled vehicle with the paper-like coupling.
 
 {laws}
 ## Integral action
-An extension of the paper's law, for the offset that a wrong mass leaves.
+An extension of the paper's law that removes the steady-state error caused by a wrong mass.
 
 {integral}"""
 
@@ -42,7 +42,7 @@ def comparison() -> str:
 
 
 def table(names: tuple[str, ...]) -> str:
-    """Return a row for each scenario, flown."""
+    """Return a table with a row for each scenario, flown."""
     head = (
         "| scenario | settled: h s | V s | error at the fault: h ft | V ft/s | largest error of h after it, ft "
         "| error at 200 s: h ft | V ft/s | saturated steps |"

@@ -1,4 +1,4 @@
-"""What of a scenario the certificate of its design does not cover."""
+"""Everything in a scenario that the certificate of its design does not cover."""
 
 from __future__ import annotations
 

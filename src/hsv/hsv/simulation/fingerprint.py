@@ -25,25 +25,19 @@ TABLE = "fingerprints.toml"
 _ROWS = 2000
 
 
-def fingerprint(
-    state: np.ndarray,
-    filtered_pitch_rate: np.ndarray,
-    deviation: np.ndarray,
-    nominal_input: np.ndarray,
-    command: np.ndarray,
-    actuator: np.ndarray,
-) -> str:
-    """Return ``v1:`` and the SHA-256 of rows k = 0 ... n: x (9), q_f, x_n (9), u_n, command, actuator (2 each).
+def fingerprint(flown: np.ndarray) -> str:
+    """Return ``v1:`` and the SHA-256 of the rows ``flown`` (n + 1, 25).
 
-    Digested are little-endian float64 numbers, row after row, every NaN as the same one.
+    Rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command, actuator (2 each). Digested are little-endian float64
+    numbers, row after row, every NaN as the same one.
     """
-    columns = state, filtered_pitch_rate, deviation, nominal_input, command, actuator
     digest = hashlib.sha256()
-    # So many at a time that they stay in the processor's cache: a third of the time of all at once.
-    for start in range(0, len(state), _ROWS):
-        rows = np.column_stack([column[start : start + _ROWS] for column in columns]).astype("<f8", copy=False)
-        rows[np.isnan(rows)] = np.nan
-        digest.update(rows.tobytes())
+    # So many at a time that they stay in the processor's cache.
+    for start in range(0, len(flown), _ROWS):
+        rows = np.ascontiguousarray(flown[start : start + _ROWS], "<f8")
+        if (unknown := np.isnan(rows)).any():
+            rows = np.where(unknown, np.nan, rows)
+        digest.update(rows.data)
     return f"v{FORMAT}:{digest.hexdigest()}"
 
 

@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 from hsv.control.controller import STEP_FUNCTION
 
 NOTHING = 0
-"""In place of an address: the library's own, compiled with the loop, flies."""
+"""Placeholder for an address: the built-in law, compiled with the loop, is flown."""
 
 
 class Call(NamedTuple):
@@ -49,7 +49,7 @@ def _call_step(typing_context: Any, function: Any, step: Any, inputs: Any, outpu
 
 
 call_step: Any = _call_step
-"""For compiled functions: without the first argument, which numba puts in."""
+"""Function for compiled code, without the first argument, which numba supplies."""
 
 
 def call_of(function: int, inputs: np.ndarray, outputs: np.ndarray, state: np.ndarray, par: np.ndarray) -> Call:

@@ -1,4 +1,4 @@
-"""What runs in the child process of a shared library: it loads the library and flies the compiled loop with it.
+"""Child process of a shared library, which loads the library and flies the compiled loop with it.
 
 Two processes: the first waits for the second, which does all that, to crash, tells the parent of it, and forks another
 one. It never loads the library itself, so that the next one starts afresh, and at once.
@@ -28,7 +28,8 @@ from hsv.control.controller import call_step_function
 from hsv.control.library import LibraryController
 from hsv.control.library_process import SharedMemory, use_in_this_process
 from hsv.errors import HsvError, ProcessError
-from hsv.simulation.closed_loop import Components, History, fly_into
+from hsv.simulation.closed_loop import Components, fly_into
+from hsv.simulation.history import History
 from hsv.warm import warm
 
 

@@ -56,8 +56,8 @@ def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float]
     """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged.
 
     Args:
-        judged: What :func:`verdicts` returns.
-        metrics: Of the flight, by name, SI.
+        judged: Verdicts, from :func:`verdicts`.
+        metrics: Metrics of the flight by name, SI.
         system: Units of the numbers in it.
     """
     text = limits_kept(judged, system)

@@ -18,7 +18,7 @@ PRE_FAULT_WINDOW = 5.0
 
 
 class Group(StrEnum):
-    """What a metric tells about, in the order in which people read it."""
+    """Group of metrics, in the order in which they are displayed."""
 
     tracking = "tracking"
     after_the_fault = "after the fault"
@@ -28,7 +28,7 @@ class Group(StrEnum):
 
 @dataclass(frozen=True)
 class Metric:
-    """What a metric is: its name in words, its unit (SI), its meaning, and what it tells about."""
+    """Definition of a metric: its name in words, its unit (SI), its meaning, and its group."""
 
     words: str
     unit: str
@@ -134,7 +134,7 @@ def is_share(name: str) -> bool:
 
 @dataclass(frozen=True)
 class FlightData:
-    """What the metrics are made of, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2).
+    """Data for metrics, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2).
 
     ``gain_index`` is the nominal gain in use, counted from the outermost of the family.
     """
@@ -154,21 +154,22 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
     values: dict[str, float] = {}
     time = flight.time
-    before = np.ones_like(time, bool) if flight.fault_start is None else time < flight.fault_start - 1e-9
+    faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
+    before, after = slice(faultless), slice(faultless, None)
     for axis, column in (("altitude", 0), ("velocity", 1)):
         error = flight.state[:, column] - flight.reference[:, column]
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
         values[f"{axis}_integral_absolute_error"] = _integral(np.abs(error), time)
         values[f"{axis}_error_maximum"] = float(np.max(np.abs(error)))
         values[f"{axis}_end_error"] = float(error[-1])
-    tube_error = np.abs(flight.state - flight.reference - flight.deviation)[:, 2:4]
+    angles = slice(2, 4)
+    tube_error = np.abs(flight.state[:, angles] - flight.reference[:, angles] - flight.deviation[:, angles])
     values["attitude_from_nominal"] = float(np.max(tube_error))
-    after = ~before
-    if after.any() and before.any():
-        start = time[after][0]
-        window = before & (time >= start - PRE_FAULT_WINDOW - 1e-9)
-        attitude = flight.state[:, 2:4]
-        if window.any():  # of a recording with a gap before the fault there is no mean
+    if 0 < faultless < len(time):
+        start = time[faultless]
+        window = slice(int(np.searchsorted(time, start - PRE_FAULT_WINDOW - 1e-9)), faultless)
+        attitude = flight.state[:, angles]
+        if window.start < faultless:  # of a recording with a gap before the fault there is no mean
             deviation = attitude[after] - attitude[window].mean(axis=0)
             values["post_fault_attitude_deviation"] = float(np.max(np.abs(deviation)))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[after]))
@@ -180,7 +181,7 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     for name, column in (("fuel_equivalence_ratio", 0), ("elevator_deflection", 1)):
         values[f"{name}_minimum"] = float(np.min(flight.command[:, column]))
         values[f"{name}_maximum"] = float(np.max(flight.command[:, column]))
-    values["saturated_steps"] = float(np.count_nonzero(np.any(flight.saturated, axis=1)))
+    values["saturated_steps"] = float(np.count_nonzero(flight.saturated[:, 0] | flight.saturated[:, 1]))
     return {name: values[name] for name in METRICS if name in values}
 
 

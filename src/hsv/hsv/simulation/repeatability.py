@@ -18,7 +18,8 @@ import numpy as np
 from hsv.control.controller import Controller, ControllerInput
 from hsv.errors import HsvError, ParameterError, RunError
 from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Components, Flight, History, fly
+from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.history import SIGNALS, History
 from hsv.simulation.scenario import Scenario, load_scenario, scenario_names
 from hsv.threads import ctrl_c_held_back
 from hsv.vehicle.dynamics import PITCH_RATE
@@ -69,8 +70,6 @@ def from_copied_state(parts: Components, flight: Flight) -> str:
     """Step the controller along a ``flight`` of its own, from half-way on in turns with a copy of it.
 
     Returns:
-    -------
-    str
         Where an answer differs first from that of the flight, and whose it is; empty: nowhere.
     """
     steps = len(flight.time)
@@ -150,8 +149,9 @@ def _difference(first: History, other: History) -> str:
     rows = min(len(first.state), len(other.state))
     found = []
     # In the order of the loop: of what differs in a step, the first is the cause.
-    for order, (name, *columns) in enumerate(zip(History._fields, first, other, strict=True)):
-        expected, flown = (np.ascontiguousarray(column[:rows]).reshape(rows, -1) for column in columns)
+    for order, name in enumerate(SIGNALS):
+        columns = (getattr(history, name)[:rows] for history in (first, other))
+        expected, flown = (np.ascontiguousarray(column).reshape(rows, -1) for column in columns)
         different = np.flatnonzero(np.any(expected.view(np.uint64) != flown.view(np.uint64), axis=1))
         if len(different):
             step = int(different[0])

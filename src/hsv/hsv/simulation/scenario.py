@@ -13,10 +13,10 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.control.adjustable import TAU, factors
 from hsv.control.controllers import SHIPPED_CONTROLLERS
 from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
+from hsv.control.tube_factor import TAU, rigid_factors
 from hsv.documents import parse_toml, read_text
 from hsv.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
 from hsv.faults.injector import NEVER_TIME, written_parameters
@@ -117,7 +117,7 @@ class Scenario(Table):
             # Flat parameters are of one kind: five factors a change.
             values["tau_change.starts"] = [change.start for change in self.tube.change]
             values["tau_change.values"] = [
-                tau for change in self.tube.change for tau in factors(change.tau, "tube.change.tau").tolist()
+                tau for change in self.tube.change for tau in rigid_factors(change.tau, "tube.change.tau").tolist()
             ]
         if self.fault:
             values["fault.channels"] = [fault.channel for fault in self.fault]
@@ -129,7 +129,7 @@ class Scenario(Table):
 
 
 PERIOD = 0.02
-"""Of control, s, until a design says it: whether equipment fits together does not depend on it."""
+"""Control period, s, until a design defines it; whether equipment is consistent does not depend on it."""
 
 _EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *COMMAND_LINK_PARAMETERS, *ESTIMATOR_PARAMETERS)
 
@@ -393,7 +393,7 @@ def _check(scenario: Scenario) -> None:
     for index, change in enumerate(scenario.tube.change):
         field = f"tube.change[{index}].tau"
         try:
-            factors(replace(TAU, name=field).check(change.tau), field)
+            rigid_factors(replace(TAU, name=field).check(change.tau), field)
         except ParameterError as error:
             raise ScenarioError(str(error).removeprefix("parameter ")) from error
     for index, fault in enumerate(scenario.fault):
@@ -439,7 +439,7 @@ _DUE = {
     "greater_than_equal": "at least {ge}",
     "less_than_equal": "at most {le}",
 }
-"""What is expected, by the type of a problem that pydantic finds; of others it says so itself."""
+"""Expectations by the type of a problem that pydantic finds; other problems have a message of their own."""
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -38,7 +38,7 @@ def _defined(name: str, text: str) -> Vehicle:
 
 
 class InitialTable(Table):
-    """Where the flight starts, in trim."""
+    """Start of the flight, in trim."""
 
     altitude: Annotated[float, enveloped("altitude", "m")]
     velocity: Annotated[float, enveloped("velocity", "m/s")]
@@ -62,7 +62,7 @@ class NotchTable(Table):
 
 
 class NominalTable(Table):
-    """What chooses the nominal input."""
+    """Law for the nominal input."""
 
     law: Literal["family", "kothare_online", "qp"] = "family"
 
@@ -101,4 +101,4 @@ class FaultTable(Table):
     start: Time
     stop: Time | None = None
     parameters: dict[str, float] = Field(default_factory=dict)
-    """Of its type, SI"""
+    """Parameters of the fault type, SI."""

@@ -1,4 +1,4 @@
-"""What a bag or a campaign may not do by itself: run code that it names, or have files read from anywhere.
+"""Restrictions on bags and campaigns: they may not run code or read arbitrary files that they name.
 
 A scenario or class that a user names on the command line is the user's own. What a bag or a campaign names may be
 anybody's: it counts only where the user says so, with ``--trust``. Controllers that are registered here under a name
@@ -17,7 +17,7 @@ def require_trust(controller: str, source: object, trust: bool) -> None:
     """Refuse a controller whose code a bag or a campaign names, unless the user trusts it.
 
     Args:
-        controller: As a scenario names it.
+        controller: Controller as named in a scenario.
         source: The bag or result file.
         trust: Whether the user said so.
 
@@ -33,7 +33,7 @@ def require_path_inside(path: str, field: str, source: object, trust: bool) -> N
 
     Args:
         path: A path, or a name of something shipped.
-        field: Where it stands in the scenario.
+        field: Field of the scenario.
         source: The bag or result file.
         trust: Whether the user said so.
 

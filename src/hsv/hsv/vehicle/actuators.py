@@ -22,7 +22,7 @@ from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS
 from hsv.vehicle.parameters import VehicleParameters
 
 SUBSTEPS = 4
-"""Of a control period, where an actuator is not ideal."""
+"""Substeps of a control period, if an actuator is not ideal."""
 
 POSITION, RATE = 0, 1
 """Columns of the state (2, 2), a row a channel."""
@@ -81,7 +81,7 @@ ACTUATOR_SETS = {
         "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery",
     ),
 }
-"""What a scenario may name."""
+"""Actuator sets that a scenario can name."""
 
 
 def _parameters() -> tuple[Parameter, ...]:

@@ -32,7 +32,7 @@ ATMOSPHERE_PARAMETERS = (
     Parameter("wind.forward", 0.0, "steady wind from behind", "m/s", -200.0, 200.0),
     Parameter("wind.up", 0.0, "steady wind from below", "m/s", -50.0, 50.0),
     Parameter("wind.shear", 0.0, "increase of the wind from behind with altitude", "1/s", -0.5, 0.5),
-    Parameter("wind.shear_altitude", 26060.4, "altitude at which the shear adds nothing", "m", 0.0, 1e5),
+    Parameter("wind.shear_altitude", 26060.4, "altitude at which the shear adds no wind", "m", 0.0, 1e5),
     Parameter("turbulence.sigma_forward", 0.0, "standard deviation of the turbulence along the path", "m/s", 0.0, 50.0),
     Parameter("turbulence.sigma_up", 0.0, "standard deviation of the turbulence across the path", "m/s", 0.0, 50.0),
     Parameter("turbulence.length_forward", _LENGTH, "scale of the turbulence along the path", "m", 30.0, 1e5),
@@ -44,14 +44,14 @@ ATMOSPHERE_PARAMETERS = (
     Parameter(
         "gust.stays",
         [],
-        "1: the gust stays (MIL-F-8785C), 0: it falls as it rose (CS-25.341)",
+        "1: the gust stays (MIL-F-8785C), 0: it decays as it rose (CS-25.341)",
         "",
         0.0,
         1.0,
         whole=True,
     ),
     Parameter("density.offset", 0.0, "relative difference of the density from the model's", "", -0.5, 1.0),
-    Parameter("density.sigma", 0.0, "standard deviation of what varies along the path", "", 0.0, 0.5),
+    Parameter("density.sigma", 0.0, "standard deviation of the variation along the path", "", 0.0, 0.5),
     Parameter("density.length", 1e5, "distance over which it varies", "m", 1e3, 1e8),
 )
 

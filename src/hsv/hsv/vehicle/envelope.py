@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
-import numpy as np
 from numba import njit
 
 FOOT = 0.3048
@@ -12,9 +12,9 @@ FOOT = 0.3048
 
 
 @njit(cache=True)
-def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
+def in_model_range(x: Any, angle_limit: Any) -> Any:
     """Tell whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
-    for value in x:
-        if not math.isfinite(value):
-            return False
-    return abs(x[2]) <= angle_limit and abs(x[3]) <= angle_limit and x[1] > 0.0
+    inside = (abs(x[2]) <= angle_limit) & (abs(x[3]) <= angle_limit) & (x[1] > 0.0)
+    for i in range(len(x)):
+        inside = inside & math.isfinite(x[i])
+    return inside

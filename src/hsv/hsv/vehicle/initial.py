@@ -1,4 +1,4 @@
-"""Where a flight starts: in the trim of the nominal vehicle in still air, which more than the plant knows."""
+"""Initial state of a flight, in the trim of the nominal vehicle in still air, used by more than the plant."""
 
 from __future__ import annotations
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, NamedTuple, Self
@@ -63,7 +64,7 @@ PLANT_PARAMETERS = (
         for name in COEFFICIENT_UNITS
     ),
 )
-"""Beside those of the vehicle, its actuators, sensors and links, and the air."""
+"""Parameters of the plant besides those of the vehicle, its actuators, sensors and links, and the air."""
 
 EQUIPMENT_PARAMETERS = (
     *ACTUATOR_PARAMETERS,
@@ -72,7 +73,7 @@ EQUIPMENT_PARAMETERS = (
     *MEASUREMENT_LINK_PARAMETERS,
     COMPUTATION_PARAMETER,
 )
-"""Of what is ideal unless a scenario says otherwise; the tables of a scenario are called after them."""
+"""Parameters of everything that is ideal by default; the tables of a scenario are named after them."""
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
@@ -110,7 +111,7 @@ class PlantData(NamedTuple):
 
 
 class PlantMemory(NamedTuple):
-    """What the plant keeps from step to step beside the state x, replaced in place.
+    """State of the plant between steps besides the state x, updated in place.
 
     Position and rate of the actuators (2, 2); what reached them last and what the vehicle was given last (2 each); the
     states of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period;
@@ -232,9 +233,9 @@ class Plant:
 
         Args:
             vehicle: Parameters.
-            initial: Where it starts.
+            initial: Initial state.
             period: T (s).
-            steps: Of the flight.
+            steps: Number of steps of the flight.
             substeps: Runge-Kutta steps a period, while actuators are ideal.
             equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; the rest is as by default: ideal.
         """
@@ -242,17 +243,17 @@ class Plant:
         self.initial = initial
         self.period = period
         self.steps = steps
-        self._equipment = dict(equipment or {})
+        values = dict(equipment or {})
         self.data = PlantData(
             vehicle,
             period,
             substeps,
-            actuator_data(self._equipment, vehicle, period),
-            atmosphere_data(self._equipment, period),
-            sensor_data(self._equipment, period),
-            measurement_link(self._equipment),
-            SUBSTEPS * computation(self._equipment, period)[1],
-            check_all((SEED_PARAMETER,), self._equipment)[SEED_PARAMETER.name],
+            actuator_data(values, vehicle, period),
+            atmosphere_data(values, period),
+            sensor_data(values, period),
+            measurement_link(values),
+            SUBSTEPS * computation(values, period)[1],
+            check_all((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
         self.reset()
         # Compile now, also what a fault in flight would need: a cold cache must not stall a flight.
@@ -276,8 +277,15 @@ class Plant:
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Plant:
         """Return the same with another vehicle, relative changes by parameter name; it starts in the same trim."""
-        vehicle = self.vehicle.perturbed(perturbation)
-        return Plant(vehicle, self.initial, self.period, self.steps, self.data.substeps, self._equipment)
+        return self.varied(self.vehicle.perturbed(perturbation), self.data.seed)
+
+    def varied(self, vehicle: VehicleParameters, seed: int) -> Plant:
+        """Return the same with a ``vehicle`` of the same limits and another ``seed``; what these leave is shared."""
+        other = copy(self)
+        other.vehicle = vehicle
+        other.data = self.data._replace(vehicle=vehicle, seed=seed)
+        other.reset()
+        return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
         """Tell whether the equipment is ideal and the air still, and no fault in a schedule changes that."""

@@ -64,7 +64,7 @@ COUPLING_PARAMETER = Parameter(
 )
 
 VEHICLE_PARAMETERS = (
-    Parameter("vehicle.name", DEFAULT_VEHICLE, "name of the vehicle, whose values hold where one is not given"),
+    Parameter("vehicle.name", DEFAULT_VEHICLE, "name of the vehicle, which provides the values that are not given"),
     *(
         Parameter(f"vehicle.{name}", 0.0, name.replace("_", " "), "" if unit == "1" else unit)
         for name, unit in COEFFICIENT_UNITS.items()
@@ -72,13 +72,18 @@ VEHICLE_PARAMETERS = (
     Parameter("vehicle.coupling_sets.names", [""], "names of the sets of inertial coupling"),
     Parameter("vehicle.coupling_sets.values", [], "psi_1 and psi_2 of each set", "kg^0.5 m"),
     *(Parameter(f"vehicle.{axis}_range", [], f"least and largest {axis} of commands", u) for axis, u in _AXES.items()),
-    Parameter("vehicle.angle_limit", 0.0, "|angle of attack| and |pitch angle| beyond which a flight diverged", "rad"),
+    Parameter(
+        "vehicle.angle_limit",
+        0.0,
+        "|angle of attack| and |pitch angle| beyond which a flight counts as diverged",
+        "rad",
+    ),
     Parameter("vehicle.input_minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("vehicle.input_maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("vehicle.uncertainty.names", [""], "names of the uncertain coefficients"),
     Parameter("vehicle.uncertainty.bounds", [], "relative bound of each"),
 )
-"""What a vehicle brings to the nodes; those that are not given are those of the vehicle of that name."""
+"""Parameters of a vehicle for the nodes; those that are not given are those of the vehicle of that name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +137,7 @@ class Vehicle:
         """Return the coupled model (paper eq. 1) with a set of inertial coupling, or a multiple of the derived.
 
         Raises:
-            QuantityError: As :meth:`coupling_name`.
+            QuantityError: See :meth:`coupling_name`.
         """
         name = self.coupling_name(coupling)
         if name in self.couplings:
@@ -278,7 +283,7 @@ def vehicle_text(name: str) -> str:
     """Return the text of a vehicle file, by name or path, with what it extends written out.
 
     Raises:
-        VehicleError: As :func:`load_vehicle`.
+        VehicleError: See :func:`load_vehicle`.
     """
     load_vehicle(name)
     return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else read_text(_path(name))
