@@ -20,7 +20,7 @@ DESIGNS = Path(__file__).parents[2] / "offline_design"
 
 COMMANDS = [
     "design baseline",
-    "check lqr",
+    "check tube_mpc",
     "montecarlo case1 --samples 2000",
     "resilience --controllers case1 --faults elevator_loss",
     "claims",

@@ -1,0 +1,34 @@
+"""Ctrl-C, and being asked to end: an exception, but not in the middle of an import."""
+
+from __future__ import annotations
+
+import signal
+from types import FrameType
+
+_LATER = 0.02
+"""Seconds after which an import is looked at once more."""
+
+
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """Raise ``KeyboardInterrupt``, at once or as soon as the current import is finished.
+
+    A compiled module that is interrupted fails to load with an error of its own, and a callback of the import system
+    swallows the exception. A handler of signals. The timer lives on in a program in the place of this one:
+    :func:`hsv.graph.launcher.become`.
+
+    Raises:
+        KeyboardInterrupt: Always, now or later.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            signal.setitimer(signal.ITIMER_REAL, _LATER)
+            return
+        frame = frame.f_back
+    raise KeyboardInterrupt
+
+
+def take_interrupts() -> None:
+    """Let SIGINT and SIGTERM interrupt this process; it may have been started with them blocked."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        signal.signal(number, interrupt)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
