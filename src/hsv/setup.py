@@ -1,8 +1,42 @@
+"""The package's metadata. All of it is here: colcon's --symlink-install shows setuptools this file and no other."""
+
+from itertools import chain
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import find_packages, setup
+
+manifest = ElementTree.parse(Path(__file__).resolve().with_name("package.xml"))
+
+# Lower bounds are the oldest versions that tests/packaging/test_wheel.py flies; upper ones, the next release that may
+# break what is used. Both hold the pins of constraints*.txt.
+REQUIRED = [
+    "llvmlite>=0.43,<0.52",
+    "lz4>=4.3.3,<5",
+    "mcap>=1.3,<2",
+    "numba>=0.60,<0.70",
+    "numpy>=1.26,<3",
+    "pint>=0.24.4,<0.27",
+    "piqp>=0.6,<0.8",
+    "pydantic>=2.9,<3",
+    "pyyaml>=6.0.1,<7",
+    "rich>=13.7,<16",
+    "rosbags>=0.11,<0.12",
+    "scipy>=1.13,<2",
+    "tomli-w>=1.0,<2",
+    "typer>=0.20,<0.30",
+    "zstandard>=0.23,<0.26",
+]
+EXTRAS = {
+    "campaign": ["dask>=2025.1,<2027", "distributed>=2025.1,<2027", "pyarrow>=18,<27"],
+    "design": ["clarabel>=0.10,<0.12", "cvxpy>=1.6,<2"],
+    "live": ["foxglove-sdk>=0.20,<0.31", "websockets>=14,<18"],
+    "report": ["jinja2>=3.1,<4", "markupsafe>=2.1.3,<4", "matplotlib>=3.9,<4"],
+}
 
 setup(
     name="hsv",
-    version="0.1.0",
+    version=manifest.findtext("version"),
     packages=find_packages(include=["hsv", "hsv.*"]),
     package_data={
         "hsv": [
@@ -12,6 +46,7 @@ setup(
             "bench/*.c",
             "campaign/template/*",
             "control/include/*.h",
+            "designs/*",
             "export/*.j2",
             "live/template/*",
             "recording/layouts/*",
@@ -25,32 +60,8 @@ setup(
         ("share/hsv", ["package.xml"]),
     ],
     python_requires=">=3.11,<3.13",
-    install_requires=[
-        "clarabel",
-        "cvxpy",
-        "dask",
-        "distributed",
-        "foxglove-sdk",
-        "jinja2",
-        "lz4",
-        "markupsafe",
-        "matplotlib",
-        "mcap",
-        "numba",
-        "numpy",
-        "pint",
-        "piqp",
-        "pyarrow",
-        "pydantic",
-        "pyyaml",
-        "rich",
-        "rosbags",
-        "scipy",
-        "tomli-w",
-        "typer",
-        "websockets",
-        "zstandard",
-    ],
+    install_requires=REQUIRED,
+    extras_require={**EXTRAS, "all": sorted(chain.from_iterable(EXTRAS.values()))},
     zip_safe=False,
     maintainer="HSV bench maintainers",
     maintainer_email="maintainers@hsv-bench.invalid",

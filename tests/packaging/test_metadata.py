@@ -1,0 +1,139 @@
+"""What the package declares: dependencies and extras that hold every import, bounds that hold every pin."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from importlib.metadata import packages_distributions, requires
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from hsv.cli.extras import EXTRAS, missing_extra
+from hsv.simulation.scenario import scenario_names
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ROOT / "src" / "hsv" / "hsv"
+DECLARED = [Requirement(line) for line in requires("hsv") or []]
+
+OF_ROS = {"ament_index_python"}
+"""Imported where a ROS workspace is sourced only."""
+
+WITHOUT_IMPORT = {"clarabel"}
+"""Distributions that are found by another one: cvxpy solves with it."""
+
+
+def extra_of(requirement: Requirement) -> str:
+    """Return the extra that a requirement belongs to, "all" left out; "" if it is always installed."""
+    found = re.search(r'extra == "(\w+)"', str(requirement.marker or ""))
+    return found[1] if found else ""
+
+
+def imported() -> set[str]:
+    """Return the modules outside the standard library that the package imports, wherever and whenever it does."""
+    found = set()
+    for path in SOURCES.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split(".")[0])
+    return found - sys.stdlib_module_names - {"hsv"} - OF_ROS
+
+
+def test_every_import_is_of_a_declared_distribution_and_every_distribution_is_used() -> None:
+    by_module = packages_distributions()
+    used: dict[str, set[str]] = {}
+    for module in imported():
+        used.setdefault(EXTRAS.get(module, ""), set()).update(map(canonicalize_name, by_module[module]))
+    used["design"] |= WITHOUT_IMPORT
+    declared: dict[str, set[str]] = {}
+    for requirement in DECLARED:
+        declared.setdefault(extra_of(requirement), set()).add(canonicalize_name(requirement.name))
+    everything = declared.pop("all")
+    assert declared == used
+    assert everything == set().union(*(names for extra, names in declared.items() if extra))
+
+
+@pytest.mark.parametrize("lock", ["constraints.txt", "constraints-jazzy.txt"])
+def test_bounds_have_two_sides_and_hold_the_pins(lock: str) -> None:
+    lines = (ROOT / lock).read_text(encoding="utf-8").splitlines()
+    pins = {pin.name: pin for pin in map(Requirement, (line for line in lines if not line.startswith("#")))}
+    for requirement in DECLARED:
+        assert sorted(bound.operator for bound in requirement.specifier) == ["<", ">="], requirement
+        (pin,) = pins[canonicalize_name(requirement.name)].specifier
+        assert requirement.specifier.contains(pin.version), f"{requirement}: {lock} has {pin.version}"
+
+
+WITHOUT_EXTRAS = """
+import sys
+from importlib.abc import MetaPathFinder
+from hsv.cli.extras import EXTRAS
+
+class NotInstalled(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name.partition(".")[0] in EXTRAS:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, NotInstalled())
+from hsv.cli.main import main
+sys.argv[0] = "hsv"
+main()
+"""
+"""The command in a Python in which no library of an extra can be imported."""
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", WITHOUT_EXTRAS, *words], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "simulate case1",
+        "simulate case1_qp",
+        "trim",
+        "scenarios",
+        "vehicles",
+        "faults",
+        "equipment",
+        f"info {ROOT}/bags/reference/case1",
+        f"replay {ROOT}/bags/reference/case2",
+        f"diff {ROOT}/bags/reference/case1 {ROOT}/bags/reference/case1",
+    ],
+)
+def test_flights_and_bags_need_no_extra(words: str) -> None:
+    ran = run(*words.split())
+    assert (ran.returncode, ran.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "extra"),
+    [
+        (f"report {ROOT}/bags/reference/case1 --out page.html", "report"),
+        (f"plot {ROOT}/bags/reference/case1 --out plot.png", "report"),
+        ("design baseline", "design"),
+        ("montecarlo case1 --samples 2", "campaign"),
+        (f"export {ROOT}/bags/reference/case1 --scene", "live"),
+    ],
+)
+def test_what_is_missing_is_one_line_that_names_the_extra(words: str, extra: str, tmp_path: Path) -> None:
+    ran = run(*words.split())
+    assert (ran.returncode, ran.stdout) == (2, "")
+    assert ran.stderr == f"hsv: error: needs hsv[{extra}]: pip install 'hsv[{extra}]'\n"
+
+
+def test_a_module_of_no_extra_is_not_explained_away() -> None:
+    assert missing_extra(ModuleNotFoundError("No module named 'mine'", name="mine")) is None
+    assert missing_extra(ImportError("cannot import name 'x' from 'cvxpy'", name="cvxpy")) is None
+
+
+def test_every_shipped_scenario_has_its_design_in_the_package() -> None:
+    from hsv.simulation.scenario import load_scenario
+
+    designs = {path.stem for path in (SOURCES / "designs").glob("*.yaml")}
+    assert {load_scenario(name).design for name in scenario_names()} - {None, ""} <= designs

@@ -1,0 +1,130 @@
+"""The package as pip installs it, in virtual environments without ROS, on the newest and the oldest libraries allowed.
+
+Needs a package index; where there is none, the tests say so and are skipped.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tomllib
+from collections.abc import Callable
+from importlib.metadata import PathDistribution
+from pathlib import Path
+from zipfile import Path as ZipPath
+from zipfile import ZipFile
+
+import pytest
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).parents[2]
+BAG = ROOT / "bags" / "reference" / "case1"
+BUILD_SDIST = "import sys; from setuptools import build_meta; print(build_meta.build_sdist(sys.argv[1]))"
+
+pytestmark = pytest.mark.long
+
+
+def run(*command: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run a command with nothing of this process' environment but how it reaches a package index."""
+    handed_on = {
+        name: value for name, value in os.environ.items() if name.startswith("PIP_") or "proxy" in name.lower()
+    }
+    env = {"PATH": os.defpath, "HOME": os.environ.get("HOME", "/"), "LANG": "C.UTF-8", **handed_on}
+    return subprocess.run([str(word) for word in command], cwd=cwd, env=env, capture_output=True, text=True)
+
+
+def checked(*command: object, cwd: Path | None = None) -> str:
+    ran = run(*command, cwd=cwd)
+    assert ran.returncode == 0, f"{command}: {ran.stdout}{ran.stderr}"
+    return ran.stdout
+
+
+@pytest.fixture(scope="module")
+def index() -> None:
+    """Skip where pip finds no package index."""
+    asked = run(sys.executable, "-m", "pip", "index", "versions", "setuptools")
+    if asked.returncode:
+        pytest.skip(f"no package index: {asked.stderr.strip().splitlines()[-1]}")
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the source distribution from a copy of the sources, with the link that leads out of them."""
+    folder = tmp_path_factory.mktemp("sources")
+    made = shutil.ignore_patterns("__pycache__", "*.egg-info", "build")
+    shutil.copytree(ROOT / "src" / "hsv", folder / "src" / "hsv", symlinks=True, ignore=made)
+    shutil.copytree(ROOT / "offline_design", folder / "offline_design")
+    said = checked(sys.executable, "-c", BUILD_SDIST, folder, cwd=folder / "src" / "hsv")
+    return folder / said.splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist: Path, index: None) -> Path:
+    """Build the wheel from the source distribution alone."""
+    folder = sdist.parent / "wheel"
+    checked(sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, sdist)
+    (wheel,) = folder.glob("hsv-*.whl")
+    return wheel
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that makes a bare virtual environment, installs into it, and returns its ``bin``."""
+
+    def make(*words: object) -> Path:
+        checked(sys.executable, "-m", "venv", tmp_path / "venv")
+        folder = tmp_path / "venv" / "bin"
+        checked(folder / "python3", "-m", "pip", "install", "--quiet", *words)
+        assert run(folder / "python3", "-c", "import rclpy").returncode == 1
+        return folder
+
+    return make
+
+
+def fly(folder: Path, cwd: Path) -> None:
+    """Fly Case 1 and check that it is the published flight."""
+    table = tomllib.loads((ROOT / "src/hsv/hsv/simulation/fingerprints.toml").read_text(encoding="utf-8"))
+    flown = json.loads(checked(folder / "hsv", "simulate", "case1", "--json", cwd=cwd))
+    assert flown["fingerprint"] == table["case1"]["fingerprint"]
+
+
+def test_both_distributions_hold_every_file_of_the_package(sdist: Path, wheel: Path) -> None:
+    listed = checked("git", "-C", ROOT, "ls-files", "src/hsv/hsv", "offline_design").split()
+    link = "src/hsv/hsv/designs"
+    expected = {name.replace("offline_design", link).removeprefix("src/hsv/") for name in listed if name != link}
+    with tarfile.open(sdist) as archive:
+        in_sdist = {name.partition("/")[2] for name in archive.getnames()}
+    assert expected <= in_sdist
+    assert {"setup.py", "pyproject.toml", "package.xml", "resource/hsv"} <= in_sdist
+    in_wheel = set(ZipFile(wheel).namelist())
+    assert {name for name in in_wheel if name.startswith("hsv/")} == expected
+
+
+def test_a_bare_environment_flies_and_reports(wheel: Path, environment: Callable[..., Path], tmp_path: Path) -> None:
+    folder = environment(wheel)
+    fly(folder, tmp_path)
+    words = ("report", BAG, "--out", tmp_path / "report.html")
+    refused = run(folder / "hsv", *words, cwd=tmp_path)
+    assert (refused.returncode, refused.stderr) == (2, "hsv: error: needs hsv[report]: pip install 'hsv[report]'\n")
+
+    checked(folder / "python3", "-m", "pip", "install", "--quiet", f"{wheel}[report]")
+    checked(folder / "hsv", *words, cwd=tmp_path)
+    assert "</html>" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_oldest_libraries_allowed_do(wheel: Path, environment: Callable[..., Path], tmp_path: Path) -> None:
+    (metadata,) = (path for path in ZipPath(wheel).iterdir() if path.name.endswith(".dist-info"))
+    oldest = tmp_path / "oldest.txt"
+    with oldest.open("w", encoding="utf-8") as stream:
+        for requirement in map(Requirement, PathDistribution(metadata).requires or []):
+            (lowest,) = (bound.version for bound in requirement.specifier if bound.operator == ">=")
+            stream.write(f"{requirement.name}=={lowest}\n")
+    folder = environment(f"{wheel}[all]", "--constraint", oldest)
+    fly(folder, tmp_path)
+    checked(folder / "hsv", "report", BAG, "--out", tmp_path / "report.html")
+    checked(folder / "hsv", "montecarlo", "case1", "--samples", "2", "--seed", "1", cwd=tmp_path)
+    checked(folder / "hsv", "export", BAG, "--scene", "--out", tmp_path / "scene.mcap", cwd=tmp_path)
