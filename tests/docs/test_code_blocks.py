@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import matplotlib
+import page_blocks
 import pytest
 
 from hsv.faults.table import FAULT_KINDS, read_fault
@@ -18,8 +19,7 @@ MODULES = {"python.md": ("mine", "class Mine")}
 
 
 def blocks(page, language):
-    text = (DOCS / page).read_text(encoding="utf-8")
-    found = re.findall(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE)
+    found = [block.text for block in page_blocks.blocks(f"docs/{page}", language)]
     assert found
     return found
 
@@ -51,6 +51,11 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
         sys.modules.pop(module, None)
     assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"\)', "".join(code)))
     assert names["flight"].status.name == "FINISHED"
+
+
+def test_numbers_of_the_page_on_the_notch_filter_hold():
+    for block in blocks("explanation/notch.md", "python"):
+        exec(compile(block, "notch.md", "exec"), {})
 
 
 @pytest.mark.long

@@ -47,6 +47,6 @@ def test_every_page_of_the_documentation_is_in_a_table_of_contents():
     for index in (ROOT / "docs").rglob("index.md"):
         for block in re.findall(r"```\{toctree\}\n(.*?)```", index.read_text(), flags=re.S):
             entries = [line for line in block.split("\n") if line and not line.startswith(":")]
-            for entry in entries:
+            for entry in [re.sub(r".*<(.*)>", r"\1", line) for line in entries]:
                 listed |= {str(p.relative_to(ROOT / "docs")) for p in index.parent.glob(f"{entry}.md")}
     assert listed >= {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}

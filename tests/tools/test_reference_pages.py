@@ -1,0 +1,77 @@
+"""The documentation's generated reference has every command, message and package."""
+
+from __future__ import annotations
+
+import pkgutil
+import re
+from pathlib import Path
+
+import pytest
+from typer.main import get_command
+
+import hsv
+import reference_pages
+import repository_pages
+from hsv.cli.main import app
+
+ROOT = Path(__file__).parents[2]
+
+
+def test_every_command_has_a_section_with_all_its_options():
+    page = reference_pages.commands()
+    found = dict(re.findall(r"^#{2,4} `(hsv.*?)`$(.*?)(?=^#{2,4} |\Z)", page, re.DOTALL | re.MULTILINE))
+
+    def check(name, command):
+        section = found.pop(name)
+        for parameter in command.params:
+            word = parameter.opts[0] if parameter.param_type_name == "option" else f"{parameter.name}"
+            assert word in section, f"{name}: {word}"
+        for child, below in getattr(command, "commands", {}).items():
+            check(f"{name} {child}", below)
+
+    check("hsv", get_command(app))
+    assert found == {}
+    assert "...\n" not in re.sub(r"^\$ .*", "", page, flags=re.MULTILINE)
+
+
+def test_every_field_of_every_message_is_there_with_its_unit_and_meaning():
+    pytest.importorskip("rosidl_adapter")
+    page = reference_pages.messages()
+    sections = dict(re.findall(r"^### \w+\n\n`hsv_msgs/(\S+)`(.*?)(?=^##|\Z)", page, re.DOTALL | re.MULTILINE))
+    files = [*ROOT.glob("ros_ws/src/hsv_msgs/msg/*.msg"), *ROOT.glob("ros_ws/src/hsv_msgs/srv/*.srv")]
+    assert {*sections} == {f"{file.parent.name}/{file.stem}" for file in files}
+    for file in files:
+        section = sections[f"{file.parent.name}/{file.stem}"].replace("\\", "")
+        lines = file.read_text(encoding="utf-8").splitlines()
+        for line in lines:
+            if match := re.fullmatch(r"(\S+) +(\w+)(?: *= *(\d+))? *(?:# *(.*))?", line):
+                kind, name, value, comment = match.groups()
+                if kind.startswith(("#", "-")):
+                    continue
+                [row] = [row for row in section.splitlines() if row.startswith(f"| `{name}` |")]
+                assert (comment or "") in row and (value or "") in row, f"{file.name}: {line}"
+                assert kind.partition("/")[2] in row or kind in row
+        first = re.match(r"# (.*)", lines[0])
+        assert first is None or first[1] in section
+
+
+def test_every_package_and_module_of_the_library_is_on_its_page():
+    page = (ROOT / "docs" / "reference" / "modules.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^   (hsv\.\w+)$", page, re.MULTILINE)
+    # The package's own names have another page; what compiles the library has no use by itself.
+    there = {f"hsv.{module.name}" for module in pkgutil.iter_modules(hsv.__path__)} - {"hsv.api", "hsv.warm"}
+    assert {*listed} == there and len(listed) == len(there)
+    assert "hsv.design.sets.ellipsoid" in reference_pages.modules_of("hsv.design")
+    assert reference_pages.modules_of("hsv.units") == []
+
+
+def test_links_of_pages_lead_to_pages():
+    files = repository_pages.included()
+    readme = repository_pages.text_of("readme", (ROOT / "docs" / "readme.md").read_text(), files)
+    assert "](errata.md)" in readme and "](examples/lqr.md)" in readme and "](contributing.md)" in readme
+    example = repository_pages.text_of("examples/lqr", (ROOT / "docs" / "examples" / "lqr.md").read_text(), files)
+    assert "](../python.md)" in example and "](../../examples/lqr/hsv_lqr/__init__.py)" in example
+    own = repository_pages.text_of(
+        "tutorial/a", "[one](../../README.md#topics) [two](https://x.org) [three](b.md)", files
+    )
+    assert own == "[one](../readme.md#topics) [two](https://x.org) [three](b.md)"
