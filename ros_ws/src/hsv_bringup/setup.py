@@ -1,8 +1,13 @@
+from pathlib import Path
+from xml.etree import ElementTree
+
 from setuptools import setup
+
+manifest = ElementTree.parse(Path(__file__).resolve().with_name("package.xml"))
 
 setup(
     name="hsv_bringup",
-    version="0.1.0",
+    version=manifest.findtext("version"),
     packages=["hsv_bringup"],
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv_bringup"]),

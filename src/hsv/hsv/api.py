@@ -46,8 +46,8 @@ def sweep(
 
     Args:
         name: Name of a shipped scenario, or path.
-        field: What varies, as in a scenario file, for example ``"fault[0].effectiveness"``.
-        values: As written in a scenario file, with their units.
+        field: Field that varies, as in a scenario file, for example ``"fault[0].effectiveness"``.
+        values: Values as written in a scenario file, with their units.
         changes: Further fields that differ from the file, the same in every flight.
 
     Raises:

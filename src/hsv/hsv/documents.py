@@ -77,10 +77,10 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_bytes(path: Path, most: int | None = None) -> bytes:
-    """Return what is in the file ``path``, which may be larger than ``most`` bytes only where that is ``None``.
+    """Return the contents of the file ``path``, which may be larger than ``most`` bytes only if that is ``None``.
 
     Raises:
-        DocumentError: As :func:`open_regular`, or it is larger.
+        DocumentError: See :func:`open_regular`; or the file is larger.
     """
     with open_regular(path) as stream:
         if most is not None and os.fstat(stream.fileno()).st_size > most:
@@ -95,7 +95,7 @@ def read_text(path: Path) -> str:
     """Return the text in the file ``path``.
 
     Raises:
-        DocumentError: As :func:`read_bytes`, or it is no UTF-8.
+        DocumentError: See :func:`read_bytes`; or the file is not UTF-8.
     """
     try:
         return read_bytes(path, MOST_BYTES).decode().replace("\r\n", "\n")
@@ -173,13 +173,13 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         return node
 
     def compose_mapping_node(self, anchor: Any) -> Any:
-        """Return the next mapping, as of the base class, whose keys differ."""
+        """Return the next mapping, like the base class, and check that its keys differ."""
         node = super().compose_mapping_node(anchor)
         seen: set[tuple[str, str]] = set()
         for key, _ in node.value:
             if isinstance(key, yaml.ScalarNode):
                 if (key.tag, key.value) in seen:
-                    raise _refused(f"the key {key.value!r} stands there twice", key)
+                    raise _refused(f"the key {key.value!r} occurs twice", key)
                 seen.add((key.tag, key.value))
         return node
 
@@ -203,7 +203,7 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     values = dict(pairs)
     if len(values) < len(pairs):
         names = [name for name, _ in pairs]
-        raise ValueError(f"the key {next(name for name in names if names.count(name) > 1)!r} stands there twice")
+        raise ValueError(f"the key {next(name for name in names if names.count(name) > 1)!r} occurs twice")
     return values
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 class HsvError(Exception):
-    """Base of everything this library raises on purpose; the message names the field, its value and what was due."""
+    """Base of everything this library raises on purpose; the message names the field, its value and the expectation."""
 
 
 class QuantityError(HsvError, ValueError):
@@ -22,7 +22,7 @@ class VehicleError(HsvError, ValueError):
 
 
 class DocumentError(HsvError, ValueError):
-    """A file that cannot be read, or a text that is not what it should be; the message does not name it."""
+    """A file that cannot be read, or a text that is not as expected; the message does not name it."""
 
 
 class ScenarioError(HsvError, ValueError):
@@ -42,15 +42,15 @@ class RecordingError(HsvError, ValueError):
 
 
 class RunError(HsvError, RuntimeError):
-    """A flight that did not come to its planned end."""
+    """A flight that did not finish."""
 
 
 class ControllerError(RunError):
-    """A controller of one's own that failed in flight; the message names it, and the step where it is known."""
+    """A custom controller that failed in flight; the message names it, and the step if known."""
 
 
 class ProcessError(RunError):
-    """A process that runs other people's code and crashed, or hangs."""
+    """A process with foreign code that crashed or hangs."""
 
 
 class CampaignError(HsvError, ValueError):

@@ -33,7 +33,7 @@ def follow_extends(
         values: Keys of tables that stand for one value, and are replaced whole wherever they are.
 
     Raises:
-        HsvError: That of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.
+        HsvError: Error of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.
     """
     chain, layers = [name], [dict(read(name))]
     while EXTENDS in layers[-1]:

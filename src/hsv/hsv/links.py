@@ -41,16 +41,18 @@ def _parameters(link: str) -> tuple[Parameter, ...]:
     where, longest = f"link.{link}", float(LONGEST_DELAY)
     return (
         Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, longest, whole=True),
-        Parameter(f"{where}.jitter", 0.0, "it is late by up to so many more, drawn", "", 0.0, longest, whole=True),
+        Parameter(
+            f"{where}.jitter", 0.0, "largest additional random delay, control periods", "", 0.0, longest, whole=True
+        ),
         Parameter(f"{where}.loss", 0.0, "probability that a payload is lost: the last one is held", "", 0.0, 1.0),
-        Parameter(f"{where}.burst", 0.0, "mean number lost in a row; 0: each is lost on its own", "", 0.0, 1e6),
-        Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is turned over", "", 0.0, 1.0),
-        Parameter(f"{where}.checksum", False, "true: a corrupted payload is noticed, and lost"),
+        Parameter(f"{where}.burst", 0.0, "mean number of consecutive losses; 0: independent losses", "", 0.0, 1e6),
+        Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is flipped", "", 0.0, 1.0),
+        Parameter(f"{where}.checksum", False, "true: a corrupted payload is detected and lost"),
     )
 
 
 COMPUTATION_PARAMETER = Parameter(
-    "link.computational_delay", 0.0, "from the measurement to the command that answers it", "s", 0.0, 1.0
+    "link.computational_delay", 0.0, "delay from the measurement to the resulting command", "s", 0.0, 1.0
 )
 MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
 COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
@@ -153,13 +155,13 @@ def _begin(state: np.ndarray, payload: np.ndarray) -> None:
 
 @njit(cache=True, error_model="numpy")
 def receive(link: Any, state: np.ndarray, step: int, seed: int, payload: np.ndarray) -> None:
-    """Replace the ``payload`` (n) that is sent in ``step`` by what the receiver has then.
+    """Replace the ``payload`` (n) that is sent in ``step`` by the one that the receiver then has.
 
     Args:
         link: :class:`LinkData`.
         state: See :func:`link_state`, replaced.
         step: k; steps follow one another from 0 on.
-        seed: Of the flight.
+        seed: Seed of the flight.
         payload: Replaced.
     """
     if link.ideal:

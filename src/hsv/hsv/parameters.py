@@ -22,7 +22,7 @@ class Parameter:
     default: Value
     """Value where nothing else is given; an empty list of floats stands for an array that a design must bring."""
     description: str
-    """What it is, in a few words."""
+    """Short description."""
     unit: str = ""
     """SI unit, empty where it has none."""
     minimum: float = -math.inf
@@ -45,7 +45,7 @@ class Parameter:
 
     @property
     def constraint(self) -> str:
-        """What a value must satisfy, in words."""
+        """Condition for a valid value, in words."""
         if self.choices:
             return f"one of {', '.join(self.choices)}"
         words = _range(self.minimum, self.maximum)
@@ -83,7 +83,7 @@ class Parameter:
         return value
 
     def refusal(self, value: object) -> ParameterError:
-        """Return the error that tells why ``value`` is not admissible, and what to write for a whole number."""
+        """Return the error for an invalid ``value``, with a hint how to write a whole number."""
         hint = ""
         if self.kind == "double" and _is_whole(value):
             hint = f" (write {float(cast(int, value))})"
@@ -157,7 +157,7 @@ def table_values(
     One value stands for a list of it.
 
     Args:
-        parameters: That there are.
+        parameters: Known parameters.
         tables: One in the other; their keys, with dots between, are names of parameters.
         read: Reads a number, with the arguments of :func:`read_number`.
 

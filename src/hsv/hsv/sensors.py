@@ -53,13 +53,13 @@ class Field(NamedTuple):
 FIELDS = (
     Field("noise", "standard deviation of white noise", "{}", 0.0, 1e6, 0.0),
     Field("bias", "constant bias", "{}", -1e6, 1e6, 0.0),
-    Field("bias_sigma", "standard deviation of a bias that is drawn once a flight", "{}", 0.0, 1e6, 0.0),
+    Field("bias_sigma", "standard deviation of a bias drawn once per flight", "{}", 0.0, 1e6, 0.0),
     Field("drift_sigma", "standard deviation of a Gauss-Markov bias", "{}", 0.0, 1e6, 0.0),
-    Field("drift_time", "its correlation time", "s", 1e-3, 1e9, 1.0),
+    Field("drift_time", "correlation time of the Gauss-Markov bias", "s", 1e-3, 1e9, 1.0),
     Field("random_walk", "random walk, after one second", "{}/s^0.5", 0.0, 1e6, 0.0),
     Field("scale", "relative error of the scale", "", -0.9, 10.0, 0.0),
-    Field("scale_sigma", "standard deviation of one that is drawn once a flight", "", 0.0, 1.0, 0.0),
-    Field("lag", "bandwidth of a lag of first order; 0: none", "rad/s", 0.0, 1e4, 0.0),
+    Field("scale_sigma", "standard deviation of a scale error drawn once per flight", "", 0.0, 1.0, 0.0),
+    Field("lag", "bandwidth of a first-order lag; 0: none", "rad/s", 0.0, 1e4, 0.0),
     Field("latency", "age of a sample, control periods", "", 0.0, float(LONGEST_LATENCY), 0.0, whole=True),
     Field("drop_out", "probability that a sample is lost", "", 0.0, 1.0, 0.0),
     Field("quantum", "step of the quantisation; 0: none", "{}", 0.0, 1e6, 0.0),
@@ -70,7 +70,7 @@ FIELDS = (
 
 @dataclass(frozen=True)
 class SensorSet:
-    """Published sensors: fields of those channels that are not ideal, SI and radians, and whose they are."""
+    """Published sensors: fields of the channels that are not ideal, SI and radians, and their source."""
 
     channels: Mapping[str, Mapping[str, float]]
     source: str
@@ -113,7 +113,7 @@ SENSOR_SETS = {
         inertial_angle_of_attack=True,
     ),
 }
-"""What a scenario may name."""
+"""Sensor sets that a scenario can name."""
 
 
 def _unit(pattern: str, unit: str) -> str:
@@ -243,7 +243,7 @@ def measure(
     x: np.ndarray,
     measurement: np.ndarray,
 ) -> None:
-    """Write into ``measurement`` (9) what the sensors say of the state ``x`` (9) in ``step``.
+    """Write into ``measurement`` (9) the output of the sensors for the state ``x`` (9) in ``step``.
 
     Args:
         data: :class:`SensorData`.
@@ -251,7 +251,7 @@ def measure(
         rows: Faults of sensors, see :mod:`hsv.faults.laws`.
         memory: Theirs, replaced.
         step: k; steps follow one another from 0 on.
-        seed: Of the flight.
+        seed: Seed of the flight.
         x: The truth.
         measurement: Written.
     """

@@ -67,7 +67,7 @@ _ROOT_BITS = 80
 
 @cache
 def registry() -> pint.UnitRegistry:
-    """Return the registry of units, whose factors are fractions; made for a unit that is not known: it takes long."""
+    """Return the registry of units, with fractions as factors; created only for unknown units, because it is slow."""
     import pint
 
     return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
@@ -79,7 +79,7 @@ def is_finite(value: float) -> bool:
 
 
 def rounded(value: float) -> float:
-    """Return ``value`` to 15 digits: what was written, without the last-digit error of a sum or a product."""
+    """Return ``value`` to 15 digits: as written, without the last-digit error of a sum or a product."""
     return float(f"{value:.15g}")
 
 
@@ -147,7 +147,7 @@ def in_words(value: float, unit: str, system: UnitSystem) -> str:
 
 
 def si_unit_of(text: object) -> str:
-    """Return the SI unit of what a quantity is written in, ``"1"`` where there is no unit or no such quantity."""
+    """Return the SI unit of a quantity as written, ``"1"`` if it has no unit or is no quantity."""
     try:
         base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
     except ValueError:
@@ -189,7 +189,7 @@ def parse_quantity(text: object, unit: str, field: str) -> float:
     """Return the quantity written in ``text`` as a number in ``unit``.
 
     Args:
-        text: What the user wrote, e.g. ``"85500 ft"``. A bare number is accepted only where ``unit`` is ``"1"``.
+        text: Text of the user, e.g. ``"85500 ft"``. A bare number is accepted only where ``unit`` is ``"1"``.
         unit: Target unit, e.g. ``"m"``.
         field: Name used in the error message.
 
@@ -265,7 +265,7 @@ def _known() -> dict[str, Square]:
 
 
 def square_by_pint(unit: str) -> Square:
-    """Return what the units library says of the square of ``unit``.
+    """Return the unit of the square of ``unit``.
 
     Raises:
         ValueError: It knows no such unit, or its exponents are neither whole nor halves.

@@ -6,6 +6,7 @@ from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
+from hsv.simulation.side_by_side import FlightGroup
 
 
 def warm() -> None:
@@ -15,6 +16,8 @@ def warm() -> None:
         fly(components)
         for _ in steps(components):
             pass
+    both = [assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1}) for _ in range(2)]
+    FlightGroup(both[0].plant.steps).fly(both)
 
 
 if __name__ == "__main__":

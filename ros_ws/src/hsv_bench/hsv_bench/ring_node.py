@@ -44,7 +44,7 @@ class RingNode:
         ]
 
     def matched(self) -> bool:
-        """Tell whether all links of the graph description stand."""
+        """Return whether all links of the graph description are connected."""
         links = description.links(self._role, _CONTROLLER, True)
         counts = {topic: publisher.get_subscription_count() for topic, publisher, _ in self._outputs}
         inputs = zip(self._role.subscribes, self.inputs, strict=True)
@@ -52,14 +52,14 @@ class RingNode:
         return all(count >= sum(topic == linked for linked, _ in links) for topic, count in counts.items())
 
     def publish(self) -> None:
-        """Publish what this process publishes in a step."""
+        """Publish the messages of this process for a step."""
         for topic, publisher, message in self._outputs:
             if topic != description.CLOCK:
                 message.step = self.lap
             publisher.publish(message)
 
     def receive(self, message: Any) -> None:
-        """Take an input; answer when all of a step have come."""
+        """Take an input; publish when all inputs of a step have arrived."""
         self._came += 1
         if self._came < len(self.inputs):
             return

@@ -1,4 +1,4 @@
-"""What the commands share that ask something of a running graph: finding it, waiting for it, answering, ending."""
+"""Shared code of the commands that act on a running graph: discovery, waiting, replies and exit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rclpy.utilities import remove_ros_args
 from hsv.errors import HsvError, RunError
 from hsv.graph.description import PLANT, NodeDescription
 from hsv.graph.exclusive import is_published
-from hsv.graph.progress import Standstill
+from hsv.graph.standstill import Standstill
 from hsv.json_text import json_text
 from hsv_node import roles
 from hsv_node.main import take_signals
@@ -35,12 +35,12 @@ SETTLED_AFTER = 3.0
 """Seconds without a change in the topics after which all that there are are known."""
 
 SAY_AFTER = 5.0
-"""Seconds of waiting after which this is said, and between saying it again."""
+"""Seconds of waiting before the first message about it, and between messages."""
 
 INTERRUPTED = 130
 
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-"""What rmw calls a node whose endpoint is known and whose name is not yet."""
+"""Name that rmw reports for a node whose endpoint is known but whose name is not yet."""
 
 _LOOK = 0.1
 
@@ -62,7 +62,7 @@ class GraphClient(Node):
         if name:
             self.create_subscription(Run, name, runs.append, LATCHED)
         if not name or not self.wait_for(lambda: runs, f"a run ({name})"):
-            raise RunError(f"no run in {self.where}: expected hsv run, or the nodes by hand, in this place")
+            raise RunError(f"no run in {self.where}: expected hsv run, or nodes started by hand there")
         return runs[-1]
 
     def topic_of(self, role: NodeDescription, kind: type) -> str:
@@ -80,7 +80,7 @@ class GraphClient(Node):
         return f"ROS_DOMAIN_ID={self.context.get_domain_id()}{f', namespace {namespace}' if namespace != '/' else ''}"
 
     def call(self, role: NodeDescription, kind: Any, request: Any) -> Any:
-        """Return what the service of a type answers that the node of the graph in ``role`` offers.
+        """Return the reply of a service, by its type, of the node of the graph in ``role``.
 
         Raises:
             RunError: There is no such node, or it does not answer.
@@ -94,18 +94,22 @@ class GraphClient(Node):
         raise RunError(f"no answer from {service} for {SILENT_AFTER:g} s")
 
     def publishers_of(self, topic: str) -> list[str]:
-        """Return the full names of the nodes that publish ``topic``, as far as they are known, but not this one."""
+        """Return the full names of the known nodes that publish ``topic``, except this one."""
         return self._others(self.get_publishers_info_by_topic(topic))
 
     def subscribers_of(self, topic: str) -> list[str]:
-        """Return the full names of the nodes that subscribe ``topic``, as far as they are known, but not this one."""
+        """Return the full names of the known nodes that subscribe ``topic``, except this one."""
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
     def settle(self, whole: Callable[[], object]) -> None:
         """Wait until all of a graph is known, which ``whole`` says, or nothing new comes for a while."""
         standstill = Standstill()
-        while not whole() and standstill.look(self.get_topic_names_and_types()) < SETTLED_AFTER:
+        while not whole() and standstill.look(self._endpoints()) < SETTLED_AFTER:
             rclpy.spin_once(self, timeout_sec=_LOOK)
+
+    def _endpoints(self) -> list[tuple[str, int, int]]:
+        names = (name for name, _ in self.get_topic_names_and_types())
+        return [(name, self.count_publishers(name), self.count_subscribers(name)) for name in names]
 
     def wait_for(
         self, done: Callable[[], object], what: str, published: Sequence[str] = (), for_ever: bool = False
@@ -113,8 +117,8 @@ class GraphClient(Node):
         """Wait until ``done``; return whether it is.
 
         Args:
-            done: What is waited for.
-            what: How it is called.
+            done: Condition to wait for.
+            what: Name of the condition in messages.
             published: Where somebody has to be there, what he publishes. Who does on this machine may take his time;
                 otherwise nobody is long looked for.
             for_ever: Whether to wait however long nothing changes.
@@ -167,7 +171,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 class _Prog(argparse.Action):
-    """What the command is called by who has started it, ``hsv set``: it stands before what is refused."""
+    """Name of the command for its user, such as ``hsv set``, which precedes error messages."""
 
     def __call__(self, parser: argparse.ArgumentParser, _options: argparse.Namespace, values: Any, *_: object) -> None:
         parser.prog = values
@@ -178,7 +182,7 @@ def run_client(
     act: Callable[[GraphClient, argparse.Namespace], None],
     args: Sequence[str] | None = None,
 ) -> int:
-    """Run a command and return its exit code: 1 without a run, 2 for what is refused, in one line each."""
+    """Run a command and return its exit code: 1 without a run, 2 if rejected, with one line each."""
     given = list(sys.argv if args is None else args)
     name = parser.prog
     parser.add_argument("--prog", action=_Prog, help=argparse.SUPPRESS)

@@ -40,7 +40,7 @@ class FlowExecutor(SingleThreadedExecutor):
         super().spin_once(timeout_sec=0.0 if sweeps else timeout_sec)
 
     def drain(self) -> None:
-        """Take all that has come, subscription by subscription, up to ``SWEEPS`` messages of each."""
+        """Take all messages that have arrived, subscription by subscription, up to ``SWEEPS`` of each."""
         for take, kind, raw, callback in self._subscriptions:
             for _ in range(SWEEPS):
                 taken = take(kind, raw)

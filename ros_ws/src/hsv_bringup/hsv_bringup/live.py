@@ -37,8 +37,8 @@ from hsv.graph.description import (
     NodeDescription,
 )
 from hsv.graph.infrastructure_parameters import LIVE_PARAMETERS
-from hsv.graph.progress import Standstill
 from hsv.graph.settable import SETTABLE, step_in
+from hsv.graph.standstill import Standstill
 from hsv.live.commands import Change, Command, Inject
 from hsv.live.foxglove_server import FoxgloveServer
 from hsv.live.hub import Hub
@@ -77,7 +77,7 @@ class LiveExecutor(FlowExecutor):
     """Sleeps until a look is due, and not until a message comes: a hundred of them cost little more than one."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Sleep for so long, then take all that has come, and look for an answer where a service was asked."""
+        """Sleep for so long, then take all messages that have arrived, and check for replies of services."""
         time.sleep(timeout_sec or 0.0)
         self.drain()
         if any(True for node in self.get_nodes() for _ in node.clients):
@@ -101,7 +101,7 @@ class _Request:
 
 
 class LiveNode(ProcessNode):
-    """Passes the messages on as they are, samples them for the page, and carries out what the page asks."""
+    """Forwards the messages unchanged, samples them for the page, and carries out the commands of the page."""
 
     def __init__(self) -> None:
         # What it said and had for parameters would be recorded with the flight.
@@ -132,7 +132,7 @@ class LiveNode(ProcessNode):
         print(f"live data: ws://127.0.0.1:{self.foxglove.port} (Foxglove, Lichtblick; layout {layout})", flush=True)
 
     def poll(self) -> None:
-        """Sample what has come, and go on with what is asked."""
+        """Sample the messages that have arrived, and continue with the commands."""
         self._next_look = max(self._next_look + 1.0 / RATE, time.monotonic())
         self.hub.sample()
         if self.page.watched:
@@ -154,7 +154,7 @@ class LiveNode(ProcessNode):
         return max(self._next_look - time.monotonic(), 0.0)
 
     def close(self) -> None:
-        """Show the last of what has come, and leave the viewers."""
+        """Show the last messages, and disconnect the viewers."""
         if isinstance(self.executor, LiveExecutor):
             self.executor.drain()
         self._look_for_plant()
@@ -206,7 +206,7 @@ class LiveNode(ProcessNode):
                 self.hub.note(f"{node}: {status.message}", warning=True)
 
     def _on_parameter_event(self, event: ParameterEvent) -> None:
-        """Follow the plant's pace, whoever has changed it."""
+        """Follow changes of the plant's pace."""
         if event.node == self._plant:
             self._on_settings({p.name: parameter_value_to_python(p.value) for p in event.changed_parameters})
 

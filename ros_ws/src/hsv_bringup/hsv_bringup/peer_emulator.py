@@ -15,7 +15,7 @@ from rclpy.node import Node
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
 from hsv.graph.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
-from hsv.graph.progress import Standstill
+from hsv.graph.standstill import Standstill
 from hsv.recording.definitions import definition, type_hash
 from hsv.recording.reader import Bag
 from hsv.recording.topic import Qos, Topic
@@ -31,7 +31,7 @@ _STAMP = struct.Struct("<iI")
 
 
 class PeerEmulatorNode(LockstepNode):
-    """Plays the peers of ``peer_emulator.node``, each under its own name, with what a bag holds of them."""
+    """Emulates the peers of ``peer_emulator.node``, each under its own name, from the messages in a bag."""
 
     def __init__(self) -> None:
         super().__init__(description.PEER_EMULATOR, "replay")
@@ -124,7 +124,7 @@ class PeerEmulatorNode(LockstepNode):
                 self.finish(0)
 
     def poll(self) -> None:
-        """Start when the links stand; give up on a node that does not answer."""
+        """Start when the links are connected; give up on a node that does not answer."""
         if not self._is_plant and self._ready and self._fed == 0 and self._heard_by_node():
             self._feed()
         answers = sum(self._answered.values())

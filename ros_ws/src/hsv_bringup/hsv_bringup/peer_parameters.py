@@ -13,7 +13,7 @@ from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
 from hsv.graph.description import COMPOSED
-from hsv.graph.progress import Standstill, processor_time_of
+from hsv.graph.standstill import Standstill, processor_time_of
 
 GIVE_UP_AFTER = 10.0
 """Seconds without any progress, of answers or of the silent nodes' processes, after which the bag does without."""
@@ -23,13 +23,13 @@ _LOOK = 1.0
 
 
 class PeerParameters:
-    """The parameters of other nodes, as they come in while the asking node goes on."""
+    """The parameters of other nodes, collected while the asking node continues."""
 
     def __init__(self, node: Node, names: Mapping[str, str]) -> None:
         """Begin to ask.
 
         Args:
-            node: Who asks.
+            node: Node that asks.
             names: Full name of each node to be asked, by its role, which is also that of its executable.
         """
         self._peers = {role: _Peer(node, name) for role, name in names.items()}
@@ -73,7 +73,7 @@ class _Peer:
 
     @property
     def service(self) -> str:
-        """Name of the service whose answer is due."""
+        """Name of the service whose reply is pending."""
         return str(self._client.service_name)
 
     @property

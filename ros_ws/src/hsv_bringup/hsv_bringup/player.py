@@ -30,17 +30,17 @@ EXCLUSIVE = (*TOPICS, *PLANT.announces, *RECORDER.announces)
 
 
 class PlayerNode(ProcessNode):
-    """Publishes the recorded bytes of a bag; what was recorded in one instant of simulated time goes out together."""
+    """Publishes the recorded bytes of a bag; messages of the same simulated time are published together."""
 
     def __init__(self, bag: Bag, topics: Sequence[str], rate: float, paused: bool, delay: float) -> None:
         """Prepare to play.
 
         Args:
-            bag: What to play.
+            bag: Bag to play.
             topics: Topics to publish, by their names in the bag.
             rate: Simulated over wall time.
             paused: Whether to begin paused.
-            delay: Wall time (s) before the first message, for listeners to find the player.
+            delay: Wall time (s) before the first message, for subscribers to discover the player.
         """
         # In the namespace of the bag, so that a remapping of the player's own moves its topics as well.
         super().__init__("player", bag.namespace)
@@ -63,7 +63,7 @@ class PlayerNode(ProcessNode):
         self._next = 0
         self._begins = time.monotonic() + delay
         self._says = self._begins
-        """When to say again that listeners are slow."""
+        """Time of the next warning about slow subscribers."""
         self._anchor: tuple[float, int] | None = None
         """Wall time (s) and simulated time (ns) from which the pace is counted."""
         self.create_service(Trigger, "~/pause", self._pause)
@@ -71,7 +71,7 @@ class PlayerNode(ProcessNode):
         self.create_service(Trigger, "~/step", self._step)
 
     def poll(self) -> None:
-        """Publish what is due; end after the last message."""
+        """Publish the messages that are due; end after the last one."""
         while not self._paused and self._next < len(self._instants) and self._delay() <= 0.0:
             self._publish()
         if self._next >= len(self._instants):
@@ -93,13 +93,13 @@ class PlayerNode(ProcessNode):
         return self._anchor[0] + (instant - self._anchor[1]) * 1e-9 / self._rate - now
 
     def _end(self) -> None:
-        """End once all listeners have everything; one that is gone or hangs is given up by DDS itself, in time."""
+        """End when all subscribers have received everything; DDS itself drops one that is gone or hangs."""
         slow = [t for t, p in self._outputs.items() if not p.wait_for_all_acked(Duration(seconds=0.25))]
         if not slow:
             self.finish(0)
         elif time.monotonic() > self._says:
             self._says = time.monotonic() + SAID_EVERY
-            self.get_logger().info("waiting for slow listeners of " + ", ".join(slow))
+            self.get_logger().info("waiting for slow subscribers of " + ", ".join(slow))
 
     def _publish(self) -> None:
         for topic, data in self._instants[self._next][1]:
@@ -179,7 +179,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument("--topics", nargs="+", default=[], help="topics to publish, and the clock; default: all")
     parser.add_argument("--no-clock", action="store_true", help="leave the clock to somebody else")
     parser.add_argument("--paused", action="store_true", help="begin paused: call /player/step or /player/resume")
-    parser.add_argument("--delay", type=float, default=1.0, help="wall time (s) for listeners to find the player")
+    parser.add_argument(
+        "--delay", type=float, default=1.0, help="wall time (s) that subscribers get to discover the player"
+    )
     options = parser.parse_args(words)
 
     def build() -> PlayerNode:

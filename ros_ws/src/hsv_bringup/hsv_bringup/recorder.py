@@ -55,7 +55,7 @@ _STAMP = struct.Struct("<iI")
 
 
 class RecorderNode(PeerNode):
-    """Writes the messages of a step in a fixed order once all are there, so that equal runs give equal bags."""
+    """Writes the messages of a step in a fixed order once all have arrived, so that equal runs give equal bags."""
 
     def __init__(self) -> None:
         super().__init__(RECORDER, "bag")
@@ -97,14 +97,14 @@ class RecorderNode(PeerNode):
             self.create_subscription(message_class(kind), topic, callback, profile, raw=True)
         self._progress_message = RecorderProgress()
         self._progress = self.create_publisher(RecorderProgress, RECORDER_PROGRESS, STEP)
-        self.get_logger().info(f"records to {self.bag.directory}")
+        self.get_logger().info(f"recording to {self.bag.directory}")
 
     def start_run(self, run: Run) -> None:
-        """Note how many steps will come; a second run would need a second bag."""
+        """Store the number of steps to expect; a second run would need a second bag."""
         if self._complete >= 0:
             self.get_logger().fatal(
-                "a new run was announced: expected a recorder of its own for every run, "
-                "and a ROS_DOMAIN_ID or a namespace of its own for each that flies at the same time"
+                "a new run was announced: expected one recorder per run, "
+                "and a separate ROS_DOMAIN_ID or namespace for simultaneous runs"
             )
             self.finish(1)
             return
@@ -115,11 +115,11 @@ class RecorderNode(PeerNode):
         self._nanoseconds_per_step = round(run.period * 1e9)
 
     def end_run(self, how: str) -> None:
-        """Say how the run ended, and what is left to do by hand."""
+        """Report how the run ended, and what remains to be done by the user."""
         self.get_logger().info(f"{how}{'; Ctrl-C closes the bag' if self._asks else ''}")
 
     def missing(self) -> list[str]:
-        """Wait for the links, then, of a run that nobody prepared, for the parameters of all nodes in it."""
+        """Wait for the links and, in a run started by hand, for the parameters of all its nodes."""
         missing = super().missing()
         if missing or self._run is None or not self._asks:
             return missing
@@ -209,7 +209,7 @@ class RecorderNode(PeerNode):
         self.bag.write(topic, self._now, data)
 
     def close(self) -> None:
-        """Write what has come of an unfinished step, and finish the bag."""
+        """Write the messages of an unfinished step, and finish the bag."""
         for stamp in sorted(self._pending):
             for topic in sorted(self._pending[stamp], key=self._order.index):
                 self.bag.write(topic, stamp, self._pending[stamp][topic])

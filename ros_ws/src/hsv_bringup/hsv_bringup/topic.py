@@ -27,6 +27,9 @@ DEPTH = 1000
 _PUBLISHED = tuple(node.publishes[0] for node in graph() if node.publishes)
 """A topic of every node."""
 
+_SUBSCRIBERS = {topic: sum(topic in node.subscribes for node in graph()) for topic in TOPICS}
+"""How many nodes of a whole graph subscribe each topic."""
+
 
 class Decoder:
     """Makes columns with units of the messages of a type, as its installed definition states them."""
@@ -89,11 +92,12 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
 
     def whole() -> bool:
         return bool(wanted and client.count_publishers(wanted)) or all(
-            set(client.subscribers_of(topic)) and client.publishers_of(topic) for topic in TOPICS
+            len(client.subscribers_of(topic)) >= count and client.publishers_of(topic)
+            for topic, count in _SUBSCRIBERS.items()
         )
 
     if not client.wait_for(found, "a node of the graph", _PUBLISHED):
-        raise RunError(f"no node of the graph in {client.where}: expected hsv run, or the nodes by hand, in this place")
+        raise RunError(f"no node of the graph in {client.where}: expected hsv run, or nodes started by hand there")
     client.settle(whole)
     return dict(client.get_topic_names_and_types())
 

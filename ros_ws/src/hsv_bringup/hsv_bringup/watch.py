@@ -39,7 +39,7 @@ def _watch(client: GraphClient, options: argparse.Namespace) -> None:
         client.create_subscription(message_class(TOPICS[topic]), topic, keep, LATEST)
     state = client.resolve_topic_name(STATE)
     if not client.wait_for(lambda: {STATE, NOMINAL, ACTUATOR} <= latest.keys(), f"a step on {state}", (STATE,)):
-        raise RunError(f"no run in {client.where}: expected hsv run, or the nodes by hand, in this place")
+        raise RunError(f"no run in {client.where}: expected hsv run, or nodes started by hand there")
     moves = sys.stdout.isatty() and not options.json
     shown = 0.0
     while client.wait_for(

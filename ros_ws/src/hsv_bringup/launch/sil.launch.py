@@ -124,7 +124,7 @@ class Flight:
             self._verdict = f"{self._run['bag']}: {self._failure or 'the flight was lost'}"
 
     def on_shutdown(self, _: Shutdown, __: LaunchContext) -> None:
-        """End with exit code 1 after a lost flight: launch does so after an exception, and tells its message."""
+        """End with exit code 1 after a lost flight: launch does so after an exception, and prints its message."""
         verdict, self._verdict = self._verdict, ""
         if verdict:
             raise RuntimeError(verdict)
@@ -191,7 +191,7 @@ def as_arguments(text: str) -> str:
 
 
 def remove_if_empty(bag: str) -> None:
-    """Remove the folder of a bag that no recorder has come to write to."""
+    """Remove the folder of a bag to which no recorder has written."""
     with suppress(OSError):
         Path(bag).rmdir()
 

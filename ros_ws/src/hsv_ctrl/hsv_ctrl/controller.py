@@ -28,7 +28,7 @@ class ControllerNode(BlockNode):
         if name in CONTROLLERS or name.startswith(NODE):
             node = f"node {name}" if name in CONTROLLERS else "node that it names"
             raise ParameterError(
-                f"parameter controller = {name!r}: expected a controller without a node of its own, the {node} flies it"
+                f"parameter controller = {name!r}: expected one that is not a separate node, the {node} flies it"
             )
         # It may look at whatever else is known of the flight: as far as this node is told, it has it, too.
         flight = {p.name: p for table in NODE_PARAMETERS.values() for p in table if given(self, p.name)}
@@ -43,5 +43,5 @@ class ControllerNode(BlockNode):
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Run the node of a controller of one's own."""
+    """Run the node of a custom controller."""
     return run_node(ControllerNode, CONTROLLER.name, args)

@@ -25,7 +25,7 @@ class NotchFilterNode(BlockNode):
         self.component = NotchFilter.from_parameters(declare(self, (*table, ESTIMATOR_ENABLED)))
 
     def stepped(self, signals: Signals) -> None:
-        """Tell that it goes on."""
+        """Report that the node continues."""
         if self.diagnosis_due(signals.header.stamp):
             self.diagnose(signals.header.stamp, step=signals.step)
 

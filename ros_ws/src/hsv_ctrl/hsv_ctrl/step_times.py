@@ -1,4 +1,4 @@
-"""How long the steps of a node take."""
+"""Statistics of the durations of a node's steps."""
 
 from __future__ import annotations
 

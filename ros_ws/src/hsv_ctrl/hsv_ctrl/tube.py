@@ -1,4 +1,4 @@
-"""What the nodes with a status of the tube have in common."""
+"""Common code of the nodes that publish the status of the tube."""
 
 from __future__ import annotations
 

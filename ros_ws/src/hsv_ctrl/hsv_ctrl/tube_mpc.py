@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
-from hsv.control.adjustable import TAU
 from hsv.control.coverage import uncovered_hardware
+from hsv.control.tube_factor import TAU
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight

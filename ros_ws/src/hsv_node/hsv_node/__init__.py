@@ -1,1 +1,1 @@
-"""What every node of the bench shares: lockstep links, parameters, message conversion, start and stop."""
+"""Shared code of all nodes of the bench: lockstep links, parameters, message conversion, start and stop."""

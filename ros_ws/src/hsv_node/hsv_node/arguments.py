@@ -1,4 +1,4 @@
-"""What stands on the command line of a node that ROS does not tell: which parameters are meant for several nodes."""
+"""Arguments of a node's command line that rclpy does not expose: which parameters are meant for several nodes."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def shared_parameters(words: Sequence[str], several: bool) -> frozenset[str]:
 
 
 def check_names(words: Sequence[str], several: bool) -> None:
-    """Check the names that the arguments of a process give to its nodes: ROS says what is wrong in several lines.
+    """Check the node names in the arguments of a process, because ROS reports errors in them in several lines.
 
     Args:
         words: The arguments.

@@ -19,7 +19,7 @@ class BlockNode(PeerNode):
     """Answers the messages of each step with those of its block, on the topics of its role."""
 
     component: Any
-    """What is stepped; set by the node."""
+    """The block that is stepped; set by the node."""
 
     def __init__(self, role: NodeDescription, task: str) -> None:
         super().__init__(role, task)
@@ -45,7 +45,7 @@ class BlockNode(PeerNode):
         """Called after each step; overridden to tell of it."""
 
     def on_message(self, topic: str, message: Any) -> None:
-        """Step as soon as all messages of a step are there."""
+        """Step as soon as all messages of a step have arrived."""
         given, delays = self._given, self._delays
         given[topic] = message
         step = message.step + delays[topic]

@@ -31,11 +31,11 @@ _CODES = {
     "float": "f",
     "double": "d",
 }
-"""What :mod:`struct` calls the numbers of the messages, by their names in rosidl."""
+"""Format character of :mod:`struct` for every number type, by its name in rosidl."""
 
 _LENGTH = "I"
 _LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-"""What CDR begins with; alignment counts from behind it."""
+"""Encapsulation header of CDR; alignment counts from its end."""
 
 _FIELD_TYPE = re.compile(r"(?:sequence<)?(?P<of>[\w/]+)(?:<\d+>)?(?:\[(?P<count>\d+)\])?(?:, \d+)?>?")
 """A type of a field as rosidl writes it."""
@@ -48,12 +48,12 @@ def codec(message_type: str) -> Codec:
 
 
 def plain_class(message_type: str) -> Callable[..., Any]:
-    """Return the class of the messages that the codec of a type takes: zeros and empty, but for what is given."""
+    """Return the message class for the codec of a type: zero and empty fields except for those given."""
     return codec(message_type).message
 
 
 class _Kind(Protocol):
-    """What a field can be, as expressions in Python: of such the functions of a codec are made."""
+    """A kind of field, as Python expressions from which the functions of a codec are generated."""
 
     def blank(self) -> Any:
         """Return it empty."""
@@ -162,7 +162,7 @@ def _text(value: str, lengths: list[int]) -> tuple[int, bytes]:
 
 
 class _Layout:
-    """Where everything is in a message whose texts and sequences have certain lengths.
+    """Offsets of all fields in a message whose texts and sequences have given lengths.
 
     ``length_at`` gives the length that stands at an offset. ``padding`` is what DDS sends behind the message; it is
     there without DDS, too, so that bags of nodes in one process have the same bytes.

@@ -31,13 +31,13 @@ FIRST_SAID_AFTER = 2.0
 """Seconds of waiting for peers before this is said."""
 
 SAID_EVERY = 10.0
-"""Seconds between saying the same thing again."""
+"""Seconds between repeated messages."""
 
 LINK_LOOK = 0.05
 """Seconds between looks at the links before they stand; each takes a millisecond from those that still start."""
 
 WARN_AFTER = 10.0
-"""Seconds after which whoever waits for all says it as a warning: slow, and going on."""
+"""Seconds after which a node that waits for all others logs a warning."""
 
 
 class LockstepNode(ProcessNode):
@@ -54,8 +54,8 @@ class LockstepNode(ProcessNode):
         """Join the graph.
 
         Args:
-            role: What the node is in the graph.
-            task: What its diagnostics tell of, in a word or two.
+            role: Role of the node in the graph.
+            task: Task named in its diagnostics, in a word or two.
         """
         super().__init__(role.name)
         self._task = task
@@ -78,7 +78,7 @@ class LockstepNode(ProcessNode):
         self._made = time.monotonic()
         self._says_next = self._made + FIRST_SAID_AFTER
         self._changed = ""
-        """Which parameter is being changed, and from which step on that acts."""
+        """Parameter that is being changed, and the step at which the change takes effect."""
         self._foreign = 0
         self._foreign_said = -SAID_EVERY
         self._links: dict[str, list[NodeDescription]] = {}
@@ -107,14 +107,14 @@ class LockstepNode(ProcessNode):
         self._inputs[topic] = self.create_subscription(message_class(kind), topic, taken, STEP, raw=True)
 
     def create_step_publisher(self, topic: str) -> Callable[[Any], None]:
-        """Return what publishes a message on a step topic of the graph description."""
+        """Return the function that publishes a message on a step topic of the graph description."""
         kind = description.TOPICS[topic]
         self._outputs[topic] = publisher = self.create_publisher(message_class(kind), topic, STEP)
         encode, publish = codec(kind).encode, publisher.publish
         return lambda message: publish(encode(message))
 
     def links_are_counted(self) -> bool:
-        """Tell whether as many are matched as there are links, which costs next to nothing; not who they are."""
+        """Return whether as many endpoints are matched as there are links: a fast check that does not identify them."""
         return all(self._matched(topic) >= len(roles) for topic, roles in self._links.items())
 
     def missing_links(self) -> list[str]:
@@ -161,7 +161,7 @@ class LockstepNode(ProcessNode):
         return full_name(*found) if found else None
 
     def say_waiting(self, missing: Callable[[], Sequence[str]], decides: bool = False) -> None:
-        """Log now and then for whom this node waits; in the end as a warning if its waiting ``decides`` the start."""
+        """Log from time to time for which nodes this one waits; as a warning if its waiting ``decides`` the start."""
         now = time.monotonic()
         if now < self._says_next:
             return
@@ -180,7 +180,7 @@ class LockstepNode(ProcessNode):
         )
 
     def say_foreign(self, topic: str, step: int, expected: int) -> None:
-        """Log now and then that messages come which nobody of this graph should send."""
+        """Log from time to time that messages arrive that no node of this graph should send."""
         self._foreign += 1
         now = time.monotonic()
         if now < self._foreign_said + SAID_EVERY:
@@ -193,7 +193,7 @@ class LockstepNode(ProcessNode):
         )
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Say in the result from which step on a change in flight acts, for whoever has asked for it."""
+        """Put into the result the step at which a change in flight takes effect."""
         self._changed = ""
         result = super().set_parameters_atomically(parameter_list)
         if result.successful:
@@ -201,7 +201,7 @@ class LockstepNode(ProcessNode):
         return result
 
     def say_change(self, words: str) -> None:
-        """Log what a change in flight is and from which step on it acts, and answer so to who has asked for it."""
+        """Log a change in flight and the step at which it takes effect, and send the same as the reply."""
         self._changed = words
         self.get_logger().info(words)
 
@@ -275,7 +275,7 @@ class PeerNode(LockstepNode):
         return self.missing_links()
 
     def poll(self) -> None:
-        """Announce this node as ready as soon as all its links are matched; until then say for whom it waits."""
+        """Announce this node as ready as soon as all its links are matched; until then log which peers it waits for."""
         if self._announced:
             return
         if self._run is not None and self.links_are_counted() and not self.missing():
@@ -286,7 +286,7 @@ class PeerNode(LockstepNode):
             self.say_waiting(lambda: self.missing() or [f"plant ({self._runs.topic_name})"])
 
     def wait_timeout(self) -> float:
-        """Look at the links more often until they stand."""
+        """Check the links more often until they are connected."""
         return 0.25 if self._announced else LINK_LOOK
 
     def _on_run(self, run: Run) -> None:
@@ -324,7 +324,7 @@ class PeerNode(LockstepNode):
 
 
 def short_id(run: Run) -> str:
-    """Return as much of the run's id as tells it from others, for people."""
+    """Return a prefix of the run's id that distinguishes it from others, for display."""
     return str(run.run_id[:8])
 
 

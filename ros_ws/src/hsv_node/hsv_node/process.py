@@ -36,7 +36,7 @@ class ProcessNode(Node):
         self._keep(claim_node(self.context.get_domain_id(), name), f"another node is called {name}", expected)
 
     def claim(self, topic: str, expected: str) -> None:
-        """Keep a topic to this node, before anything is published on it that could disturb another.
+        """Reserve a topic for this node, before anything is published on it that could disturb another.
 
         Raises:
             RunError: Another node of this machine has it; ``expected`` says what is due.

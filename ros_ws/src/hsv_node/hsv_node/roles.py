@@ -1,4 +1,4 @@
-"""Who plays which role of the graph: a node is known by what it publishes, whatever it and its topics are called."""
+"""Roles of the graph: a node is identified by what it publishes, whatever it and its topics are called."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:
 
 
 def full_name(name: str, namespace: str) -> str:
-    """Return name and namespace of a node in one; of an endpoint whose node is not known yet, that."""
+    """Return name and namespace of a node in one string; a placeholder for an endpoint whose node is not known yet."""
     if not namespace.startswith("/"):
         return "a node that just joins"
     return f"{namespace.rstrip('/')}/{name}"

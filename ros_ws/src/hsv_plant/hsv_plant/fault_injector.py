@@ -44,7 +44,7 @@ class FaultInjectorNode(BlockNode):
         self._due = 0
 
     def on_message(self, topic: str, message: Any) -> None:
-        """Step; in a run, another step or time than the one due ends it: what flies would be nobody's."""
+        """Step; in a run, a step or time other than the expected one ends it."""
         if self.exit_code is not None:
             return  # the run has ended, and why is said
         if self.announced is not None:

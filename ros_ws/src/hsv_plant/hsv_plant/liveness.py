@@ -10,12 +10,12 @@ from rclpy.client import Client
 from rclpy.task import Future
 
 from hsv.graph.description import NodeDescription
-from hsv.graph.progress import Standstill
+from hsv.graph.standstill import Standstill
 from hsv_node.lockstep import LockstepNode
 
 
 def unresponsive(node: LockstepNode, peers: Sequence[NodeDescription], wait: float = 2.0) -> list[str]:
-    """Return those of ``peers`` whose parameter service does not answer while no other does for ``wait`` (s).
+    """Return the ``peers`` whose parameter service does not answer while no other does for ``wait`` (s).
 
     Every node has that service, so that a hung process is told from one that only waits for somebody else.
     """

@@ -33,7 +33,7 @@ from hsv.graph.description import (
 )
 from hsv.graph.exchange import FILL, READ
 from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
-from hsv.graph.progress import Standstill
+from hsv.graph.standstill import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.plant import FlightStatus, Plant
@@ -86,7 +86,7 @@ class PlantNode(LockstepNode):
         self._announcer.publish(self._run)
         self._last_state = self.create_publisher(VehicleState, LAST_STATE, LATCHED)
         self._broken_off = ""
-        """By what, if it was."""
+        """Reason for which the run was aborted, if it was."""
         self._signals = Signals()
         self._advance()
         self._started = False
@@ -181,7 +181,7 @@ class PlantNode(LockstepNode):
             self.diagnose(stamp, step=signals.step, status=status.name)
 
     def poll(self) -> None:
-        """Start when everybody is ready, keep the pace, and name whoever is silent for too long."""
+        """Start when all nodes are ready, keep the pace, and name a node that is silent for too long."""
         if not self._started:
             self._try_start()
         else:
@@ -207,7 +207,7 @@ class PlantNode(LockstepNode):
         return min(max(self._delay(), 0.0), 0.25) if due else 0.25
 
     def stopped(self, signal_number: int) -> int:
-        """Say that the flight is incomplete, unless whoever watches it has ended it by Ctrl-C."""
+        """Report that the flight is incomplete, unless the user ended it by Ctrl-C."""
         self._broken_off = signal.Signals(signal_number).name
         return 0 if signal_number == signal.SIGINT else 128 + signal_number
 

@@ -23,9 +23,9 @@ class Cantilever:
     """
 
     length: float
-    """In metres."""
+    """Length in metres."""
     mass_per_length: float
-    """In kg/m."""
+    """Mass per length in kg/m."""
 
     def shape(self, distance: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Return the mode (kg^-0.5) at a distance (m, any shape) from the clamp, or its derivative (kg^-0.5/m^n)."""

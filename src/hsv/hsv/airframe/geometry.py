@@ -25,7 +25,7 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class Airframe:
-    """Lengths in metres, angles in radians; what each is stands in ``airframe.toml``."""
+    """Lengths in metres, angles in radians; ``airframe.toml`` explains each of them."""
 
     fore_body: float
     aft_body: float
@@ -44,9 +44,9 @@ class Airframe:
     exaggeration: float
     largest_exaggeration: float
     thrust_arm: float
-    """Of the thrust line, the middle of the engine, below the centre of gravity."""
+    """Distance of the thrust line, the middle of the engine, below the centre of gravity."""
     elevator_arm: float
-    """Of the elevator's lift behind the centre of gravity."""
+    """Distance of the elevator's lift behind the centre of gravity."""
     elevator_chord: float
 
     @property
@@ -100,7 +100,7 @@ class Airframe:
 
     @cached_property
     def elevator_hinge(self) -> Point:
-        """Where the elevator turns: its middle, half-way between upper and lower surface, (x, z)."""
+        """Axis of the elevator: its middle, half-way between upper and lower surface, (x, z)."""
         x = -self.elevator_arm
         return x, 0.5 * float(self.upper(x) + self.lower(x))
 

@@ -1,4 +1,4 @@
-"""Where the pieces of the bent airframe are: a chain of rigid segments whose joints lie on the bent beams.
+"""Poses of the pieces of the bent airframe: a chain of rigid segments whose joints lie on the bent beams.
 
 Frames are those of ROS: x forward, y to the left, z up. ``vehicle_carried`` moves with the centre of gravity and stays
 level; ``airframe`` is turned by the pitch angle, ``flight_path`` by the path angle. A segment's frame lies in its end
@@ -29,7 +29,7 @@ STEEPEST = 0.9
 
 
 class Sample(NamedTuple):
-    """What is drawn of a moment, SI: angles in rad, elastic coordinates in kg^0.5 m."""
+    """Quantities that are drawn at one time, SI: angles in rad, elastic coordinates in kg^0.5 m."""
 
     angle_of_attack: float
     pitch_angle: float

@@ -1,4 +1,4 @@
-"""What the side view of the pages is drawn from: outlines with the modes at each of their points, as plain data."""
+"""Data of the side view in the reports: outlines with the modes at each of their points, as plain data."""
 
 from __future__ import annotations
 

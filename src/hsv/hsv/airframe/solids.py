@@ -24,7 +24,7 @@ LABEL_HEIGHT, LABEL_SIZE = 5.0, 1.0
 """Metres: above the centre of gravity, and of a letter."""
 
 _FLAME_HEIGHTS = (0.85, 0.6, 0.3)
-"""Of the flame's pieces, in heights of the engine."""
+"""Heights of the flame's pieces, relative to the height of the engine."""
 _SUNK = 0.8
 """Metres by which the engine reaches into the body, so that no gap opens when the body bends."""
 
@@ -40,13 +40,13 @@ class Solid:
 
 
 def label(exaggeration: float | None = None) -> str:
-    """Return what is written over the vehicle; ``exaggeration`` as of :func:`hsv.airframe.pose.transforms`."""
+    """Return the text above the vehicle; ``exaggeration`` as in :func:`hsv.airframe.pose.transforms`."""
     return f"bending x {airframe().exaggeration if exaggeration is None else exaggeration:g}"
 
 
 @cache
 def solids() -> tuple[Solid, ...]:
-    """Return what the vehicle consists of."""
+    """Return the solids of the vehicle."""
     frame = airframe()
     found = []
     for name, stations in segments(frame).items():

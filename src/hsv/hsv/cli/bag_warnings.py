@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def print_bag_warnings(*bags: Bag) -> None:
-    """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is cut off."""
+    """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is truncated."""
     from hsv.recording.bag_warnings import bag_warnings
 
     for bag in {bag.path: bag for bag in bags}.values():

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 
 def bench(
-    only: Annotated[list[str] | None, typer.Option(help="Measure this group only; may be repeated.")] = None,
+    only: Annotated[list[str] | None, typer.Option(help="Measure only this group; can be repeated.")] = None,
     scale: Annotated[float, typer.Option(help="Factor on the number of repetitions.")] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Page whose table to replace, e.g. docs/benchmarks.md.")] = None,
     compare: Annotated[
-        Path | None, typer.Option(help="Say what became slower or faster since this run, kept by --json > FILE.")
+        Path | None, typer.Option(help="Report what became slower or faster since this run, saved with --json > FILE.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Measure this machine: every figure a ratio, both sides measured in turn; worse than promised is said plainly.
+    """Measure the performance of this machine, as ratios whose two sides are measured alternately.
 
-    Exit code 1 where something became slower since the run given to --compare.
+    With --compare, the exit code is 1 if anything became slower.
 
     Example: hsv bench --only in_process --only mcap
     """
@@ -43,7 +43,7 @@ def bench(
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
     if out and only:
-        raise QuantityError(f"out = {str(out)!r}: expected no --only with it, the page keeps the table of a whole run")
+        raise QuantityError(f"out = {str(out)!r}: expected no --only with it, the page has the table of a complete run")
     page = None
     if out:
         check_target(out, "out")
@@ -88,7 +88,7 @@ def bench(
 
 
 def _print(figures: list[Figure]) -> None:
-    """Print a figure a paragraph: a table of them all, which the page of the docs has, is wider than a terminal."""
+    """Print one paragraph per figure: the table of all figures, as in the documentation, is wider than a terminal."""
     from hsv.bench.page import cells
 
     for figure in figures:
@@ -103,7 +103,7 @@ def _print(figures: list[Figure]) -> None:
 
 
 def _print_changes(since: list[Change], commit: str, measured: int) -> None:
-    """Print what became slower or faster since a recorded run of a ``commit``, and of how many nothing can be said."""
+    """Print what became slower or faster since a recorded run of a ``commit``, and how many could not be compared."""
     console.print(Text(f"since {commit}", "bold"))
     for change in since:
         if change.slower:

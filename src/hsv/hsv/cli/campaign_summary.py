@@ -28,14 +28,14 @@ _LISTED = 5
 
 
 def announce(capacity: Capacity) -> None:
-    """Say what a campaign is going to take."""
+    """Print the expected size and duration of a campaign."""
     hours, minutes = divmod(capacity.wall_time / 60.0, 60.0)
     duration = f"{hours:.0f} h {minutes:.0f} min" if hours else f"{significant(capacity.wall_time, 2)} s"
     cores = "core" if capacity.cores == 1 else "cores"
     errors.print(
         f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration} "
         f"({significant(capacity.wall_time * capacity.cores / 3600.0, 2)} core hours), "
-        f"{significant(capacity.bytes / 1e6, 2)} MB on the disk"
+        f"{significant(capacity.bytes / 1e6, 2)} MB of disk space"
     )
 
 
@@ -115,7 +115,7 @@ def _print_tables(
     console.print(table)
     worst = [w for w in worst if w.limit]  # of a scenario without limits, those that ended early
     if worst:
-        console.print("worst flights, by what they use of their limits:")
+        console.print("worst flights, by the fraction of their limits that they use:")
     for w in worst:
         used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
         console.print(folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2), soft_wrap=True)

@@ -30,10 +30,11 @@ HALF_WIDTHS = {
 
 
 def certify(
-    file: Annotated[Path, typer.Argument(help="Parameter file of a design; its certificate lies beside it.")],
-    sensors: Annotated[str, typer.Option(help="Published sensors by name: their noise and bias.")] = "ideal",
+    file: Annotated[Path, typer.Argument(help="Parameter file of a design, with its certificate in the same folder.")],
+    sensors: Annotated[str, typer.Option(help="Published sensors by name, with their noise and bias.")] = "ideal",
     bias: Annotated[
-        list[str], typer.Option(help="Constant bias of a rigid state, as 'angle_of_attack=0.05 deg'; may be repeated.")
+        list[str],
+        typer.Option(help="Constant bias of a rigid state, e.g. 'angle_of_attack=0.05 deg'; can be repeated."),
     ] = [],  # noqa: B006
     actuators: Annotated[
         str,
@@ -57,11 +58,12 @@ def certify(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Say whether a design stays certified with hardware and air, and by how much; fails where it does not.
+    """Check whether a design remains certified with given hardware and air, and with which margin.
 
-    Each model is added to the disturbances of the certificate alone, and then all of them. The tube's invariant set is
-    sought anew, and the nominal plan has to fit into what it leaves of the inputs. Of actuators the last line says
-    whether their limits act in that set. Of a scenario it is also said what the certificate as it is does not cover.
+    Each model is added to the disturbances of the certificate separately, and then all together. A new invariant set is
+    computed, and the nominal trajectory must fit into the input bounds that remain. For actuators, the last line tells
+    whether their limits are reached in that set. For a scenario, everything that the certificate does not cover is
+    listed. The exit code is 1 if the design is not certified.
 
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
@@ -90,7 +92,7 @@ def certify(
         print_json({"design": subject.design.name, **found})
     else:
         for thing in uncovered:
-            console.print(folded(f"not covered as it is: {thing}"), soft_wrap=True)
+            console.print(folded(f"not covered by the certificate: {thing}"), soft_wrap=True)
         console.print(_table(verdicts, units))
         for verdict in verdicts:
             state = "certified" if verdict.certified else "not certified"

@@ -19,9 +19,9 @@ def check(
     ],
     json: JsonOption = False,
 ) -> None:
-    """Fly a controller twice, after a reset, from a copied state and under load, and compare every byte.
+    """Check that a controller is reproducible: fly it twice, after a reset, from a copied state and under load.
 
-    Exit code 1 if any differs: it is told what differs first, and from which step on.
+    Every byte is compared. On a difference, the first step and number that differ are printed, and the exit code is 1.
 
     Example: hsv check tube_mpc
     """

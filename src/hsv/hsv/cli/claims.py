@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 def claims(
-    out: Annotated[Path | None, typer.Option(help="Also write the page of all claims here, in Markdown.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Also write a page on all claims to this file, in Markdown.")] = None,
     flights: FlightsOption = Path("bags/study"),
     verbose: Annotated[bool, typer.Option("--verbose", help="Print quotes, readings and reasons, too.")] = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Measure every checkable statement of the paper, nominal and at all corners of the parameters, and judge it.
+    """Measure and judge every checkable claim of the paper, for the nominal vehicle and all corners of the parameters.
 
-    The first time takes some minutes: a dozen scenarios and more are flown by 1025 vehicles each. What was flown is
-    kept.
+    The first run takes several minutes: more than a dozen scenarios are flown with 1025 vehicles each. The flights are
+    stored and reused.
 
     Example: hsv claims --out docs/claims.md
     """
@@ -98,7 +98,7 @@ def _print_claims(judged: dict[str, list[Judged]], verbose: bool, units: UnitSys
             table.add_row(entry.claim.name, _shorter(entry.claim.location), _verdict(entry))
         console.print(table)
     if verbose:
-        console.print("* the statement itself; the others ask for the same under further conditions")
+        console.print("* the statement itself; the others ask for the same under other conditions")
     console.print(f"{tally(judged)}\n", style="bold")
 
 

@@ -14,13 +14,13 @@ from hsv.units import UnitSystem
 def conclude(
     bag: BagArgument,
     report: ReportOption = True,
-    failure: Annotated[str, typer.Option(help="What a process failed with: then this is the verdict.")] = "",
+    failure: Annotated[str, typer.Option(help="Error message of a process that failed; it becomes the verdict.")] = "",
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Conclude a flight whose nodes have ended: close its bag, print the summary, write the report, give the verdict.
+    """Conclude a flight whose nodes have exited: close its bag, print summary and verdict, and write the report.
 
-    What a launch file calls in the end, as hsv prepare in the beginning; hsv run does both by itself.
+    Launch files call this after the nodes, and hsv prepare before them; hsv run does both by itself.
 
     Example: hsv conclude bags/case1_20260101T000000Z
     """
@@ -56,7 +56,7 @@ def conclude_flight(bag: Path, *, report: bool, units: UnitSystem, json: bool, w
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:
         raise RecordingError(
-            f"{bag}: holds no scenario, as of a graph flown by hand: hsv info and hsv report tell of it"
+            f"{bag}: has no scenario, like every bag of a graph started by hand: use hsv info and hsv report"
         )
     data = flight_data(recorded)
     files = {"bag": bag}

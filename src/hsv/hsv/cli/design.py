@@ -27,23 +27,24 @@ def design(
     out: Annotated[
         Path | None, typer.Option(help="Parameter file to write; default: NAME.yaml in this folder.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over files that exist.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
     compare_sets: Annotated[
-        bool, typer.Option("--compare-sets", help="Also compute the set in the other ways, and print a table.")
+        bool, typer.Option("--compare-sets", help="Also compute the set by the other methods, and print a table.")
     ] = False,
     tau: Annotated[
         str, typer.Option(help="Adjustable factor in place of the input's: one number, or five with commas between.")
     ] = "",
     check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; compare with the parameter file beside the input.")
+        bool, typer.Option("--check", help="Write nothing; compare with the parameter file in the folder of the input.")
     ] = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Compute a controller offline, with its tube; write its parameter file and, beside it, its certificate.
+    """Compute a controller with its tube offline, and write its parameter file and its certificate.
 
-    Both are written to the current folder, or where --out says; files that exist are kept unless --force is given.
-    --check fails, with the entry that is farthest off, where the design does not come out as it was shipped.
+    Both are written to the current folder or to --out; existing files are not overwritten unless --force is given. With
+    --check, the design is compared with the shipped one; on a difference the largest deviation is printed and the exit
+    code is 1.
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
@@ -58,14 +59,14 @@ def design(
         inputs = with_tau(inputs, _factors(tau))
     if check:
         if out or force or tau or compare_sets:
-            raise ParameterError("check: --out, --force, --tau or --compare-sets given, too, expected --check alone")
+            raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
         _check(source, inputs, json)
         return
     target = out or Path(f"{source.stem}.yaml")
     for path in (target, certificate_path(target)):
         check_target(path, "out")
         if path.exists() and not force:
-            raise ParameterError(f"out = {str(path)!r}: exists, expected a new file, or --force to write over it")
+            raise ParameterError(f"out = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
     result = _computed(inputs)
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
     with writing(target, "out"):
@@ -123,7 +124,7 @@ def _factors(text: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError as error:
-        raise DesignError(f"tau = {text!r}: expected one number, or five with commas between") from error
+        raise DesignError(f"tau = {text!r}: expected one number, or five separated by commas") from error
 
 
 def _summary(report: dict[str, Any]) -> None:
@@ -142,7 +143,7 @@ def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
     """Return the seven steps of Algorithm 1 with what came of each."""
     import numpy as np
 
-    from hsv.control.adjustable import compact
+    from hsv.control.tube_factor import compact
     from hsv.vehicle.dynamics import STATE_UNITS
 
     feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]

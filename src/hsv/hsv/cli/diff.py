@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 def diff(
     first: BagArgument,
     second: BagArgument,
-    tolerance: Annotated[float, typer.Option(help="Absolute and relative at once; 0: every bit counts.")] = 0.0,
+    tolerance: Annotated[float, typer.Option(help="Absolute and relative tolerance; 0: compare every bit.")] = 0.0,
     json: JsonOption = False,
 ) -> None:
-    """Compare two bags step by step: where they part first, and the largest difference of every field.
+    """Compare two bags step by step: print the first difference, and the largest difference of every field.
 
-    Exit code 0 if all step topics are equal, 1 if not, or if one bag lacks a topic of the other.
+    The exit code is 0 if all step topics are equal, and 1 if not, or if a topic is missing in one of the bags.
 
     Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
     """
@@ -76,11 +76,11 @@ def _print(compared: list[Comparison], earliest: Difference | None) -> None:
     if earliest is None:
         count = sum(c.actual_count for c in compared)
         padding = sum(c.different_padding for c in compared)
-        identical = f"identical{f' in every byte but the padding of {padding}' if padding else ''}"
+        identical = f"identical{f' in every byte except the padding of {padding}' if padding else ''}"
         same = identical if all(c.identical for c in compared) else "equal within the tolerance"
         console.print(f"{count} messages: {same}", soft_wrap=True)
     else:
-        console.print(folded(f"they part at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"), soft_wrap=True)
+        console.print(folded(f"first difference at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"), soft_wrap=True)
         common = sum(c.common_count for c in compared)
         if common < max(sum(c.expected_count for c in compared), sum(c.actual_count for c in compared)):
             equal = not any(c.largest for c in compared)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
+
+from hsv.cli.interruption import take_interrupts
 
 
 def main() -> None:
-    """Run the command line; interrupted while it is imported it ends with one line, as later on."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    """Run the command line; interrupted before it begins it ends with one line, as later on."""
     try:
-        # The script may have been started with it blocked.
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
+        # The whole command: asked to end, it ends its processes and removes its temporary files as after Ctrl-C.
+        take_interrupts()
         from hsv.cli.main import main as command_line
+
+        command_line()
     except KeyboardInterrupt:
         print("hsv: error: interrupted", file=sys.stderr, flush=True)
         os._exit(130)
-    command_line()

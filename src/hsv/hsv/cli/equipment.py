@@ -17,7 +17,7 @@ def equipment(
     units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
-    """List the published sets of actuators and sensors that a scenario may name, or print the numbers of one.
+    """List the published sets of actuators and sensors that a scenario can name, or print the numbers of one.
 
     Example: hsv equipment elevator_50 --units paper
     """

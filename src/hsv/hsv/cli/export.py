@@ -19,20 +19,23 @@ def export(
     npz: Annotated[bool, typer.Option("--npz", help="One .npz file.")] = False,
     scene: Annotated[
         bool,
-        typer.Option("--scene", help="One MCAP file: the bag, with the vehicle in 3-D for Foxglove and Lichtblick."),
+        typer.Option(
+            "--scene", help="One MCAP file: a copy of the bag with the vehicle in 3-D, for Foxglove and Lichtblick."
+        ),
     ] = False,
     exaggeration: Annotated[
         float | None, typer.Option(help="Factor on the bending in the scene; default: that of docs/airframe.md.")
     ] = None,
     topic: Annotated[
-        list[str] | None, typer.Option(help="Topic to export, may be repeated; default: all with one message a step.")
+        list[str] | None,
+        typer.Option(help="Topic to export, can be repeated; default: all topics with one message per step."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="What to write; default: in the bag's folder, named after the format.")
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write the topics of a bag as tables with field names and units in the header (SI), or the bag with pictures.
+    """Write the topics of a bag as tables with field names and units (SI) in the header, or add a 3-D scene to the bag.
 
     Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
     """

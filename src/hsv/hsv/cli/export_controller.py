@@ -14,10 +14,10 @@ from hsv.cli.targets import check_folder, writing
 
 def export_controller(
     design: Annotated[str, typer.Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
-    out: Annotated[Path, typer.Option(help="Folder for controller.c and hsv_block.h: a new one, or one with these.")],
+    out: Annotated[Path, typer.Option(help="Folder for controller.c and hsv_block.h; new, or with these files only.")],
     json: JsonOption = False,
 ) -> None:
-    """Write notch filter, nominal trajectory and tube law of a design as one C99 file; print what a step takes at most.
+    """Write the notch filter, nominal trajectory and tube law of a design as a C99 file; print the cost of a step.
 
     Example: hsv export-controller baseline --out controller
     """

@@ -11,7 +11,7 @@ from hsv.cli.options import GraphNamespaceOption, JsonOption
 
 fault = typer.Typer(
     no_args_is_help=True,
-    help="""Inject, clear and list faults in a flight that is on its way, whoever has started it.
+    help="""Inject, clear and list faults in a running flight, no matter how it was started.
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8""",
 )
@@ -23,15 +23,15 @@ def inject(
     type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
     parameters: Annotated[
         list[str] | None,
-        typer.Argument(help="Parameters of the type, e.g. 'amplitude=1 deg' 'frequency=2 Hz'; an only one as 0.8."),
+        typer.Argument(help="Parameters of the type, e.g. 'amplitude=1 deg' 'frequency=2 Hz'; a single one as 0.8."),
     ] = None,
     duration: Annotated[
-        str, typer.Option(help="Simulated time after which it ends, such as '5 s'; default: until it is cleared.")
+        str, typer.Option(help="Simulated time after which the fault ends, e.g. '5 s'; default: until it is cleared.")
     ] = "0 s",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Begin a fault with the next step that is not flown yet; the answer says which one. hsv faults lists the types.
+    """Start a fault at the next step that is not flown yet, and print this step. hsv faults lists the types.
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
@@ -51,7 +51,7 @@ def clear(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """End the faults of a channel, or of all, with the next step that is not flown yet.
+    """End the faults of one channel or of all channels at the next step that is not flown yet.
 
     Example: hsv fault clear elevator_deflection
     """
@@ -60,7 +60,7 @@ def clear(
 
 @fault.command(name="list")
 def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> None:
-    """Show which faults act now.
+    """List the active faults.
 
     Example: hsv fault list --json
     """

@@ -13,15 +13,16 @@ from hsv.cli.targets import check_folder
 
 
 def figures(
-    only: Annotated[list[int] | None, typer.Option(help="Draw this figure of the paper; may be repeated.")] = None,
+    only: Annotated[list[int] | None, typer.Option(help="Draw only this figure of the paper; can be repeated.")] = None,
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of each figure.")] = Path("figures"),
     flights: FlightsOption = Path("bags/study"),
     json: JsonOption = False,
 ) -> None:
-    """Draw the paper's figures from this project's designs and flights, to be laid beside the paper's.
+    """Draw the paper's figures from this project's designs and flights, for comparison with the paper's.
 
-    The flights are runs of the graph, recorded to bags that are kept and found again while nothing that they depend on
-    changes, the nodes and their messages included. Without the nodes they are flown in this process: the same numbers.
+    The flights are runs of the graph, recorded to bags. The bags are reused as long as nothing they depend on changes,
+    including the nodes and their messages. Without the nodes, the flights are computed in this process, with the same
+    numbers.
 
     Example: hsv figures --only 9 --only 11 --out figures
     """
@@ -43,7 +44,7 @@ def figures(
     check_folder(flights, "flights")
     graph = graph_is_there()
     if not graph and any(figure.scenarios for figure in chosen):
-        errors.print("no built ROS workspace is sourced: flown in this process, the same numbers bit for bit")
+        errors.print("no built ROS workspace is sourced: flown in this process, with the same numbers bit for bit")
     out.mkdir(parents=True, exist_ok=True)
     written = []
     with stages() as progress, matplotlib.rc_context(RC):

@@ -18,15 +18,15 @@ def govern(
     blend: Annotated[
         str, typer.Option(help="Half the time in which climb rate and acceleration change at a corner.")
     ] = "2 s",
-    out: Annotated[Path | None, typer.Option(help="Scenario file to write, which flies the reference.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Write over a file that exists.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Scenario file to write, with the reference.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Turn the commands of a scenario into the fastest jerk-limited reference that its design has room for.
+    """Turn the commands of a scenario into the fastest jerk-limited reference that its design permits.
 
-    Steps, ramps and lists of points become ramps along climbing, accelerating trims, with blended corners, as short as
-    the nominal plan stays inside U minus F Z and within the rates of the actuators in every step.
+    Steps, ramps and lists of points become ramps along climbing, accelerating trims with blended corners. They are as
+    short as possible while the nominal trajectory stays inside U minus F Z and within the rate limits of the actuators.
 
     Example: hsv govern case1 --blend "2 s" --out governed.toml
     """
@@ -38,7 +38,7 @@ def govern(
     if out:
         check_target(out, "out")
         if out.exists() and not force:
-            raise ParameterError(f"out = {str(out)!r}: exists, expected a new file, or --force to write over it")
+            raise ParameterError(f"out = {str(out)!r}: exists, expected a new file, or --force to overwrite it")
     found = governed(scenario, parse_quantity(blend, "s", "blend"))
     if out:
         with writing(out, "out"):
@@ -69,7 +69,7 @@ def govern(
     for t, h, v in rows:
         corners.add_row(f"{t:g} s", in_words(h, "m", units), in_words(v, "m/s", units))
     console.print(corners)
-    console.print(f"corners blended over {reference.blend:g} s to either side; at rest from {reference.end:g} s on")
+    console.print(f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on")
     heads = ("least", "largest", "lower bound", "upper bound", "largest step in a period")
     table = new_table("nominal input", *heads, right=heads)
     for (name, values), unit in zip(inputs.items(), INPUT_UNITS, strict=True):

@@ -27,7 +27,9 @@ def info(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """What bags hold: duration, topics, scenario, design, faults, metrics. With --json: of several, a list.
+    """Show the contents of bags: duration, topics, scenario, design, faults, metrics.
+
+    With --json, several bags are printed as a list.
 
     Example: hsv info bags/case1_20260101T000000Z
     """
@@ -140,7 +142,7 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
             ),
         ),
     }
-    ends = {"effectors": " from where they were told to be"}
+    ends = {"effectors": " from the commanded position"}
     return {key: f"{head}{text}{ends.get(key, '')}" for key, (head, text) in lines.items() if text}
 
 
@@ -165,9 +167,9 @@ def _tube(tube: dict[str, Any] | None) -> str:
         f"largest level {tube['largest_level']:.3g}, {tube['outside_steps']} of {tube['checked_steps']} steps outside"
     )
     if tube["uncertified_steps"]:
-        text += ", vehicle outside the set that it is certified for"
+        text += ", for a vehicle that the design is not certified for"
     if tube["uncertified_hardware_steps"]:
-        text += ", hardware or air that it is not certified for"
+        text += ", with hardware or air that the design is not certified for"
     excursions = tube["excursions"]
     shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
     more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""

@@ -49,7 +49,7 @@ def linearise(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Jacobians A, B and poles at a trim point (paper eq. 6 to eq. 9; of the ECM eq. 40 to eq. 43).
+    """Compute the Jacobians A, B and the poles at a trim point (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43).
 
     Example: hsv linearise --coupling derived --model ECM
     """
@@ -67,7 +67,7 @@ def linearise(
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
     if reading and model != "ECM":
-        raise QuantityError(f"reading = {reading!r}: expected with model ECM, where eq. 40 is read")
+        raise QuantityError(f"reading = {reading!r}: expected with model ECM only")
     reading = reading or READINGS[0]
     if reading not in READINGS:
         raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
@@ -112,7 +112,7 @@ def linearise(
         print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", names, columns, cells)
     console.print(_poles("Poles", poles))
     if difference:
-        console.print(_poles("Poles of the other reading of eq. 40", difference))
+        console.print(_poles("Poles for the other reading of eq. 40", difference))
 
 
 def _pole(mode: Mode) -> dict[str, float]:

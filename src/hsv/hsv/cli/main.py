@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from contextlib import suppress
 from typing import Annotated, Any
@@ -22,6 +21,7 @@ from hsv.cli.diff import diff
 from hsv.cli.equipment import equipment
 from hsv.cli.export import export
 from hsv.cli.export_controller import export_controller
+from hsv.cli.extras import missing_extra
 from hsv.cli.fault import fault
 from hsv.cli.faults import faults
 from hsv.cli.figures import figures
@@ -55,14 +55,14 @@ _INTERRUPTED = 130
 
 EXIT_CODES = {
     0: "done",
-    1: "it failed, or found what it looks for: a flight lost, a claim or comparison that does not hold",
+    1: "failed, or the result is negative: a flight lost, a claim or comparison that does not hold",
     2: "refused: bad input, or a file that cannot be read or written",
     _INTERRUPTED: "interrupted",
 }
-"""What each exit code of the command means."""
+"""Meaning of each exit code of the command."""
 
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
-"""Of an unknown option, a missing argument and the like; typer exports only this subclass of it."""
+"""Error for an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
 app = typer.Typer(
     name="hsv",
@@ -83,7 +83,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version, and end.")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."""
@@ -132,8 +132,6 @@ app.add_typer(fault, name="fault")
 
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
-    # Asked to end, a command ends its processes and removes its temporary files as after Ctrl-C.
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     if "_HSV_COMPLETE" in os.environ:
         completion_init()  # a shell asks for the words that may come next
     try:
@@ -155,10 +153,9 @@ def main() -> None:
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
     except ImportError as error:
-        # Interrupted while it starts, a compiled module says that it has failed to.
-        if not isinstance(error.__cause__, KeyboardInterrupt):
-            raise
-        _fail("interrupted", _INTERRUPTED)
+        if extra := missing_extra(error):
+            _fail(f"needs hsv[{extra}]: pip install 'hsv[{extra}]'", 2)
+        raise
     except BrokenPipeError:
         _end(1)  # Nobody reads any more: no more words either, as of click and rich.
     except OSError as error:

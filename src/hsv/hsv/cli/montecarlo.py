@@ -29,7 +29,7 @@ _SAMPLES = 1000
 
 
 class Sampling(StrEnum):
-    """How samples are drawn."""
+    """Sampling methods."""
 
     uniform = "uniform"
     latin_hypercube = "latin_hypercube"
@@ -41,7 +41,7 @@ montecarlo = typer.Typer(
     no_args_is_help=True,
     help="""Fly a scenario many times with uncertain parameters; each flight can be repeated alone, bit for bit.
 
-    Without the word fly it is meant: hsv montecarlo case1 is hsv montecarlo fly case1.
+    The word fly can be omitted: hsv montecarlo case1 is the same as hsv montecarlo fly case1.
 
     Example: hsv montecarlo case1 --corners""",
 )
@@ -55,7 +55,9 @@ def fly(
     samples: Annotated[int | None, typer.Option(help=f"Number of flights; default: {_SAMPLES}.")] = None,
     seed: Annotated[int, typer.Option(help="Determines all samples.")] = 1,
     sampling: Annotated[Sampling | None, typer.Option(help="How samples are drawn; default: uniform.")] = None,
-    corners: Annotated[bool, typer.Option("--corners", help="All combinations of least and largest value.")] = False,
+    corners: Annotated[
+        bool, typer.Option("--corners", help="Fly all combinations of smallest and largest values.")
+    ] = False,
     scale: Annotated[float, typer.Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
     factor: Annotated[
         list[str] | None,
@@ -64,15 +66,17 @@ def fly(
     out: Annotated[Path | None, typer.Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    restart: Annotated[bool, typer.Option("--restart", help="Throw away what is there and begin anew.")] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Discard existing results and start from the beginning.")
+    ] = False,
     page: Annotated[bool, typer.Option(help="Write the page of the results beside them.")] = True,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Fly a campaign. Interrupted, the same command goes on where it was left.
+    """Fly a campaign. After an interruption, the same command continues where it stopped.
 
-    A flight that its controller crashes is recorded with the reason, and the others are flown. Exit code 1 where every
-    flight crashed.
+    A flight whose controller crashes is recorded with the reason, and the campaign continues. The exit code is 1 if
+    every flight crashed.
 
     Example: hsv montecarlo fly case1 --samples 1000 --seed 7 --factor "fault[0].start=90 s..110 s"
     """
@@ -92,7 +96,7 @@ def fly(
     given = {"sampling": sampling, "samples": samples}
     for name, value in given.items():
         if corners and value is not None:
-            raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which says what is flown")
+            raise CampaignError(f"{name} = {value}: expected no --{name} with --corners, which defines the flights")
     method = "corners" if corners else (sampling or Sampling.uniform).value
     factors = dict(map(_factor, factor or ()))
     count = _SAMPLES if samples is None else samples
@@ -135,7 +139,7 @@ def summary(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Show the results of a campaign again.
+    """Show the results of a finished campaign.
 
     Example: hsv montecarlo summary campaigns/case1_corners.parquet --units paper
     """
@@ -155,7 +159,7 @@ def replay(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Fly one flight of a campaign again, alone, and compare every outcome bit for bit.
+    """Repeat a single flight of a campaign, and compare all its results bit for bit.
 
     Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
     """
@@ -168,7 +172,7 @@ def replay(
     from hsv.errors import CampaignError, RunError
 
     if bag and not over_dds:
-        raise CampaignError(f"bag = {str(bag)!r}: expected with --over-dds, nothing else is recorded")
+        raise CampaignError(f"bag = {str(bag)!r}: expected with --over-dds only")
     results = Results(result, trust=trust)
     if over_dds:
         target = bag or Path("bags", f"{result.stem}_flight_{flight}")
@@ -221,11 +225,11 @@ def scenario(
     result: ResultArgument,
     flight: Annotated[int, typer.Option(help="Number of the flight.")],
     design: Annotated[
-        Path | None, typer.Option(help="Also write the design that was flown to this file (.yaml), and name it.")
+        Path | None, typer.Option(help="Also write the design that was flown to this file (.yaml), and refer to it.")
     ] = None,
     trust: TrustOption = False,
 ) -> None:
-    """Print the scenario of one flight of a campaign: a file to fly by itself, with the same fingerprint.
+    """Print the scenario of a single flight of a campaign; flown by itself it has the same fingerprint.
 
     Example: hsv montecarlo scenario campaigns/case1_corners.parquet --flight 17 > worst.toml
     """

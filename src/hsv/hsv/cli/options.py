@@ -13,8 +13,8 @@ from hsv.units import UnitSystem
 GraphNamespaceOption = Annotated[
     str, typer.Option("--namespace", help="ROS namespace of the graph, such as /veh1; default: none.")
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every key carries its unit.")]
-ListJsonOption = Annotated[bool, typer.Option("--json", help="Print JSON; every number has its unit beside it.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with the unit in every key.")]
+ListJsonOption = Annotated[bool, typer.Option("--json", help="Print JSON, with a unit for every number.")]
 UnitsOption = Annotated[
     UnitSystem, typer.Option(help="Units: SI with degrees and percent, strict SI, or the paper's ft, ft/s, deg.")
 ]
@@ -35,7 +35,7 @@ RealTimeFactorOption = Annotated[
     typer.Option(help="Pace: 1 is real time, 0 as fast as possible; default: 0, with --live 1.", show_default=False),
 ]
 LiveOption = Annotated[
-    bool, typer.Option("--live", help="Show the flight while it is flown: a page for the browser, and Foxglove.")
+    bool, typer.Option("--live", help="Show the flight live, on a page in the browser and in Foxglove.")
 ]
 LivePortOption = Annotated[
     int | None,
@@ -50,24 +50,27 @@ StepTimeoutOption = Annotated[
 ]
 NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
 ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]
-ExternalOption = Annotated[
-    bool, typer.Option("--external", help="Wait for a controller that is started by hand, any node of yours.")
-]
+ExternalOption = Annotated[bool, typer.Option("--external", help="Wait for a controller node that you start by hand.")]
 NamespaceOption = Annotated[
     str, typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain.")
 ]
 ReportOption = Annotated[bool, typer.Option(help="Write the report into the bag's folder.")]
 BagArgument = Annotated[Path, typer.Argument(help="Bag directory, or its .mcap file.")]
 SuppliedDesignOption = Annotated[
-    Path | None, typer.Option("--design", help="Design YAML that the flight had, for a bag without attachments.")
+    Path | None, typer.Option("--design", help="Design YAML file of the flight, for a bag without attachments.")
 ]
 SuppliedScenarioOption = Annotated[
-    str | None, typer.Option("--scenario", help="Scenario (name or TOML file) flown, for a bag without attachments.")
+    str | None,
+    typer.Option("--scenario", help="Scenario (name or TOML file) of the flight, for a bag without attachments."),
 ]
-TrustOption = Annotated[bool, typer.Option("--trust", help="Run code that the file names, as a controller's class.")]
-FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are kept and found again.")]
-WorkersOption = Annotated[int, typer.Option(help="Processes of this machine; 0: one a processor, 1: this one.")]
-SchedulerOption = Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers fly instead.")]
+TrustOption = Annotated[
+    bool, typer.Option("--trust", help="Allow running code that the file names, such as a controller class.")
+]
+FlightsOption = Annotated[Path, typer.Option(help="Folder in which the study's flights are stored and reused.")]
+WorkersOption = Annotated[
+    int, typer.Option(help="Number of processes on this machine; 0: one per processor, 1: fly in this process.")
+]
+SchedulerOption = Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers are used instead.")]
 
 
 def live_port_of(live: bool, port: int | None) -> int | None:
@@ -77,5 +80,5 @@ def live_port_of(live: bool, port: int | None) -> int | None:
         ParameterError: A port is given for no live view.
     """
     if port is not None and not live:
-        raise ParameterError(f"live-port = {port}: expected with --live, nothing listens without")
+        raise ParameterError(f"live-port = {port}: expected with --live only")
     return (8765 if port is None else port) if live else None

@@ -25,7 +25,7 @@ class _Terminal(Console):
     """A console on which a text is only text, whatever a file or a node has in it."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Yield what is to be printed, as of the base class, with control characters made visible."""
+        """Yield the output of the base class, with control characters made visible."""
         for segment in super().render(renderable, options):
             text = segment.text if segment.control else segment.text.translate(_UNPRINTABLE)
             yield Segment(text, segment.style, segment.control)
@@ -37,12 +37,12 @@ errors = _Terminal(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 class Interrupted(Exception):  # noqa: N818 - what the user did is no error
-    """Ctrl-C in long work; the message says how it goes on."""
+    """Ctrl-C in a long computation; the message says how to continue."""
 
 
 @contextmanager
 def resumable(folder: Path) -> Iterator[None]:
-    """Say after Ctrl-C, in one line, that what is finished is kept in ``folder``.
+    """Report after Ctrl-C, in one line, that finished results are stored in ``folder``.
 
     Raises:
         Interrupted: After Ctrl-C.
@@ -51,7 +51,7 @@ def resumable(folder: Path) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         raise Interrupted(
-            f"interrupted; what is finished is in {folder}, the same command goes on from there"
+            f"interrupted; finished results are in {folder}, the same command continues from there"
         ) from None
 
 
@@ -79,7 +79,7 @@ UNIT_KEYS = {
     "slug^0.5 ft": "sqrt_slug_ft",
     "slug^0.5 ft/s": "sqrt_slug_ft_per_s",
 }
-"""How a unit is spelled at the end of a JSON key."""
+"""Spelling of units at the end of JSON keys."""
 
 Quantity = tuple[float, str]
 """A number and its SI unit."""
@@ -110,7 +110,7 @@ def report_error(problem: object) -> None:
 
 
 def report_line(node: str, text: str) -> None:
-    """Print on standard error what a node said."""
+    """Print a log line of a node on standard error."""
     errors.print(Text.assemble((f"{node}:", "dim"), f" {text}"), soft_wrap=True)
 
 
@@ -143,7 +143,7 @@ def folded(text: str, indent: int = 0, first: int = 0) -> str:
     """Return ``text`` as lines no wider than the terminal, or 80 columns, folded between words, which stay whole.
 
     Args:
-        text: What to fold.
+        text: Text to fold.
         indent: Spaces before each line.
         first: Spaces before the first line.
     """
@@ -161,7 +161,7 @@ def new_table(*headings: str, title: str = "", right: Collection[str] = (), head
     """Return an empty table as all commands print it: without lines, folded between words to the terminal's width.
 
     Args:
-        headings: Of the columns.
+        headings: Headings of the columns.
         title: Above the table.
         right: Headings of the columns that stand at the right and are not folded, as numbers do.
         head: Whether the headings are shown.
@@ -203,13 +203,13 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
 def print_matrix(
     title: str, rows: Sequence[str], columns: Sequence[str], cells: Sequence[Sequence[RenderableType]]
 ) -> None:
-    """Print a matrix, with as many columns beside each other as fit on the terminal; names fold at their underscores.
+    """Print a matrix with as many columns side by side as fit on the terminal; names fold at their underscores.
 
     Args:
         title: Above the matrix.
         rows: Names of the rows.
         columns: Names of the columns.
-        cells: By row.
+        cells: Cells by row.
     """
     label = max(map(len, rows))
     count = max(1, (console.width - label) // _COLUMN)
@@ -235,7 +235,7 @@ def quantity_table(
     rows: Sequence[tuple[str, list[float] | None]],
     units: UnitSystem,
 ) -> Table:
-    """Return a table of quantities, a row a thing, the unit of each column below its heading.
+    """Return a table of quantities with one row per item and the unit of each column below its heading.
 
     Args:
         title: Above the table.

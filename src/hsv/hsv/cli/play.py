@@ -12,14 +12,14 @@ from hsv.cli.options import BagArgument
 
 def play(
     bag: BagArgument,
-    rate: Annotated[float, typer.Option(help="Pace: 1 as recorded, 10 ten times as fast.")] = 1.0,
-    topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, may be repeated; default: all.")] = None,
+    rate: Annotated[float, typer.Option(help="Pace: 1 is as recorded, 10 ten times as fast.")] = 1.0,
+    topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, can be repeated; default: all.")] = None,
     clock: Annotated[bool, typer.Option(help="Publish the clock.")] = True,
     paused: Annotated[
-        bool, typer.Option("--paused", help="Begin paused; the services /player/step and /player/resume go on.")
+        bool, typer.Option("--paused", help="Start paused; continue with the services /player/step and /player/resume.")
     ] = False,
     namespace: Annotated[str, typer.Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
-    delay: Annotated[float, typer.Option(help="Wall time (s) for listeners to find the player.")] = 1.0,
+    delay: Annotated[float, typer.Option(help="Wall time (s) that subscribers get to discover the player.")] = 1.0,
 ) -> None:
     """Republish a bag over DDS, for a viewer or a node under test.
 

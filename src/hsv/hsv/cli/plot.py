@@ -15,7 +15,7 @@ from hsv.units import UnitSystem
 
 
 def plot(
-    bags: Annotated[list[Path], typer.Argument(help="Bags to lay over one another.")],
+    bags: Annotated[list[Path], typer.Argument(help="Bags to plot together.")],
     out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,

@@ -38,10 +38,10 @@ def prepare(
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Prepare a flight for another launcher: check the scenario, make the bag, write the parameter files.
+    """Prepare a flight for another launcher: check the scenario, create the bag, write the parameter files.
 
-    Prints which nodes to start, with which parameter files. Whoever starts them removes the folder of these files in
-    the end, and calls hsv conclude; hsv run does both by itself.
+    The nodes to start and their parameter files are printed. After the flight, the launcher must remove the folder of
+    these files and call hsv conclude; hsv run does both by itself.
 
     Example: hsv prepare case1 --json
     """

@@ -47,7 +47,7 @@ class FlightLine:
         self._task = bar.add_task(title, total=steps, note="starting the nodes")
 
     def step(self, number: int) -> None:
-        """Show that a step is flown."""
+        """Show that a step has been flown."""
         self._bar.update(self._task, completed=number)
 
     def snapshot(self, snapshot: Snapshot) -> None:
@@ -69,7 +69,7 @@ def flight(title: str, steps: int, units: UnitSystem = UnitSystem.metric) -> Ite
 
 @contextmanager
 def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
-    """Yield a callback (flights finished) that shows flights a second and the time that is left."""
+    """Yield a callback (flights finished) that shows flights per second and the remaining time."""
     import time
 
     with _bar() as bar:

@@ -14,13 +14,14 @@ from hsv.cli.output import console, print_json
 def recover(
     bag: BagArgument,
     out: Annotated[
-        Path | None, typer.Option(help="Bag to write; default: beside the old one, with _recovered at its name.")
+        Path | None,
+        typer.Option(help="Bag to write; default: next to the old one, with _recovered appended to its name."),
     ] = None,
     json: JsonOption = False,
 ) -> None:
-    """Write a new bag of everything that is whole in one that is cut off or damaged; the old one stays as it is.
+    """Write a new bag from the intact data of a truncated or damaged one, which is not modified.
 
-    What is lost is said, in messages and in seconds of simulated time.
+    The loss is reported in messages and in seconds of simulated time.
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
@@ -50,7 +51,9 @@ def recover(
         )
         return
     if not recovery.changed:
-        console.print(f"{recovery.path}: whole already: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
+        console.print(
+            f"{recovery.path}: already complete: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True
+        )
         return
     console.print(f"{recovery.path}: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
     for words in loss_in_words(loss):

@@ -20,20 +20,20 @@ def replay(
     bag: BagArgument,
     node: Annotated[str, typer.Option(help="Replay this node only.")] = "",
     parameters: Annotated[
-        Path | None, typer.Option(help="Parameter YAML under test, in place of the attached design.")
+        Path | None, typer.Option(help="Parameter YAML file to test instead of the attached design.")
     ] = None,
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
     rerun: Annotated[
-        bool, typer.Option("--rerun", help="Repeat the whole loop instead of one node after the other.")
+        bool, typer.Option("--rerun", help="Repeat the whole loop instead of each node separately.")
     ] = False,
     over_dds: Annotated[bool, typer.Option("--over-dds", help="Run the real node processes.")] = False,
     trust: TrustOption = False,
     json: JsonOption = False,
 ) -> None:
-    """Feed every node's algorithm with its recorded inputs and compare what it does with what was recorded.
+    """Feed every node's algorithm with its recorded inputs, and compare its outputs with the recorded ones.
 
-    Exit code 1 if anything differs; a run in which the controller did next to nothing is refused.
+    The exit code is 1 if anything differs. A run in which the controller was hardly active is rejected.
 
     Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
     """
@@ -62,8 +62,8 @@ def replay(
         raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
     if controller_node(controller).foreign and rerun and over_dds:
         raise ParameterError(
-            f"controller = {controller!r}: a node of its own, which a bag does not start: expected --rerun without "
-            "--over-dds, with its recorded commands"
+            f"controller = {controller!r}: a separate node, which a bag does not start: expected --rerun without "
+            "--over-dds, which uses its recorded commands"
         )
     if rerun or node in ("", CONTROLLER.name):
         require_trust(controller, bag, trust)
@@ -93,7 +93,7 @@ def replay(
         print_json({"bag": str(bag), "passed": not failed, "processes": report})
     print_bag_warnings(opened)
     if failed:
-        raise RunError(f"{', '.join(failed)}: not what {bag} recorded")
+        raise RunError(f"{', '.join(failed)}: differs from the recording in {bag}")
 
 
 def _print(result: ProcessComparison) -> None:
@@ -101,7 +101,7 @@ def _print(result: ProcessComparison) -> None:
     line = f"{result.process.node.name:18} {messages:7} messages  "
     padding = sum(topic.different_padding for topic in result.topics)
     if result.identical:
-        remark = f" but the padding of {padding}" if padding else ""
+        remark = f" except the padding of {padding}" if padding else ""
         console.print(Text.assemble(line, (f"identical in every byte{remark}", "green")), soft_wrap=True)
         return
     different = sum(topic.different_bytes for topic in result.topics) - padding

@@ -15,16 +15,16 @@ from hsv.units import UnitSystem
 
 
 def report(
-    bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are laid over one another.")],
+    bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are compared in the same plots.")],
     out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Write a page about recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
+    """Write a report on recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
 
-    The page is one file that opens offline; units can be switched on it.
+    The report is a single file that works offline; its units can be switched.
 
     Example: hsv report bags/case1_20260101T000000Z bags/case1_no_notch_20260101T000000Z --out comparison.html
     """

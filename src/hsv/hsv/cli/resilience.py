@@ -18,21 +18,24 @@ if TYPE_CHECKING:
 
 def resilience(
     controllers: Annotated[
-        str, typer.Option(help="Scenarios, by name or path, with commas; default: five of Tube-MPC and robust MPC.")
+        str,
+        typer.Option(
+            help="Scenarios, by name or path, separated by commas; default: five with Tube-MPC and robust MPC."
+        ),
     ] = "",
-    faults: Annotated[str, typer.Option(help="Faults to try, with commas; default: all, which --list names.")] = "",
-    out: Annotated[Path, typer.Option(help="Folder for page, scenarios of the worst flights, and results.")] = Path(
-        "resilience"
-    ),
+    faults: Annotated[str, typer.Option(help="Faults to try, separated by commas; default: all (see --list).")] = "",
+    out: Annotated[
+        Path, typer.Option(help="Folder for the report, the scenarios of the worst flights, and the results.")
+    ] = Path("resilience"),
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    listed: Annotated[bool, typer.Option("--list", help="Name the faults with their severities, and end.")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="List the faults with their severities and exit.")] = False,
     json: JsonOption = False,
 ) -> None:
-    """Fly controllers with faults of rising severity until each is lost; make a map of what they survive.
+    """Fly controllers with faults of increasing severity until each is lost, and make a map of what they survive.
 
-    Interrupted, the same command goes on where it was left; more controllers or faults fly beside what is there. Exit
-    code 1 where every flight crashed.
+    After an interruption, the same command continues where it stopped; controllers and faults can be added later. The
+    exit code is 1 if every flight crashed.
 
     Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
     """

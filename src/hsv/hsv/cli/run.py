@@ -36,13 +36,13 @@ def run(
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = None,
     report: ReportOption = True,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Show what the nodes say.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", help="Show the log output of the nodes.")] = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
     """Fly a scenario with the graph of ROS 2 nodes as separate processes, recorded to an MCAP bag.
 
-    Interrupted, it leaves what was flown until then, and nothing before the first step.
+    After an interruption the bag contains the steps flown so far; before the first step, no bag is left.
 
     Example: hsv run case1 --units paper
     """

@@ -12,10 +12,12 @@ from hsv.cli.output import print_json, print_titles
 
 
 def scenarios(
-    show: Annotated[str, typer.Option(metavar="NAME", help="Print this one whole, a shipped one or a file.")] = "",
+    show: Annotated[
+        str, typer.Option(metavar="NAME", help="Print this complete scenario, a shipped one or a file.")
+    ] = "",
     json: JsonOption = False,
 ) -> None:
-    """List the shipped scenarios, or print one with everything that it takes from the one it extends.
+    """List the shipped scenarios, or print a complete one, including everything inherited from the one it extends.
 
     Example: hsv scenarios --show case2_derived
     """

@@ -15,7 +15,7 @@ def set(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Change a parameter in a flight that is on its way, with the next step that is not flown yet.
+    """Change a parameter of a running flight at the next step that is not flown yet.
 
     Example: hsv set tau 0.8
     """

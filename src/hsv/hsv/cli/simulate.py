@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -18,7 +18,7 @@ def simulate(
     out: Annotated[Path | None, typer.Option(help="Also save the time histories to this .npz file (SI).")] = None,
     json: JsonOption = False,
 ) -> None:
-    """Fly a scenario in this process, without ROS; the same numbers as the graph, bit for bit.
+    """Fly a scenario in this process, without ROS, with the same numbers as the graph, bit for bit.
 
     Example: hsv simulate case1 --units paper
     """
@@ -47,7 +47,8 @@ def simulate(
     wall = time.perf_counter() - started
     if out:
         with writing(out, "out"), out.open("wb") as stream:
-            np.savez_compressed(stream, time=flight.time, **flight.history._asdict())
+            columns: dict[str, Any] = {"time": flight.time, **flight.history.columns()}
+            np.savez_compressed(stream, **columns)
     report_flight(
         loaded,
         flight_metrics(flight.data()),

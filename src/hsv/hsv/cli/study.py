@@ -16,15 +16,15 @@ def study(
     name: Annotated[
         str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor or hardware.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page of the study.")] = Path("study"),
+    out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page on the study.")] = Path("study"),
     flights: FlightsOption = Path("bags/study"),
     coarseness: Annotated[float, typer.Option(help="1: as in the docs; 4: a quarter of the points.")] = 1.0,
     beside: Annotated[
-        list[str], typer.Option("--with", help="Fly the controller of this scenario, too; may be repeated.")
+        list[str], typer.Option("--with", help="Also fly the controller of this scenario; can be repeated.")
     ] = [],  # noqa: B006
     json: JsonOption = False,
 ) -> None:
-    """Carry the results over what the paper leaves open, until each controller is lost; plot and say where.
+    """Vary one thing that the paper leaves open until each controller is lost; plot the results and state the limits.
 
     Example: hsv study fault --with examples/lqr/lqr.toml --out study
     """

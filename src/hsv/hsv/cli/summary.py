@@ -34,17 +34,17 @@ def report_flight(
     """Print the summary of a flight.
 
     Args:
-        scenario: What was flown.
-        metrics: By name, in SI units.
-        fingerprint: Of the flight; ``None`` where steps are missing.
+        scenario: Scenario that was flown.
+        metrics: Metrics by name, in SI units.
+        fingerprint: Fingerprint of the flight; ``None`` if steps are missing.
         design_hash: Digest of the design's parameters.
         ending: ``finished``, ``diverged`` or ``broken off``.
         wall_time: Wall time (s) that the flight took, where it is known.
         simulated_time: Simulated time (s) of the last step.
         units: UnitSystem of what is printed.
         json: Whether to print JSON.
-        not_covered: What of the flight the certificate of its design does not cover; ``None``: not known.
-        files: What was written, by name.
+        not_covered: Items of the flight that the certificate does not cover; ``None``: not known.
+        files: Written files by name.
 
     Raises:
         RunError: The flight diverged or was broken off; the message says when.

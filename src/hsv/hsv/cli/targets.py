@@ -37,7 +37,7 @@ def check_folder(path: Path, field: str) -> None:
 
 @contextmanager
 def writing(path: Path, field: str) -> Iterator[None]:
-    """Turn what the system refuses while ``path`` is written into one error; half a file is removed.
+    """Convert system errors while ``path`` is written into one error; an incomplete file is removed.
 
     Raises:
         ParameterError: It could not be written.

@@ -16,9 +16,9 @@ def topic(
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
-    """Print the messages of a topic of a running graph, with units, until nobody publishes it any more.
+    """Print the messages of a topic of a running graph, with units, until its publisher is gone.
 
-    Without a name: the topics, their types, who publishes and who subscribes. With --json: an object a line.
+    Without a topic: list the topics with their types, publishers and subscribers. With --json: one object per line.
 
     Example: hsv topic /hsv/state --every 50
     """
@@ -28,6 +28,6 @@ def topic(
 
     if not name and (once or every > 1):
         option = "once" if once else f"every = {every}"
-        raise ParameterError(f"{option}: expected with a topic, whose messages these are")
+        raise ParameterError(f"{option}: expected with a topic only")
     flags = [f"--{flag}" for flag, given in (("once", once), ("json", json)) if given]
     become(TOPIC, ["--prog", "hsv topic", *flags, "--every", str(every), *(["--", name] if name else [])], namespace)

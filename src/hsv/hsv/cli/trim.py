@@ -29,7 +29,7 @@ def trim(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating as on a ramp.
+    """Compute the equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating.
 
     Example: hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper
     """

@@ -11,10 +11,12 @@ from hsv.cli.output import print_json, print_titles
 
 
 def vehicles(
-    show: Annotated[str, typer.Option(metavar="NAME", help="Print this one whole, a registered one or a file.")] = "",
+    show: Annotated[
+        str, typer.Option(metavar="NAME", help="Print this complete vehicle, a registered one or a file.")
+    ] = "",
     json: JsonOption = False,
 ) -> None:
-    """List the vehicles that are registered, or print one with everything that it takes from the one it extends.
+    """List the registered vehicles, or print a complete one, including everything inherited from the one it extends.
 
     Example: hsv vehicles --show stiffened
     """

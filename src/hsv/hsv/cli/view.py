@@ -30,7 +30,7 @@ def view(
 ) -> None:
     """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
 
-    Foxglove and Lichtblick show the vehicle in 3-D: they open a copy with pictures, in the folder scene of the bag.
+    Foxglove and Lichtblick show the vehicle in 3-D: they open a copy with a 3-D scene, in the folder scene of the bag.
 
     Example: hsv view bags/case1_20260101T000000Z --with plotjuggler
     """

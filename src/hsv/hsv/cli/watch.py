@@ -11,9 +11,9 @@ def watch(
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
-    """Show where the flight of a running graph is, whoever has started it: a line that moves, until it ends.
+    """Show the current state of a running flight, no matter how it was started, on a line that is updated.
 
-    Nobody in the graph waits for it. With --json, or into a file: a line for each look, five a second at most.
+    The graph never waits for this command. With --json, or into a file, at most five lines per second are printed.
 
     Example: hsv watch --units paper
     """

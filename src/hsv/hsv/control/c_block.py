@@ -65,7 +65,7 @@ class CBlock:
     source: str
     """Path from the library's folder, empty where none is given"""
     address: int
-    """Of the step function, in the process that loaded the library"""
+    """Address of the step function in the process that loaded the library."""
     state_size: int
     inputs: tuple[SignalType, ...]
     outputs: tuple[SignalType, ...]

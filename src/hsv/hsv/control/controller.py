@@ -1,4 +1,4 @@
-"""What a controller is: what it is given in a step and what it answers.
+"""Interface of a controller: its inputs and outputs in a step.
 
 A controller of one's own is a class with four names, here the whole of one that flies::
 
@@ -44,7 +44,7 @@ STEP_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_int64, *[ctypes.c_void
 
 
 class ControllerInput(NamedTuple):
-    """What a controller is given in a step, SI units and radians: k, and the signals of :data:`CONTROLLER_INPUTS`."""
+    """Inputs of a controller in a step, SI units and radians: k, and the signals of :data:`CONTROLLER_INPUTS`."""
 
     step: int
     """k, from 0 on; t = k T"""
@@ -73,15 +73,15 @@ CONTROLLER_INPUTS = (
     signals.NOMINAL_INPUT,
     signals.FILTER_STATE,
 )
-"""In the order in which a compiled controller finds them, one after the other; C has the same in ``hsv_block.h``."""
+"""Inputs in the order in which a compiled controller receives them; ``hsv_block.h`` has the same order."""
 
 CONTROLLER_OUTPUTS = (signals.WANTED_INPUT,)
-"""What a compiled controller answers, before the bench limits it."""
+"""Outputs of a compiled controller, before the bench limits them."""
 
 
 @dataclass(frozen=True)
 class ControllerResult:
-    """What the bench takes from a controller; one with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
+    """Result of a controller's step; one with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
 
     input: np.ndarray
     """u (2), within the limits"""
@@ -90,7 +90,7 @@ class ControllerResult:
 
     @property
     def saturated(self) -> np.ndarray:
-        """Which of the two (2) the limits have changed."""
+        """Which of the two inputs (2) are limited."""
         return np.asarray(self.input != self.u_unsaturated)
 
 
@@ -104,19 +104,20 @@ class StepKernel(NamedTuple):
 
     address: int
     state: np.ndarray
-    """At the start of a run; every flight has a copy of its own"""
+    """State at the start of a run; every flight has its own copy."""
     parameters: np.ndarray
 
 
 class Controller(ABC):
-    """A controller as the loop steps it: from measured, reference and nominal state to the input of a step."""
+    """A controller in the loop: it computes the input of a step from measured, reference and nominal state."""
 
     name = ""
-    """What errors call it"""
+    """Name in error messages."""
     compiled_with_loop = False
     """Whether it is a tube law, whose step the compiled loop has in itself; its ``kernel`` is the data of that."""
     kernel: Any = None
-    """Of another one: the :class:`StepKernel` that the compiled loop calls; ``None``, and it calls :meth:`wanted`."""
+    """For other controllers: the :class:`StepKernel` that the compiled loop calls; ``None``: it calls :meth:`wanted`.
+    """
     library: Any = None
     """The user of the shared library with its function, see :mod:`hsv.control.library_process`, where it is in one"""
 
@@ -126,7 +127,7 @@ class Controller(ABC):
 
     @abstractmethod
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Return the input of this step; called once a step, in order."""
+        """Return the input of this step; called once per step, in order."""
 
     def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
         """Return the input of this step before the limits; called in place of :meth:`step`."""
@@ -134,11 +135,11 @@ class Controller(ABC):
         return float(fuel), float(elevator)
 
     def copied(self) -> Controller:
-        """Return a controller of its own that goes on from the state of this one."""
+        """Return a separate controller that continues from the state of this one."""
         return copy.deepcopy(self)
 
     def failure(self, step: int, what: str) -> ControllerError:
-        """Return the error of a step whose answer cannot be flown, with ``what`` it did."""
+        """Return the error for a step whose output cannot be flown, with ``what`` the controller did."""
         expected = f"expected {len(INPUT_NAMES)} finite numbers: {' and '.join(INPUT_NAMES)}"
         return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
 
@@ -151,14 +152,14 @@ class ControllerClass(Protocol):
     """
 
     PARAMETERS: tuple[Parameter, ...]
-    """Of the controller alone, named ``table.parameter``; a scenario has them in that table."""
+    """Parameters of the controller alone, named ``table.parameter``; a scenario has them in that table."""
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
         """Return a controller from all flat parameters of a flight and its design, ``None`` where it has none."""
 
 
 class ElsewhereController(Controller):
-    """In place of a controller that is a ROS 2 node of its own: it cannot be stepped here."""
+    """Placeholder for a controller that is a separate ROS 2 node and cannot be stepped here."""
 
     def __init__(self, name: str) -> None:
         """Call it by its ``name`` in errors."""
@@ -185,12 +186,12 @@ class ElsewhereController(Controller):
         raise self.refusal()
 
     def refusal(self) -> ParameterError:
-        """Return the error of who wants to fly it here."""
+        """Return the error for flying it in this process."""
         return ParameterError(f"controller = {self.name!r}: a node of its own, expected hsv run to fly it")
 
 
 class ForeignController(Controller):
-    """A controller of one's own, in Python or compiled, with its answers checked and limited."""
+    """A custom controller, in Python or compiled, whose outputs are checked and limited."""
 
     def __init__(self, name: str, controller: Any, vehicle: VehicleParameters) -> None:
         """Call the ``controller`` by its ``name`` in errors, and keep to the input limits of ``vehicle``."""
@@ -219,7 +220,7 @@ class ForeignController(Controller):
             raise ControllerError(f"{self.name}, reset: {type(error).__name__}: {words}") from error
 
     def copied(self) -> ForeignController:
-        """Return a controller of its own that goes on from the state of this one; of a compiled one, all is in it."""
+        """Return a separate controller that continues from the state of this one, copied completely if compiled."""
         if self.kernel is None:
             return copy.deepcopy(self)
         made = copy.copy(self)
@@ -265,7 +266,7 @@ class ForeignController(Controller):
 
 
 def flat_input(inputs: ControllerInput) -> np.ndarray:
-    """Return what a compiled controller is given, in one array."""
+    """Return the inputs of a compiled controller in one array."""
     return np.concatenate([np.ravel(given) for given in inputs[1:]])
 
 

@@ -41,14 +41,14 @@ NOT_TOLD = (
 _DEFAULT = "tube_mpc"
 
 NODE = "node:"
-"""With which the name of a controller begins that is a ROS 2 node of its own, ``node:package/executable``; alone where
-it is started by hand."""
+"""Prefix of the name of a controller that is a separate ROS 2 node, ``node:package/executable``; the prefix alone means
+a node that is started by hand."""
 
 CONTROLLER_PARAMETERS = (
     Parameter(
         "controller",
         _DEFAULT,
-        "what closes the loop: a registered name, package.module:Class, path/lib.so:symbol or node:package/executable",
+        "controller: a registered name, package.module:Class, path/lib.so:symbol or node:package/executable",
     ),
 )
 
@@ -59,7 +59,7 @@ def controller_names() -> list[str]:
 
 
 def names_code(controller: str) -> bool:
-    """Tell whether a controller is named by its code, not as what is registered here under a name, or as a node."""
+    """Return whether a controller is named by its code, rather than registered here under a name, or a node."""
     return ":" in controller and not controller.startswith(NODE)
 
 
@@ -117,7 +117,7 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
     """Return the controller that the flat parameters ``values`` describe.
 
     Args:
-        values: Of the flight; the controller takes those that it knows.
+        values: Parameters of the flight; the controller uses its own.
         design: The design in ``values``, where it is known already.
 
     Raises:

@@ -1,4 +1,4 @@
-"""What a flight has that the certificate of its design does not cover, named: vehicle, hardware, air, law, faults.
+"""Everything in a flight that its certificate does not cover: vehicle, hardware, air, law, faults.
 
 A certificate holds for a vehicle with its uncertainty, for the actuators that the design knows, ideal sensors and
 links, still air of the model's density, and a loss of elevator effectiveness down to that of the design's inputs. What
@@ -49,10 +49,10 @@ _SENSOR_TIMES = ("drift_time",)
 """Fields that are nothing by themselves."""
 
 _LINK_DETAILS = ("burst", "checksum")
-"""Of links: what is nothing without a loss or a corruption."""
+"""Parameters of links that have no effect without a loss or a corruption."""
 
 _SHAPING = ("shear_altitude", "length", "length_forward", "length_up", "lengths", "stays", "starts")
-"""Of air: what is nothing without a velocity or a density."""
+"""Parameters of the air that have no effect without a velocity or a density."""
 
 
 def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list[str]:
@@ -108,7 +108,7 @@ def uncovered_faults(faults: Iterable[tuple[str, str, Mapping[str, float]]], eff
         if (channel, kind) != (INPUT_NAMES[1], "loss_of_effectiveness"):
             why = "a loss of elevator effectiveness alone"
         elif effectiveness is None:
-            why = "a loss of which no certificate at hand says how much"
+            why = "a loss whose size no available certificate states"
         elif least < effectiveness:
             why = f"a loss to {effectiveness:g} at most"
         else:
@@ -132,7 +132,7 @@ def uncovered(
     Args:
         values: Flat parameters of the flight.
         design: Its design.
-        certificate: That of the design, where it is at hand.
+        certificate: Certificate of the design, if available.
         faults: Channel, type and parameters (SI) of each.
 
     Raises:
@@ -164,7 +164,7 @@ def _effectiveness(certificate: Mapping[str, Any]) -> float:
 
 
 def commanded(design: ControlDesign) -> np.ndarray:
-    """Return the largest magnitude (2) of a command: a certified plan's, and what the feedback adds in the tube."""
+    """Return the largest magnitude (2) of a command: that of a certified plan plus the feedback in the tube."""
     bounds = design.plan_bounds
     if bounds is None:
         return np.maximum(np.abs(design.input_minimum), np.abs(design.input_maximum))

@@ -8,10 +8,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from hsv.control.adjustable import TAU, TAU_MINIMUM, certified, compact, factors
 from hsv.control.design_parameters import DESIGN_PARAMETERS, brings_design, digest, positive, samples, shaped
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections
 from hsv.control.plan_bounds import PlanBounds
+from hsv.control.tube_factor import TAU, TAU_MINIMUM, certified, compact, rigid_factors
 from hsv.control.tube_set import TubeSet
 from hsv.errors import DesignError, ParameterError
 from hsv.lpv.polytope import Polytope, axis_weights
@@ -54,7 +54,7 @@ class ControlDesign:
     tube: TubeSet | None = None
     """The invariant set of the tube error, ``None``: the design carries none."""
     plan_bounds: PlanBounds | None = None
-    """What a nominal plan may use, ``None``: the design carries no tightened inputs."""
+    """Bounds of the total nominal input; ``None``: the design has no tightened inputs."""
     tau: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
     """Factor (5) of each rigid state's feedback that the design flies with."""
     tau_minimum: np.ndarray = field(default_factory=lambda: np.ones(N_RIGID))
@@ -134,7 +134,7 @@ class ControlDesign:
             v = check_all(DESIGN_PARAMETERS, values)
             notch = flown_sections(v)
             discretise(notch, v["period"])  # refuses centres that the period has no room for
-            tau_minimum = factors(v[TAU_MINIMUM.name], TAU_MINIMUM.name)
+            tau_minimum = rigid_factors(v[TAU_MINIMUM.name], TAU_MINIMUM.name)
             tau = certified(v[TAU.name], tau_minimum)
         except ParameterError as error:
             raise DesignError(str(error)) from error
@@ -202,7 +202,7 @@ def design_of(values: Mapping[str, Any]) -> ControlDesign | None:
     """Return the design in the flat parameters of a flight, ``None`` where there is none.
 
     Raises:
-        DesignError: As :meth:`ControlDesign.from_parameters`.
+        DesignError: See :meth:`ControlDesign.from_parameters`.
     """
     return ControlDesign.from_parameters(values) if brings_design(values) else None
 

@@ -14,6 +14,9 @@ from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.documents import parse_yaml, read_text
 from hsv.errors import DesignError, DocumentError, did_you_mean
 
+_SHIPPED = Path(__file__).parents[1] / "designs"
+"""In a checkout a link to ``offline_design``, in an installed package a folder of its own."""
+
 _DESIGN_NAMES = [parameter.name for parameter in DESIGN_PARAMETERS]
 
 
@@ -63,7 +66,7 @@ def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
     """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes.
 
     Raises:
-        DesignError: As :func:`parse_parameters`.
+        DesignError: See :func:`parse_parameters`.
     """
     try:
         tree = parse_yaml(text)
@@ -75,7 +78,7 @@ def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
             flat = sections.setdefault(str(section), {})
             for name, value in _flattened(branch["ros__parameters"], ""):
                 if name in flat:
-                    raise DesignError(f"design {source!r}: parameter {name} stands there twice, expected once")
+                    raise DesignError(f"design {source!r}: parameter {name} occurs twice, expected once")
                 flat[name] = value
     if not any(sections.values()):
         raise _no_parameters(source)
@@ -101,7 +104,7 @@ def read_design(path: Path) -> ControlDesign:
 
 
 def find_design(name: str) -> Path:
-    """Return the parameter file of a design given by path, or by name in ``HSV_DESIGN_PATH`` or the source checkout.
+    """Return the parameter file of a design given by path, or by name: in ``HSV_DESIGN_PATH``, or a shipped one.
 
     Raises:
         DesignError: No such file.
@@ -115,14 +118,13 @@ def find_file(name: str, suffix: str) -> Path:
         candidates = [Path(name)]
     else:
         folders = [Path(folder) for folder in os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep) if folder]
-        # A source checkout, or a symlinked build of one, has the designs beside it.
-        folders += [parent / "offline_design" for parent in Path(__file__).resolve().parents]
-        candidates = [folder / f"{name}{suffix}" for folder in folders]
+        candidates = [folder / f"{name}{suffix}" for folder in (*folders, _SHIPPED.resolve())]
     for candidate in candidates:
         if candidate.is_file():
             return candidate
     raise DesignError(
-        f"design = {name!r}: no such file, expected the path of a {suffix} file or a name in HSV_DESIGN_PATH"
+        f"design = {name!r}: no such file, expected the path of a {suffix} file, a name in HSV_DESIGN_PATH or of a "
+        "shipped one"
     )
 
 

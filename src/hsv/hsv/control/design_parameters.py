@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.adjustable import TAU, TAU_MINIMUM
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
+from hsv.control.tube_factor import TAU, TAU_MINIMUM
 from hsv.errors import DesignError
 from hsv.lpv.polytope import INTERPOLATIONS
 from hsv.parameters import Parameter
@@ -29,15 +29,15 @@ DESIGN_PARAMETERS = (
     Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
     TAU,
     TAU_MINIMUM,
-    Parameter("nominal.filtered", False, "feedback on q_f less the filtered rate of the plan (paper eq. 48)"),
+    Parameter("nominal.filtered", False, "feedback on q_f minus the filtered nominal pitch rate (paper eq. 48)"),
     Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
     Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
     Parameter("nominal.interpolated", False, "whether the gain is interpolated between two ellipsoids, or switched"),
-    Parameter("design.coupling", "", "set of inertial coupling of the vehicle that the tube is certified for"),
-    Parameter("design.actuators", "", "actuators that the tube is certified for, by name; empty: ideal ones"),
-    Parameter("design.vehicle", "", "digest of the vehicle that the design is for; empty: the default one"),
+    Parameter("design.coupling", "", "set of inertial coupling for which the tube is certified"),
+    Parameter("design.actuators", "", "actuators for which the tube is certified, by name; empty: ideal ones"),
+    Parameter("design.vehicle", "", "digest of the vehicle of the design; empty: the default one"),
     Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
-    Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design carries no set"),
+    Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design has no set"),
     Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
     Parameter("nominal.state_scale", [], "rigid deviations (5) that weigh equally in the nominal cost (SI)"),
     Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
@@ -49,7 +49,7 @@ DESIGN_PARAMETERS = (
     Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
     Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
 )
-"""What a design brings to the nodes."""
+"""Parameters of a design, as declared by the nodes."""
 
 NO_DESIGN = "none"
 """Name of the design in the parameters of a node that flies without one: nodes have a default."""
@@ -76,7 +76,7 @@ def digest(values: Mapping[str, Any]) -> str:
 
 
 def shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the array of a parameter, a size of -1 being what its length gives.
+    """Return the array of a parameter; a size of -1 follows from its length.
 
     Raises:
         DesignError: It has another number of values.

@@ -64,7 +64,7 @@ def estimator_data(
     Args:
         values: Parameters.
         noise: Standard deviations of the sensors' white noise (9), for want of others.
-        vehicle: Of the design, nominal.
+        vehicle: Nominal vehicle of the design.
         start: Equilibrium in which the flight starts, which the estimator knows, and about which its gain is found.
         period: T (s).
 

@@ -6,7 +6,7 @@ from hsv.parameters import Parameter
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_RIGID, STATE_NAMES, STATE_UNITS
 
 ESTIMATOR_ENABLED = Parameter(
-    "estimator.enabled", False, "true: the controller is given an estimate in place of the measurement"
+    "estimator.enabled", False, "true: the controller receives an estimate instead of the measurement"
 )
 
 _DRIVING = (7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 1e-2)

@@ -45,7 +45,7 @@ class Leg(NamedTuple):
 
 @dataclass(frozen=True)
 class InputBounds:
-    """What a plan may use: least and largest u_r + u_n (2 each), and their largest rates (2), per second."""
+    """Bounds of the total nominal input: smallest and largest u_r + u_n (2 each), and largest rates (2) per second."""
 
     minimum: np.ndarray
     maximum: np.ndarray
@@ -68,7 +68,7 @@ class GovernedReference:
 
     @property
     def end(self) -> float:
-        """When the reference has come to rest, s."""
+        """Time at which the reference has come to rest, s."""
         return self.times[-1] + self.blend
 
 
@@ -101,8 +101,8 @@ class Governor:
         """Return the fastest reference from level flight at ``start``, altitude (m) and velocity (m/s), over ``legs``.
 
         Args:
-            start: Where the flight begins, in trim.
-            legs: In order; each begins when it is asked for, or when the one before has come to its corner.
+            start: Start of the flight, in trim.
+            legs: Legs in order; each begins when requested, or when the previous one has reached its corner.
             blend: Half the time in which the rate changes at a corner, s; as whole periods.
 
         Raises:
@@ -198,7 +198,7 @@ def _plan(nominal: Any, reference: Any, plan: np.ndarray, deviation: np.ndarray)
     """Write u_r + u_n (k, 2) and x_n (k, 9), 0 at first, scheduled by x_r + x_n; tell whether the family held it."""
     n, m = deviation.shape[1], plan.shape[1]
     x_n, u_n, defect = np.zeros(n), np.empty(m), np.empty(n)
-    S, new = np.empty(n * (n + m)), np.empty(n)
+    weights, S, new = np.empty(len(nominal.polytope.S)), np.empty(n * (n + m)), np.empty(n)
     last = len(reference.state) - 1
     held = True
     for k in range(len(plan)):
@@ -211,5 +211,5 @@ def _plan(nominal: Any, reference: Any, plan: np.ndarray, deviation: np.ndarray)
         for i in range(m):
             plan[k, i] = reference.input[row, i] + u_n[i]
         altitude, velocity = reference.state[row, 0] + x_n[0], reference.state[row, 1] + x_n[1]
-        nominal_advance(nominal.polytope, altitude, velocity, x_n, u_n, defect, S, new)
+        nominal_advance(nominal.polytope, altitude, velocity, x_n, u_n, defect, weights, S, new)
     return held

@@ -66,17 +66,17 @@ def seen_from(controller: str, folder: Path) -> str:
 
 @dataclass(frozen=True)
 class LibraryRecord:
-    """What a recorded flight keeps of the library that it was flown with."""
+    """Data about a controller library that are stored with a recorded flight."""
 
     sha256: str
-    """Of the file, hexadecimal"""
+    """SHA-256 of the file, hexadecimal."""
     source_name: str
-    """As the block says, from the library's folder; empty where it says nothing, or the file did not come along"""
+    """Path of the source, as given by the block, relative to the library's folder; empty if unknown or missing."""
     source: bytes
 
 
 def library_record(controller: str) -> LibraryRecord | None:
-    """Return what is to be kept of a scenario's ``controller``, nothing where it is not in a library.
+    """Return the data to store for a scenario's ``controller``; nothing if it is not in a library.
 
     Raises:
         ParameterError: The library cannot be read.
@@ -190,7 +190,7 @@ class LibraryController(ForeignController):
 
     @property
     def library(self) -> LibraryUser:
-        """What uses the library."""
+        """The user of the library."""
         return library_user(self.path)
 
     def loaded(self, address: int) -> ForeignController:

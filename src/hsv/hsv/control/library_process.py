@@ -80,11 +80,11 @@ class LibraryProcess:
     def request(
         self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = lambda: 1
     ) -> Any:
-        """Return what the child answers to a request, see :class:`hsv.simulation.library_child.LoadedLibrary`.
+        """Return the reply of the child to a request, see :class:`hsv.simulation.library_child.LoadedLibrary`.
 
         Args:
-            name: Of the request.
-            arguments: Of the request.
+            name: Name of the request.
+            arguments: Arguments of the request.
             kept: More of them, by name, that the child keeps: what is the same object as the last time is not sent.
             begun: Returns how many steps are begun, 0 before there is anything that could hang.
 
@@ -116,7 +116,7 @@ class LibraryProcess:
 
     @contextmanager
     def sharing(self, numbers: int) -> Iterator[np.ndarray]:
-        """Yield memory (numbers) that the child shares; nobody else requests anything meanwhile."""
+        """Yield memory (numbers) shared with the child; no other request is possible meanwhile."""
         with self._lock:
             yield self._memory.numbers(numbers)
 
@@ -174,18 +174,18 @@ class LibraryProcess:
 
 
 class LibraryUser(Protocol):
-    """What uses a library, in a child or in this process."""
+    """Interface of a user of a library, in a child process or in this process."""
 
     def describe(self, symbol: str) -> CBlock:
-        """As :meth:`LibraryProcess.describe`."""
+        """Describe the library, see :meth:`LibraryProcess.describe`."""
 
     def request(
         self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = ...
     ) -> Any:
-        """As :meth:`LibraryProcess.request`."""
+        """Send a request, see :meth:`LibraryProcess.request`."""
 
     def sharing(self, numbers: int) -> AbstractContextManager[np.ndarray]:
-        """As :meth:`LibraryProcess.sharing`."""
+        """Share memory, see :meth:`LibraryProcess.sharing`."""
 
 
 _children: dict[Path, LibraryProcess] = {}

@@ -1,4 +1,4 @@
-"""What chooses the nominal input u_n from the nominal state x_n: interface, and nested family (eq. 32 to eq. 35)."""
+"""Laws for the nominal input u_n given the nominal state x_n: interface, and nested gains (eq. 32 to eq. 35)."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numba import njit
 
+from hsv.lanes import choose, every, lanes_in, least, most
 from hsv.lpv.polytope import PolytopeData
 
 MEMBERSHIP_TOLERANCE = 1e-6
@@ -19,7 +20,7 @@ NOT_IN_FAMILY = 255
 
 
 class NominalStatus(IntFlag):
-    """Why a step of the nominal trajectory is not as planned; values of NominalState.status."""
+    """Reasons for which a step of the nominal trajectory deviates from the plan; values of NominalState.status."""
 
     OK = 0
     OUTSIDE_FAMILY = 1
@@ -67,7 +68,7 @@ class NominalLaw(Protocol):
 
 
 @njit(cache=True, inline="always")
-def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
+def level(ellipsoid: np.ndarray, x: Any) -> Any:
     """Return x' P x over the first states, as many as P (s, s) has rows."""
     total = 0.0
     for i in range(ellipsoid.shape[0]):
@@ -78,42 +79,42 @@ def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     return total
 
 
-@njit(cache=True)
-def nominal_input(data: Any, deviation: np.ndarray, u_n: np.ndarray) -> tuple[int, bool]:
+@njit(cache=True, error_model="numpy")
+def nominal_input(data: Any, deviation: Any, u_n: Any) -> Any:
     """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one.
 
     Interpolated, K = a K_i + (1 - a) K_j, of that ellipsoid i and the next one inside, j, which does not hold x_n: with
     x' (a P_i + (1 - a) P_j) x = 1, a is 1 on the boundary of i and 0 on that of j, so that u_n is continuous (Wan and
     Kothare, Automatica 39, 2003). Without gains u_n is zero.
     """
-    if len(data.gains) == 0:
-        for i in range(len(u_n)):
-            u_n[i] = 0.0
-        return 0, True
     boundary = 1.0 + MEMBERSHIP_TOLERANCE
-    index = 0
-    inside = False
-    held, beyond = 0.0, 0.0
+    index, held, beyond = 0.0, 0.0, 0.0
+    inside = len(data.gains) == 0
     for g in range(len(data.ellipsoids) - 1, -1, -1):
-        held = level(data.ellipsoids[g], deviation)
-        if held <= boundary:
-            index = g
-            inside = True
+        value = level(data.ellipsoids[g], deviation)
+        now = choose(inside, False, value <= boundary)
+        index = choose(now, g, index)
+        held = choose(now, value, held)
+        inside = inside | now
+        if every(inside):
             break
-        beyond = held
-    gain = data.gains[index]
-    for i in range(gain.shape[0]):
+        beyond = choose(inside, beyond, value)
+    for i in range(len(u_n)):
         u_n[i] = 0.0
-        for j in range(gain.shape[1]):
-            u_n[i] += gain[i, j] * deviation[j]
-    if data.interpolated and inside and index + 1 < len(data.gains):
-        share = (beyond - boundary) / (beyond - held)
-        inner = data.gains[index + 1]
-        for i in range(gain.shape[0]):
+    first = int(least(index))
+    last = first if lanes_in(index) == 1 else int(most(index))
+    for g in range(first, min(last + 1, len(data.gains))):
+        for i in range(len(u_n)):
             total = 0.0
-            for j in range(gain.shape[1]):
-                total += inner[i, j] * deviation[j]
-            u_n[i] = total + share * (u_n[i] - total)
+            for j in range(len(deviation)):
+                total += data.gains[g, i, j] * deviation[j]
+            if data.interpolated and g + 1 < len(data.gains):
+                share = (beyond - boundary) / (beyond - held)
+                inner = 0.0
+                for j in range(len(deviation)):
+                    inner += data.gains[g + 1, i, j] * deviation[j]
+                total = choose(inside, inner + share * (total - inner), total)
+            u_n[i] = choose(index == g, total, u_n[i])
     return index, inside
 
 
@@ -134,7 +135,8 @@ class FamilyLaw:
     def step(self, deviation: np.ndarray) -> LawResult:
         """Return the nominal input for x_n (9)."""
         u_n = np.empty(self.data.gains.shape[1])
-        index, inside = nominal_input(self.data, deviation, u_n)
+        found, inside = nominal_input(self.data, deviation, u_n)
+        index = int(found)
         status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
         gain = self.data.gains[index] if len(self.data.gains) else np.empty(0)
         return LawResult(u_n, gain, index, status)

@@ -30,20 +30,21 @@ NOMINAL_PARAMETERS = (
 @njit(cache=True)
 def nominal_advance(
     polytope: Any,
-    altitude: float,
-    velocity: float,
-    deviation: np.ndarray,
-    u_n: np.ndarray,
-    defect: np.ndarray,
-    S: np.ndarray,
-    new: np.ndarray,
-) -> bool:
+    altitude: Any,
+    velocity: Any,
+    deviation: Any,
+    u_n: Any,
+    defect: Any,
+    weights: Any,
+    S: Any,
+    new: Any,
+) -> Any:
     """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20, eq. 46), p the measured h and V.
 
-    ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``S`` (n (n + m)) and ``new``
-    (n) are scratch. Returns whether p lay inside the envelope.
+    ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``weights`` (r),
+    ``S`` (n (n + m)) and ``new`` (n) are scratch. Returns whether p lay inside the envelope.
     """
-    inside = schedule(polytope, altitude, velocity, S)
+    inside = schedule(polytope, altitude, velocity, weights, S)
     n, m = len(deviation), len(u_n)
     for i in range(n):
         row = i * (n + m)
@@ -90,12 +91,12 @@ class NominalTrajectory:
         self.law = law or FamilyLaw(self.data)
         n, m = N_STATES, N_INPUTS
         self._deviation = np.zeros(n)
-        self._scratch = np.empty(n * (n + m)), np.empty(n)
+        self._scratch = np.empty(len(self.data.polytope.S)), np.empty(n * (n + m)), np.empty(n)
         self._step = 0
         # Compile now: a cold cache must not stall a flight.
         rest = FamilyLaw(self.data).step(self._deviation).input
-        S, new = self._scratch
-        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, reference.data.defect[0], S, new)
+        weights, S, new = self._scratch
+        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, reference.data.defect[0], weights, S, new)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
@@ -133,9 +134,9 @@ class NominalTrajectory:
         self._step += 1
         deviation = self._deviation.copy()
         chosen = self.law.step(deviation)
-        S, new = self._scratch
+        weights, S, new = self._scratch
         in_envelope = not len(self.data.gains) or nominal_advance(
-            self.data.polytope, state[0], state[1], self._deviation, chosen.input, defects[row], S, new
+            self.data.polytope, state[0], state[1], self._deviation, chosen.input, defects[row], weights, S, new
         )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
         return NominalResult(
@@ -152,12 +153,12 @@ class NominalTrajectory:
 _FLAT = AxisWeights(np.array([0.0, 1.0]), np.zeros((4, 1, 0)))
 
 NO_NOMINAL = NominalData(
-    PolytopeData(np.zeros((0, N_STATES * (N_STATES + N_INPUTS))), _FLAT, _FLAT),
+    PolytopeData(np.zeros((0, N_STATES * (N_STATES + N_INPUTS))), np.zeros(0, np.int64), _FLAT, _FLAT),
     np.zeros((0, N_INPUTS, N_STATES)),
     np.zeros((0, N_RIGID, N_RIGID)),
     False,
 )
-"""In place of a nominal system, where there is no design: x_n and u_n stay zero."""
+"""Placeholder for a nominal system if there is no design: x_n and u_n stay zero."""
 
 
 def nominal_data(design: ControlDesign) -> NominalData:

@@ -33,11 +33,11 @@ FLOWN_NOTCH_PARAMETERS = tuple(
     Parameter(p.name.replace("notch.", "notch.flown."), [], f"flown instead of {p.name}", p.unit, p.minimum, p.maximum)
     for p in DESIGN_NOTCH_PARAMETERS[1:]
 )
-"""What a flight may have otherwise; empty: the design's. The invariant set does not hold for another filter."""
+"""Notch filter of a flight that replaces the design's; empty: the design's. The invariant set does not hold for it."""
 
 NOTCH_PARAMETERS = (
     *DESIGN_NOTCH_PARAMETERS,
-    Parameter("notch.enabled", True, "false: the pitch rate passes unfiltered"),
+    Parameter("notch.enabled", True, "false: the pitch rate is not filtered"),
     *FLOWN_NOTCH_PARAMETERS,
 )
 
@@ -135,7 +135,7 @@ def notch_response(sections: Sequence[NotchSection], frequencies: np.ndarray) ->
 def with_notch(
     A: np.ndarray, B: np.ndarray, gain: np.ndarray, notch: NotchData
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the sampled loop of a vehicle whose feedback takes the filtered pitch rate, still open.
+    """Return the open sampled loop of a vehicle whose feedback uses the filtered pitch rate.
 
     Args:
         A: (..., n, n) state matrices, discrete time, the pitch rate among the states.
@@ -172,7 +172,7 @@ def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
 
 
 @njit(cache=True)
-def rest(data: Any, value: float, state: np.ndarray) -> None:
+def rest(data: Any, value: Any, state: Any) -> None:
     """Write into ``state`` (2 n) the equilibrium of all sections for a constant input ``value``."""
     for i in range(len(data.D)):
         state[2 * i] = data.G[i, 0] * value
@@ -180,7 +180,7 @@ def rest(data: Any, value: float, state: np.ndarray) -> None:
 
 
 @njit(cache=True)
-def filter_step(data: Any, state: np.ndarray, value: float) -> float:
+def filter_step(data: Any, state: Any, value: Any) -> Any:
     """Return the filtered ``value`` from ``state`` (2 n), then update ``state``: y = C s + D v, s = A s + B v."""
     for i in range(len(data.D)):
         a, b = state[2 * i], state[2 * i + 1]
@@ -192,7 +192,7 @@ def filter_step(data: Any, state: np.ndarray, value: float) -> float:
 
 
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
-    """Return the sections of the filter in flight: the design's, with what the flight has otherwise in their place.
+    """Return the sections of the filter in flight: those of the flight if given, else those of the design.
 
     Raises:
         ParameterError: A wrong value, or arrays of different lengths.
@@ -222,14 +222,15 @@ class NotchResult:
 
 
 class NotchFilter:
-    """Sections in series on the pitch rate, which passes where there are none; an estimator may stand before them."""
+    """Sections in series on the pitch rate, unfiltered if there are none; an estimator may precede them."""
 
     PARAMETERS = (*NOTCH_PARAMETERS, *Estimator.PARAMETERS)
 
     def __init__(self, sections: Sequence[NotchSection], period: float, estimator: Estimator | None = None) -> None:
         self.sections = tuple(sections)
         self.estimator = estimator
-        """What makes the state, whose pitch rate is filtered, of a measurement; None: it is the measurement"""
+        """Estimator that computes the state, whose pitch rate is filtered, from a measurement; None: the measurement is
+        used."""
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False

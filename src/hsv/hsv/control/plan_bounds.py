@@ -1,4 +1,4 @@
-"""What a nominal plan may use: the tightened inputs (paper eq. 30), and the region that the tube was computed for."""
+"""Bounds of the nominal input: the tightened inputs (paper eq. 30), and the region that the tube was computed for."""
 
 from __future__ import annotations
 

@@ -24,13 +24,13 @@ BLOCK_TIME = 0.5
 """Length of a block, s."""
 
 CHECKED_NEAR, CHECKED_FAR = (0.0, 0.24, 0.48, 0.72, 0.96), (0.0, 0.48)
-"""Where in a block the bounds are imposed, as shares of it: at its ends only, inputs overshoot between."""
+"""Positions in a block at which bounds are imposed, as fractions of it; imposed at its ends only, inputs overshoot."""
 
 NEAR_BLOCKS = 10
 """Blocks that count as near, where inputs move fast; the pitch acceleration is bounded in these."""
 
 _ITERATIONS = 60
-"""Of the solver at most; it needs about 10."""
+"""Iteration limit of the solver; about 10 are needed."""
 
 
 class QpLaw:

@@ -39,11 +39,16 @@ from hsv.vehicle.vehicle import Vehicle
 TRIMS = ("climbing", "static")
 
 REFERENCE_PARAMETERS = (
-    Parameter("reference.times", [0.0], "times of the commands, two equal ones: a step", "s", 0.0, 1e5),
-    Parameter("reference.altitudes", [26243.28], "commanded altitudes there, linear between", "m"),
-    Parameter("reference.velocities", [2484.12], "commanded velocities there, linear between", "m/s"),
+    Parameter("reference.times", [0.0], "times of the commands; two equal times define a step", "s", 0.0, 1e5),
+    Parameter("reference.altitudes", [26243.28], "commanded altitudes at these times, linear in between", "m"),
+    Parameter("reference.velocities", [2484.12], "commanded velocities at these times, linear in between", "m/s"),
     Parameter("reference.blend", 0.0, "half the time in which the rate changes at a corner; 0: at once", "s", 0.0, 1e3),
-    Parameter("reference.trim", "climbing", "equilibrium of a ramp: climbing, or static as if it stood", choices=TRIMS),
+    Parameter(
+        "reference.trim",
+        "climbing",
+        "equilibrium along a ramp: climbing, or static (level and unaccelerated)",
+        choices=TRIMS,
+    ),
 )
 
 SUBSTEPS = 2
@@ -106,7 +111,7 @@ def _trimmed(
 
 
 class ReferenceTrajectory:
-    """x_r(k), u_r(k) and the defect d_r(k) of every step k, computed once; parts that stand still are stored once."""
+    """x_r(k), u_r(k) and the defect d_r(k) of every step k, computed once; constant parts are stored once."""
 
     def __init__(
         self,
@@ -149,6 +154,7 @@ class ReferenceTrajectory:
         self.data = ReferenceData(
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
+        self._along = ReferenceData(0, *(column[:0] for column in self.data[1:]))
         size = np.full(rows, np.inf)
         _, state, inputs, defect = self.data
         _trimmed(rigid, command, rate, bend, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
@@ -178,6 +184,14 @@ class ReferenceTrajectory:
     def rows(self, steps: int) -> np.ndarray:
         """Return the rows of the first ``steps`` steps."""
         return np.clip(np.arange(steps) - self.data.first, 0, len(self.data.state) - 1)
+
+    def along(self, steps: int) -> ReferenceData:
+        """Return the rows of the first ``steps`` steps, one each; they are shared by all who ask."""
+        along = self._along
+        if len(along.state) != steps:
+            rows = self.rows(steps)
+            self._along = along = ReferenceData(0, *(column[rows] for column in self.data[1:]))
+        return along
 
     @property
     def final_state(self) -> np.ndarray:

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
-from hsv.control.adjustable import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
@@ -28,6 +27,8 @@ from hsv.control.notch_filter import (
     filter_step,
     flown_sections,
 )
+from hsv.control.tube_factor import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
+from hsv.lanes import choose
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.vehicle.parameters import VehicleParameters
@@ -54,7 +55,7 @@ TUBE_PARAMETERS = (
     *FLOWN_NOTCH_PARAMETERS,
     *HARDWARE_PARAMETERS,
 )
-"""Of the tube law, beside those of the design; declared hardware is for the status alone."""
+"""Parameters of the tube law in addition to those of the design; declared hardware affects the status only."""
 
 _N_INTEGRATED = 2
 """Altitude and velocity, the first two states."""
@@ -80,7 +81,7 @@ class TubeData(NamedTuple):
 
 
 def no_tube(vehicle: VehicleParameters) -> TubeData:
-    """Return what stands in place of a tube law where another controller flies: the input limits of ``vehicle``."""
+    """Return the data that replace a tube law if another controller flies: the input limits of ``vehicle``."""
     return TubeData(
         np.zeros((1, N_INPUTS, N_STATES)),
         np.zeros(1, np.int64),
@@ -112,19 +113,19 @@ def active_gain(data: Any, step: int) -> int:
 @njit(cache=True, inline="always")
 def tube_step(
     data: Any,
-    memory: np.ndarray,
+    memory: Any,
     step: int,
     monitored: bool,
-    x: np.ndarray,
-    q_f: float,
-    x_r: np.ndarray,
-    u_r: np.ndarray,
-    x_n: np.ndarray,
-    u_n: np.ndarray,
-    s: np.ndarray,
-    u_feedback: np.ndarray,
-    u_total: np.ndarray,
-    u: np.ndarray,
+    x: Any,
+    q_f: Any,
+    x_r: Any,
+    u_r: Any,
+    x_n: Any,
+    u_n: Any,
+    s: Any,
+    u_feedback: Any,
+    u_total: Any,
+    u: Any,
 ) -> int:
     """Write feedback, sum of all parts and limited input, (2) each (paper eq. 21, eq. 36); return the gain's index.
 
@@ -145,15 +146,15 @@ def tube_step(
         planned_rate = filter_step(data.notch, memory, x_r[PITCH_RATE] + x_n[PITCH_RATE])
         if data.filtered:
             pitch_rate_error = q_f - planned_rate
-    errors = memory[size + _N_INTEGRATED :]
+    errors = size + _N_INTEGRATED
     for j in range(len(x)):
-        errors[j] = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
-    errors[PITCH_RATE] = pitch_rate_error
+        memory[errors + j] = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
+    memory[errors + PITCH_RATE] = pitch_rate_error
     limited = False
     for i in range(len(u)):
         feedback, integral = 0.0, 0.0
         for j in range(len(x)):
-            feedback += data.gains[active, i, j] * errors[j]
+            feedback += data.gains[active, i, j] * memory[errors + j]
         u_plan = u_n[i] if data.planned else 0.0
         if data.integral_rate > 0.0:
             for j in range(_N_INTEGRATED):
@@ -161,12 +162,13 @@ def tube_step(
             u_plan += integral
         u_total[i] = feedback + u_plan + u_r[i]
         u_feedback[i] = feedback + integral
-        wanted = u_total[i] if math.isfinite(u_total[i]) else u_r[i]
+        wanted = choose(math.isfinite(u_total[i]), u_total[i], u_r[i])
         u[i] = min(max(wanted, data.minimum[i]), data.maximum[i])
-        limited = limited or u[i] != u_total[i]
-    if data.integral_rate > 0.0 and not limited:
+        limited = limited | (u[i] != u_total[i])
+    if data.integral_rate > 0.0:
         for j in range(_N_INTEGRATED):
-            memory[size + j] += data.period * (x[j] - x_r[j] - x_n[j])
+            more = memory[size + j] + data.period * (x[j] - x_r[j] - x_n[j])
+            memory[size + j] = choose(limited, memory[size + j], more)
     return active
 
 

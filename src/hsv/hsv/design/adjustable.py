@@ -10,7 +10,6 @@ import numpy as np
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import (
     DesignResult,
-    Progress,
     design_gains,
     disturbance_columns,
     initial_deviation,
@@ -21,7 +20,7 @@ from hsv.design.baseline import (
     with_family,
 )
 from hsv.design.common_lyapunov import CommonLyapunov, common_lyapunov
-from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
+from hsv.design.factor_range import certified_loops, relaxed_bound, room_at_one
 from hsv.design.full_state import full_state_report
 from hsv.design.inputs import AdjustableInputs, DesignInputs
 from hsv.design.nominal import nominal_gain
@@ -29,13 +28,14 @@ from hsv.design.region import Region, incomplete_share
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import channel_model
 from hsv.errors import DesignError
+from hsv.progress import Progress
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.trim import trim
 
 
 @dataclass(frozen=True)
 class AdjustableSets:
-    """Z for W at tau = 1, and Z' for W' at the factor in use: what the relaxed bounds of K' follow from."""
+    """Z for W at tau = 1, and Z' for W' at the factor in use, from which the relaxed bounds of K' follow."""
 
     complete: MeasuredSet
     incomplete: MeasuredSet

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
@@ -24,16 +23,14 @@ from hsv.errors import DesignError
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.lpv.polytope import Polytope
+from hsv.progress import Progress
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.vehicle.trim import trim
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how many parts of it are done, and how many there are."""
 
 
 @dataclass(frozen=True)
 class DesignResult:
-    """What flies, the model it stands on, and the report behind it (ready for JSON, SI)."""
+    """A design with its model and its report (ready for JSON, SI)."""
 
     design: ControlDesign
     model: DesignModel
@@ -46,7 +43,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
     The report is the certificate. It holds nothing that differs between two runs on one machine.
 
     Args:
-        inputs: What :func:`hsv.design.inputs.read_inputs` returns.
+        inputs: Design inputs, from :func:`hsv.design.inputs.read_inputs`.
         progress: Told of every part that is done.
 
     Raises:
@@ -175,7 +172,7 @@ def initial_deviation(inputs: DesignInputs) -> np.ndarray:
 
 
 def disturbance_columns(inputs: DesignInputs) -> np.ndarray:
-    """Return the columns (5, 4) whose response F makes cheap, at mid-envelope, SI per period.
+    """Return the disturbance columns (5, 4) whose response F attenuates, at mid-envelope, SI per period.
 
     The lost share of the trim elevator, and steady errors of the velocity, angle-of-attack and pitch-rate equations.
     """

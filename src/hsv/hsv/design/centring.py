@@ -66,10 +66,10 @@ class Unknown:
 
 
 Inequalities = Callable[..., Sequence[np.ndarray]]
-"""From the unknown matrices to symmetric matrices, affine in them, that are to be positive semidefinite."""
+"""Function from the unknown matrices to symmetric matrices, affine in them, that must be positive semidefinite."""
 
 Cost = Callable[..., float]
-"""From the unknown matrices to a linear cost."""
+"""Function from the unknown matrices to a linear cost."""
 
 
 @dataclass(frozen=True)
@@ -90,10 +90,10 @@ def minimise(
     """Return the unknown matrices on the central path, about :data:`GAP` above the least cost.
 
     Args:
-        unknowns: What is sought.
+        unknowns: Unknown matrices.
         cost: Linear; if it is zero throughout, the answer is the solver's.
         inequalities: Affine, with entries near one.
-        name: What is being designed, for error messages.
+        name: Name of the result, for error messages.
 
     Raises:
         DesignError: No solution inside the inequalities.

@@ -12,9 +12,9 @@ from hsv.errors import DesignError, DocumentError
 from hsv.parameters import Parameter
 
 CERTIFICATE_PARAMETERS = (
-    Parameter("design.certificate", "", "certificate to check the design with; empty: that of the design of its name"),
+    Parameter("design.certificate", "", "certificate for checking the design; empty: that of the design with its name"),
 )
-"""Of the node that checks the design before it flies."""
+"""Parameters of the node that checks the design before a flight."""
 
 
 def certificate_path(design_file: Path) -> Path:
@@ -23,7 +23,7 @@ def certificate_path(design_file: Path) -> Path:
 
 
 def find_certificate(design: str, named: str = "") -> Path | None:
-    """Return the certificate ``named``, or where none is the one beside the design's own file; None if there is none.
+    """Return the certificate ``named``, by default the one of the design's own file; None if there is none.
 
     Args:
         design: Name of the design, or path of its parameter file.

@@ -41,7 +41,7 @@ def common_lyapunov(closed_loop: np.ndarray, scale: np.ndarray, name: str) -> Co
     Args:
         closed_loop: (r, n, n) discrete-time state matrices.
         scale: (n) sizes of the states that count as equal, SI.
-        name: What is being certified, for the error message.
+        name: Name of what is certified, for the error message.
 
     Raises:
         DesignError: No solution, or one that fails (24) when recomputed.

@@ -1,4 +1,4 @@
-"""What a feedback designed on the decoupled model does to the flexible modes of the coupled vehicle."""
+"""Effect of a feedback designed on the decoupled model on the elastic modes of the coupled vehicle."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def largest_real_parts(
     """Return the rightmost pole (1/s) of the sampled loop around the coupled ECM at a trim.
 
     Args:
-        design: With the structured gain F', flown at its adjustable factor 1.
-        vehicle: That of the design.
+        design: Design with the structured gain F', flown with the tube factor 1.
+        vehicle: Vehicle of the design.
         full: (2, 5 + k) the full-state gain on rigid states and filter.
         point: Altitude (m) and velocity (m/s) of the trim.
 

@@ -69,7 +69,10 @@ def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Record:
-    """What membership needs of a flight: rows k = 0 ... n of x, x_n (9), u_n, command, actuator, x_r, u_r, d_r (9)."""
+    """History of a flight for the test of membership.
+
+    Rows k = 0 ... n of x, x_n (9), u_n, command, actuator, x_r, u_r, d_r (9).
+    """
 
     state: np.ndarray
     deviation: np.ndarray
@@ -101,7 +104,7 @@ class Signals(NamedTuple):
 
 @dataclass(frozen=True)
 class ChannelModel:
-    """How Delta is split into channels: the model it is measured against, filter, acceleration columns (5, 3).
+    """Decomposition of Delta into channels: reference model, filter, acceleration columns (5, 3).
 
     ``filtered``: the nominal pitch rate is filtered as the measured one is, and its channel is nothing. ``gain`` (2, 5)
     and ``vehicle`` tell what the lag of the plan does where there are ``actuators``.
@@ -186,11 +189,11 @@ def _signals(
     fault: np.ndarray,
 ) -> None:
     n, m = state.shape[1], command.shape[1]
-    S = np.empty(n * (n + m))
+    weights, S = np.empty(len(polytope.S)), np.empty(n * (n + m))
     filter_state = np.zeros(2 * len(notch.D))
     rest(notch, deviation[0, 4] + x_r[0, 4], filter_state)
     for k in range(len(delta)):
-        schedule(polytope, state[k, 0], state[k, 1], S)
+        schedule(polytope, state[k, 0], state[k, 1], weights, S)
         for i in range(n):
             row = i * (n + m)
             predicted = x_r[k + 1, i] + defect[k, i]

@@ -42,11 +42,11 @@ class ErrorSystem:
     F_d: np.ndarray
     names: tuple[str, ...]
     unseen: int = 0
-    """How many of the last states no controller sees: those of actuators."""
+    """Number of states at the end that a controller does not see: those of actuators."""
 
     @property
     def seen(self) -> int:
-        """How many of the first states a controller sees."""
+        """Number of states at the beginning that a controller sees."""
         return len(self.names) - self.unseen
 
 
@@ -69,7 +69,7 @@ def error_system(
         F: (2, 9) or (2, 5) feedback gain.
         notch: The discrete filter.
         channels: (5, 3) effect of the acceleration channels over a period.
-        actuators: Those the design knows; F does not see their states, which come last.
+        actuators: Actuators of the design; F does not act on their states, which come last.
         period: s, that of the actuators.
     """
     r = len(A)
@@ -163,13 +163,13 @@ def lag_response(
     scheduled: np.ndarray,
     lag: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return what the lag of the plan makes of e (k, n) and of the feedback (k, 2), the loop closed, from zero.
+    """Return the effect of the plan's lag on e (k, n) and on the feedback (k, 2), in closed loop, from zero.
 
     Args:
         polytope: The design's model.
         gain: (2, 5) F, with its factor.
         notch: The discrete filter.
-        actuators: Those the design knows.
+        actuators: Actuators of the design.
         scheduled: (k, 2) altitude and velocity of the flight.
         lag: (k, 2) mean position of actuators driven by the plan, less the plan.
     """
@@ -201,12 +201,12 @@ def _lag_response(
 ) -> None:
     A_a, B_a, C_a, D_a = actuators
     n, m = N_RIGID, N_INPUTS
-    S = np.empty(N_STATES * (N_STATES + m))
+    weights, S = np.empty(len(polytope.S)), np.empty(N_STATES * (N_STATES + m))
     x, new, held = np.zeros(n), np.zeros(n), np.zeros(m)
     s, a, turned = np.zeros(2 * len(notch.D)), np.zeros(len(A_a)), np.zeros(len(A_a))
     for k in range(len(lag)):
         errors[k, :n], errors[k, n : n + len(s)], errors[k, n + len(s) :] = x, s, a
-        schedule(polytope, scheduled[k, 0], scheduled[k, 1], S)
+        schedule(polytope, scheduled[k, 0], scheduled[k, 1], weights, S)
         filtered = filter_step(notch, s, x[PITCH_RATE])
         for i in range(m):
             total = gain[i, PITCH_RATE] * filtered

@@ -25,11 +25,11 @@ from hsv.vehicle.extended import Filter, from_true_rate
 def full_state_report(
     inputs: DesignInputs, design: ControlDesign, whole: Polytope, columns: np.ndarray
 ) -> dict[str, Any]:
-    """Return the full-state gain beside the structured one, and what either does to the coupled vehicle, for JSON.
+    """Return the full-state and the structured gain, and the effect of each on the coupled vehicle, for JSON.
 
     Args:
         inputs: Scales and target of the design.
-        design: With the structured gain.
+        design: Design with the structured gain.
         whole: The co-designed polytopic model, filter states after the nine.
         columns: (5, d) disturbances that the feedback is to reject, as for the structured gain.
 

@@ -130,14 +130,14 @@ class TensorProductInputs(_Table):
     """Vertices by the tensor-product model transformation: ranks by ``tolerance``, relative, over the scales."""
 
     functions: Literal["singular", "polynomial"] = "singular"
-    """What spans the model at these ranks, see :func:`hsv.lpv.tensor_product.tensor_product`."""
+    """Functions that span the model at these ranks, see :func:`hsv.lpv.tensor_product.tensor_product`."""
     tolerance: Number = Field(gt=0.0, lt=1.0)
     altitude_samples: int = Field(ge=5, le=100)
     velocity_samples: int = Field(ge=5, le=100)
     state_scale: StateScale
     input_scale: InputSize
     filter_scale: FilterScale | None = None
-    """Of the model with the notch filter in it."""
+    """Scales of the model with the notch filter in it."""
 
 
 class ModelInputs(_Table):
@@ -151,7 +151,7 @@ class ModelInputs(_Table):
 
 
 class FeedbackDisturbance(_Table):
-    """What the feedback gain is to reject, each constant over a period; only their proportions matter."""
+    """Disturbances that the feedback gain rejects, each constant over a period; only their proportions matter."""
 
     acceleration: Acceleration = Positive
     angle_of_attack_rate: AngularRate = Positive
@@ -236,7 +236,7 @@ class DisturbanceInputs(_Table):
 
 
 class InvariantSetInputs(_Table):
-    """The invariant set (paper eq. 25 to eq. 28) and what it is to keep small."""
+    """Inputs of the invariant set (paper eq. 25 to eq. 28): the weights of its size."""
 
     method: Literal["ellipsoid", "zonotope", "modal", "box"]
     contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)
@@ -246,7 +246,7 @@ class InvariantSetInputs(_Table):
 
 
 class TighteningInputs(_Table):
-    """How the nominal input is bounded (paper eq. 30 and 35)."""
+    """Inputs for the bounds of the nominal input (paper eq. 30 and 35)."""
 
     chain: Literal["design_bounds", "literal"]
     """"literal": the bounds of (35) are those that (30) leaves; "design_bounds": as given, the plan checked by (30)."""
@@ -418,7 +418,7 @@ def with_tau(inputs: DesignInputs, tau: list[float]) -> DesignInputs:
 
 
 def find_inputs(name: str) -> Path:
-    """Return the design TOML given by path, or by name in ``HSV_DESIGN_PATH`` or the source checkout.
+    """Return the design TOML given by path, or by name: in ``HSV_DESIGN_PATH``, or a shipped one.
 
     Raises:
         DesignError: No such file.

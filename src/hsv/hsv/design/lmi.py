@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class SolverReport:
-    """How a programme was solved: versions, ``status``, ``iterations``, ``time`` (s) and the ``objective`` claimed."""
+    """Report on a solved problem: versions, ``status``, ``iterations``, ``time`` (s) and the ``objective`` returned."""
 
     solver: str
     modelling: str

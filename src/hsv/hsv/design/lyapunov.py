@@ -14,7 +14,7 @@ def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.
     Args:
         closed_loop: (r, n, n) A_i + B_i F.
         N: (n, n) the matrix of (24).
-        name: What is being verified, for the error message.
+        name: Name of what is verified, for the error message.
 
     Raises:
         DesignError: N is not positive definite, or an eigenvalue is not positive.

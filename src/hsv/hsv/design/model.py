@@ -56,7 +56,7 @@ def state_scale(inputs: ModelInputs, notch: Sequence[NotchSection]) -> np.ndarra
     """Return the sizes (n) of the model's states that count as equal, SI.
 
     Raises:
-        DesignError: Those of the filter are missing.
+        DesignError: The scales of the filter are missing.
     """
     sizes = inputs.tensor_product
     if inputs.system == "DM":
@@ -70,7 +70,7 @@ def polytopic_model(inputs: ModelInputs, vehicle: Vehicle, notch: Sequence[Notch
     """Return the polytopic model of ``vehicle``, decoupled, over the envelope, as asked for (paper eq. 12, eq. 45).
 
     Args:
-        inputs: What is asked for.
+        inputs: Inputs of the model.
         vehicle: Its inertial coupling is left out.
         notch: The filter that is a part of the ECM.
 

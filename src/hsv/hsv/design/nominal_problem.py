@@ -44,7 +44,7 @@ def certified_cost(problem: NominalProblem, K: np.ndarray, Q: np.ndarray, name: 
         problem: Vertices and weights.
         K: (m, n) gain, SI.
         Q: (n, n) ellipsoid, SI.
-        name: What is being verified, for the error message.
+        name: Name of what is verified, for the error message.
 
     Raises:
         DesignError: Q is not positive definite, or x' Q^-1 x does not decrease at a vertex.

@@ -20,7 +20,7 @@ from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import Flight, fly
-from hsv.threads import over_threads
+from hsv.simulation.side_by_side import fly_perturbed
 from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.plant import FlightStatus
 
@@ -72,7 +72,7 @@ def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[C
 
 
 def incomplete_share(inputs: DesignInputs) -> float:
-    """Return the share of fault and parameter bounds that W' stands for (paper eq. 47): tau, 1 where there is none.
+    """Return the fraction of fault and parameter bounds covered by W' (paper eq. 47): tau, or 1 if there is none.
 
     Of a diagonal tau it is the largest factor, which gives the largest set.
     """
@@ -147,15 +147,7 @@ class Region:
         Raises:
             DesignError: The flight diverged or saturated; no set can be computed from it.
         """
-        parts = self._parts
-        flight = fly(parts.perturbed(corner))
-        saturated = np.count_nonzero(np.any(flight.history.command != flight.history.u_unsaturated, axis=1))
-        if flight.status is not FlightStatus.FINISHED or saturated:
-            raise DesignError(
-                f"flight with perturbation {dict(corner)}: {flight.status.name}, {saturated} saturated steps, "
-                "expected FINISHED without saturation"
-            )
-        return flight
+        return _checked(corner, fly(self._parts.perturbed(corner)))
 
     def map(
         self,
@@ -163,8 +155,19 @@ class Region:
         over: Sequence[Corner],
         progress: Callable[[int], None] = lambda done: None,
     ) -> list[Result]:
-        """Return ``job`` of every flight, in order; compiled flights run in as many threads as there are processors."""
-        return over_threads(lambda corner: job(self.fly(corner)), over, progress)
+        """Return ``job`` of every flight, in order, with errors as above; they are flown side by side, in threads."""
+        return fly_perturbed(self._parts, over, lambda corner, flight: job(_checked(corner, flight)), progress)
+
+
+def _checked(corner: Corner, flight: Flight) -> Flight:
+    """Refuse a flight from which no set can be computed."""
+    saturated = np.count_nonzero(np.any(flight.history.command != flight.history.u_unsaturated, axis=1))
+    if flight.status is not FlightStatus.FINISHED or saturated:
+        raise DesignError(
+            f"flight with perturbation {dict(corner)}: {flight.status.name}, {saturated} saturated steps, "
+            "expected FINISHED without saturation"
+        )
+    return flight
 
 
 def record(flight: Flight) -> Record:
@@ -184,7 +187,7 @@ def record(flight: Flight) -> Record:
 
 @dataclass(frozen=True)
 class RegionResult:
-    """What was measured over the region: extremes of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
+    """Extremes measured over the region: of the channels (7), of f, w, Delta (9 each), of lag feedback (2).
 
     The last: what F makes of the lag of the plan, nothing where actuators are ideal.
     """

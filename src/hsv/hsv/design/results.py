@@ -27,7 +27,7 @@ and `hsv verify offline_design/NAME.yaml` recomputes. Units of the paper; the ce
 
 
 def results() -> str:
-    """Return the page, a column a design."""
+    """Return the page, with one column per design."""
     certificates = [read_certificate(certificate_path(find_design(name))) for name in DESIGNS]
     lines = [_HEADER, "| | " + " | ".join(DESIGNS) + " |", "| --- |" + " --- |" * len(DESIGNS)]
     for name, value in _ROWS.items():
@@ -73,14 +73,14 @@ def _membership(certificate: dict[str, Any]) -> str:
 _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
     "vertices, altitude x velocity (eq. 12)": lambda c: " x ".join(str(n) for n in c["model"]["vertices"]),
     "error of the model off the grid, relative": lambda c: f"{c['model']['accuracy']['relative_frobenius_error']:.2g}",
-    "its Bode deviation, dB; deg": lambda c: (
+    "Bode deviation of the model, dB; deg": lambda c: (
         f"{c['model']['accuracy']['bode_magnitude_error_db']:.2g}; {c['model']['accuracy']['bode_phase_error_deg']:.2g}"
     ),
-    "(24), least eigenvalue over the vertices": lambda c: f"{min(c['feedback']['lmi_smallest_eigenvalues']):.3g}",
+    "(24), smallest eigenvalue over the vertices": lambda c: f"{min(c['feedback']['lmi_smallest_eigenvalues']):.3g}",
     "spectral radius of A + BF, rigid; all states": lambda c: (
         f"{max(c['feedback']['spectral_radii']):.5f}; {c['feedback']['spectral_radius_all_states']:.5f}"
     ),
-    "adjustable factor; share of fault and parameter bounds in W (eq. 47)": lambda c: (
+    "tube factor; fraction of fault and parameter bounds in W (eq. 47)": lambda c: (
         f"{c['adjustable']['tau'][0]:g}; {c['adjustable']['share']:g}" if "adjustable" in c else "1; 1"
     ),
     "largest nominal input from trim: fuel; elevator deg (eq. 35, eq. 52)": lambda c: _each(
@@ -90,33 +90,33 @@ _ROWS: dict[str, Callable[[dict[str, Any]], str]] = {
         f"{len(c['nominal'])}; {c['nominal'][0]['certified_gamma']:.1f}"
     ),
     "notch filter, rad/s": lambda c: ", ".join(f"{n['zero_frequency']:g}" for n in c["inputs"]["notch"]),
-    "inertial coupling; share of W in the tube": lambda c: (
+    "inertial coupling; fraction of W in the tube": lambda c: (
         f"{c['inputs']['disturbance']['coupling']}; {c['inputs']['disturbance']['share']:g}"
     ),
     "half-widths z: ft, ft/s, deg, deg, deg/s (eq. 28)": lambda c: _half_width(c["tube"]),
-    "the same of Z for the whole W at tau = 1": lambda c: (
+    "half-widths of Z for the whole W at tau = 1": lambda c: (
         _half_width(c["adjustable"]["complete"]) if "adjustable" in c else "-"
     ),
     "the paper's tau Z": lambda c: _sizes(c["adjustable"]["scaled_half_width"]) if "adjustable" in c else "-",
     "half-range of F Z: fuel; elevator deg": lambda c: _each(c, c["tube"]["invariant_set"]["feedback_half_range"]),
     "U minus F Z with trim: fuel; elevator deg (eq. 30)": _range,
-    "least room of the nominal plan in it: fuel; elevator deg": _room,
-    "worst level of 1e5 random sequences of 600 steps": lambda c: (
+    "smallest margin of the nominal inputs in it: fuel; elevator deg": _room,
+    "largest level of 1e5 random sequences of 600 steps": lambda c: (
         f"{c['tube']['invariant_set']['sampling']['worst_level']:.4f}"
     ),
-    "worst level of flights; their number": lambda c: (
+    "largest level of flights; number of flights": lambda c: (
         f"{c['tube']['flights']['worst_level']:.3f}; {c['tube']['flights']['flights']}"
     ),
-    "their worst disturbance over its bound": _membership,
-    "their worst end errors: ft; ft/s": lambda c: (
+    "largest disturbance of the flights, relative to its bound": _membership,
+    "largest end errors of the flights: ft; ft/s": lambda c: (
         f"{_in('m', c['tube']['flights']['worst']['altitude_end_error'])}; "
         f"{_in('m/s', c['tube']['flights']['worst']['velocity_end_error'])}"
     ),
-    "their worst attitude after the fault, from before it; from nominal: deg": lambda c: (
+    "largest attitude deviation after the fault, from before it; from nominal: deg": lambda c: (
         f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_deviation'])}; "
         f"{_in('rad', c['tube']['flights']['worst']['post_fault_attitude_from_nominal'])}"
     ),
-    "worst level of flights with the whole fault": lambda c: (
+    "largest level of flights with the whole fault": lambda c: (
         f"{c['adjustable']['complete_fault']['worst_level']:.3f}" if "adjustable" in c else "-"
     ),
     "saturated steps of the flights": lambda c: f"{c['tube']['flights']['worst']['saturated_steps']:g}",

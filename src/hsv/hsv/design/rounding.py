@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 
 VERTEX_DIGITS = 12
-"""Of vertices, below the scales of the model: two processors agree on ten, but the slow modes in the Bode plot need
-twelve. What no physics makes is below 1e-14 and becomes zero."""
+"""Digits kept of vertices, below the scales of the model: two processors agree on ten, but the slow modes in the Bode
+plot need twelve. Entries that are zero in the physical model are below 1e-14 and become zero."""
 
 GAIN_DIGITS = 6
-"""Of gains, below the scales of their problem: agreed on are eight."""
+"""Digits kept of gains, below the scales of their problem; processors agree on eight."""
 
 MATRIX_DIGITS = 11
-"""Of ellipsoids and their centres and multipliers, below their own sizes: agreed on are eight, but an ellipsoid has to
-be invariant and nested in the direction in which it is thinnest, too, where its entries cancel."""
+"""Digits kept of ellipsoids, their centres and multipliers, below their own sizes. Processors agree on eight, but an
+ellipsoid must also be invariant and nested in its thinnest direction, where its entries cancel."""
 
 BOUND_DIGITS = 6
-"""Of bounds of disturbances and inputs."""
+"""Digits kept of bounds of disturbances and inputs."""
 
 
 def rounded(values: np.ndarray, size: Any, digits: int) -> np.ndarray:

@@ -20,7 +20,7 @@ def solve(problem: cp.Problem, name: str) -> SolverReport:
 
     Args:
         problem: The programme; its variables hold the solution afterwards.
-        name: What is being designed, for the error message.
+        name: Name of the result, for the error message.
 
     Raises:
         DesignError: Infeasible, unbounded, or the solver gave up.

@@ -60,7 +60,7 @@ def tighten(
 def left_by(
     found: InvariantSet, minimum: np.ndarray, maximum: np.ndarray, lag: tuple[np.ndarray, np.ndarray] | None = None
 ) -> TightenedInputs:
-    """Return U minus F Z, whether anything is left or not; arguments as for :func:`tighten`."""
+    """Return U minus F Z, even if it is empty; arguments as for :func:`tighten`."""
     system, disturbance = found.problem.system, found.problem.disturbance
     middle = system.F @ found.centre + system.F_d @ disturbance.centre
     half = found.feedback + np.abs(system.F_d) @ disturbance.half_width
@@ -69,7 +69,7 @@ def left_by(
 
 
 def plan_bounds(bounds: TightenedInputs, lowest: np.ndarray, highest: np.ndarray) -> PlanBounds:
-    """Return what another nominal plan may use for the disturbance set to hold for it, too; flights have to show it.
+    """Return bounds for another nominal plan within which the disturbance set should hold; flights have to show it.
 
     Another plan may hold for long the inputs that the certified ones only touch. So it is kept off their top; the room
     below them is that of plans that overshoot a little. The pitch acceleration is as theirs.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,11 +22,10 @@ from hsv.design.sets.sampling import sample
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.progress import Progress
 from hsv.simulation.closed_loop import Flight
 from hsv.simulation.metrics import flight_metrics
 from hsv.vehicle.dynamics import PITCH_RATE
-
-Progress = Callable[[str, int, int], None]
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
 """Size and seed of the sampling evidence."""
@@ -43,7 +41,7 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Tube:
-    """Disturbance set, invariant set, tightened inputs and what a plan may use, with the ``report`` (for JSON)."""
+    """Disturbance set, invariant set, tightened inputs and bounds of the plan, with the ``report`` (for JSON)."""
 
     disturbance: DisturbanceSet
     found: InvariantSet
@@ -69,7 +67,7 @@ def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> Invariant
 
 @dataclass(frozen=True)
 class MeasuredSet:
-    """The invariant set of the disturbances measured over a region, certified, and what it leaves of the inputs."""
+    """The certified invariant set of the disturbances measured over a region, and the remaining range of the inputs."""
 
     measured: RegionResult
     disturbance: DisturbanceSet
@@ -158,7 +156,7 @@ def flights_in_tube(
 
 @dataclass(frozen=True)
 class FlightEvidence:
-    """What one flight shows: worst ``level``, ratios |e - c| / z (n), membership, extremes of its plan, some metrics.
+    """Results of one flight: largest ``level``, ratios |e - c| / z (n), membership, extremes of its plan, metrics.
 
     ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2); ``lag_feedback`` (2, 2):
     least and largest feedback to the lag of the plan.

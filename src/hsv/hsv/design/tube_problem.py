@@ -1,4 +1,4 @@
-"""What the invariant set of a design is sought for: its error system under its disturbances."""
+"""The problem whose solution is the invariant set of a design: its error system under its disturbances."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ def known_actuators(design: ControlDesign) -> tuple[ActuatorSet, ...]:
     return tuple(ACTUATOR_SETS[name] for name in design.actuators)
 
 
-def factors(design: ControlDesign) -> list[np.ndarray]:
-    """Return the adjustable factors (5 each) that bound all that may fly: the least, for which the set is found, and 1.
+def bounding_factors(design: ControlDesign) -> list[np.ndarray]:
+    """Return the tube factors (5 each) between which all others lie: the least, for which the set is found, and 1.
 
-    A closed loop under a factor between the two is between theirs, so a set that is invariant under both is invariant
-    whatever the factor does in between.
+    The closed loop under a factor between the two lies between their closed loops, so that a set that is invariant
+    under both is invariant for any variation of the factor between them.
     """
     one = np.ones(N_RIGID)
     return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
@@ -57,6 +57,6 @@ def tube_problem(design: ControlDesign, vehicle: Vehicle, disturbance: Disturban
             known_actuators(design),
             design.period,
         )
-        for factor in factors(design)
+        for factor in bounding_factors(design)
     ]
     return TubeProblem(union(*systems), disturbance)

@@ -47,7 +47,7 @@ def move_effectors(
     effector: np.ndarray,
     length: float = 1.0,
 ) -> None:
-    """Move the actuators over one substep, or a share of it; write into ``effector`` (2) what the vehicle is given.
+    """Move the actuators over one substep or a fraction of it; write the result into ``effector`` (2).
 
     Args:
         data: :class:`hsv.vehicle.actuators.ActuatorData`.
@@ -56,10 +56,10 @@ def move_effectors(
         memory: See :mod:`hsv.faults.laws`.
         step: k.
         substep: From 0, where it begins.
-        command: That reaches the actuators (2).
+        command: Command that reaches the actuators (2).
         angle_of_attack: rad, for what floats along the flow.
         effector: What it was over the substep before; replaced.
-        length: In substeps.
+        length: Length in substeps.
     """
     n = len(rows.table)
     middle, h = (substep + 0.5 * length) * data.substep, length * data.substep
@@ -166,7 +166,7 @@ def advance_equipped(
 
     Args:
         x: State, replaced.
-        command: That reaches the actuators.
+        command: Command that reaches the actuators.
         p: Parameters of the vehicle.
         period: T (s).
         substeps: Runge-Kutta steps a period while all is ideal.
@@ -175,7 +175,7 @@ def advance_equipped(
         rows: Faults of dynamics and effectors.
         memory: Theirs, replaced.
         step: k.
-        seed: Of the flight.
+        seed: Seed of the flight.
         effector: What the vehicle was given last (2), replaced.
         work: See :func:`hsv.vehicle.integration.workspace`.
         conditions: Of air and engine (7), held, or none.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -25,12 +26,12 @@ FAULT_PARAMETERS = (
     SEED_PARAMETER,
     Parameter("fault.channels", ["none"], "channel of each scheduled fault, or one 'none'"),
     Parameter("fault.types", ["none"], "type of each scheduled fault: " + ", ".join(FAULT_KINDS)),
-    Parameter("fault.parameters", ["none"], "parameters of each, SI, as 'effectiveness=0.9', commas between several"),
+    Parameter("fault.parameters", ["none"], "parameters of each, SI, such as 'effectiveness=0.9', separated by commas"),
     Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
     Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
 )
 LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
-"""Of the way of the command to the injector."""
+"""Parameters of the link that carries the command to the injector."""
 
 NEVER_TIME = 1e9
 """Stop (s) of a fault that does not end, where others do."""
@@ -38,7 +39,7 @@ NEVER_TIME = 1e9
 
 @dataclass(frozen=True)
 class FaultResult:
-    """What reaches the actuators (2), and the faults that are due.
+    """Input that reaches the actuators (2), and the active faults.
 
     Those of command, actuators, effectors and engine are due in this step, those of sensors in the next: its
     measurement is the first that can have heard of them.
@@ -70,8 +71,8 @@ class FaultInjector:
         Args:
             scheduled: Faults.
             period: T (s).
-            seed: Of the flight.
-            link: On which the command comes; None: an ideal one.
+            seed: Seed of the flight.
+            link: Link that carries the command; None: an ideal one.
             before: The input (2) that came on it until the flight began.
         """
         # The first measurement is there before anybody can have told the sensors of a fault.
@@ -115,8 +116,15 @@ class FaultInjector:
         ]
         return cls(scheduled, *flown)
 
+    def with_seed(self, seed: int) -> FaultInjector:
+        """Return the same schedule for a flight of another ``seed``."""
+        other = copy(self)
+        other.seed = seed
+        other.reset()
+        return other
+
     def reset(self) -> None:
-        """Return to the schedule: what was injected or cleared in flight is forgotten."""
+        """Return to the schedule: everything injected or cleared in flight is discarded."""
         self.known = list(self.scheduled)
         self._next = 0
         self._rows = self.rows((COMMAND,))
@@ -147,8 +155,6 @@ class FaultInjector:
         """Start ``fault`` with the next step, for so many, in place of one of its type on its channel.
 
         Returns:
-        -------
-        int
             That step.
         """
         self.clear(fault.channel, fault.type)
@@ -161,8 +167,6 @@ class FaultInjector:
         """End the faults acting on ``channel`` (all channels if empty), those of a kind alone where one is given.
 
         Returns:
-        -------
-        int
             The next step, the first without; of faults of sensors alone, the one after it.
 
         Raises:

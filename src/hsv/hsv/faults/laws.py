@@ -31,7 +31,7 @@ from hsv.noise import STREAMS, uniforms
 from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
 
 ALWAYS, PERIODIC, RANDOM = 0, 1, 2
-"""How a fault occurs between its start and its stop."""
+"""Ways in which a fault occurs between its start and its stop."""
 
 N_PARAMETERS = max(len(kind.parameters) for kind in FAULT_KINDS.values())
 
@@ -230,7 +230,7 @@ def apply_engine_faults(
         rows: Faults of the engine.
         memory: Theirs.
         step: k.
-        seed: Of the flight.
+        seed: Seed of the flight.
         angle_of_attack: rad, of the air.
         mach: Mach number.
         fuel: Equivalence ratio that the engine gets.

@@ -24,14 +24,14 @@ ENGINE = "engine"
 
 @dataclass(frozen=True)
 class Channel:
-    """What can fail: the SI unit of its signal, and a travel, with which the ranges of parameters are measured."""
+    """Channel on which faults can act: the SI unit of its signal, and a travel that scales the ranges of parameters."""
 
     unit: str
     travel: float
 
 
 _STOP = parse_quantity("30 deg", "rad", "stop")
-"""Of the elevator, rad, every bit as a file that says 30 deg has it"""
+"""Stop of the elevator, rad, with the same bits as 30 deg in a file."""
 
 CHANNELS = {
     **{
@@ -81,7 +81,7 @@ COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effec
 """Codes of the kinds for compiled functions, in the order in which they act."""
 
 REPLACING = (LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION)
-"""What replaces the position of an effector: the newest wins."""
+"""Types that replace the position of an effector; the most recent one applies."""
 
 LONGEST_DELAY = 50
 """Steps."""
@@ -97,7 +97,7 @@ class FaultParameter:
     minimum: float
     maximum: float
     default: float | None = None
-    """None: it must be given"""
+    """Default value; None: the parameter must be given."""
     whole: bool = False
 
     def of(self, channel: str) -> Parameter:
@@ -125,14 +125,13 @@ class FaultParameter:
 
 @dataclass(frozen=True)
 class FaultKind:
-    """A kind of fault: its code and side, which channels it may have, its own parameters, and whether it remembers."""
+    """A kind of fault: its code and side, which channels it may have, its meaning and its own parameters."""
 
     code: int
     side: str
     channels: tuple[str, ...]
     meaning: str
     parameters: tuple[FaultParameter, ...] = ()
-    memory: bool = False
 
 
 _P = FaultParameter
@@ -176,7 +175,6 @@ FAULT_KINDS = {
         INPUT_NAMES,
         "the command changes its sign",
         (_P("about_start", "0: of the whole command, 1: of its change since the start", "", 0.0, 1.0, 0.0),),
-        memory=True,
     ),
     "delay": FaultKind(
         DELAY,
@@ -184,7 +182,6 @@ FAULT_KINDS = {
         INPUT_NAMES,
         "the actuator hears the command late, at first the one at the start of the fault",
         (_P("steps", "control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
-        memory=True,
     ),
     "dead_zone": FaultKind(
         DEAD_ZONE,
@@ -192,10 +189,9 @@ FAULT_KINDS = {
         INPUT_NAMES,
         "commands near the one at the start of the fault have no effect",
         (_WIDTH,),
-        memory=True,
     ),
     "backlash": FaultKind(
-        BACKLASH, COMMAND, INPUT_NAMES, "the actuator follows with play, at first in its middle", (_WIDTH,), memory=True
+        BACKLASH, COMMAND, INPUT_NAMES, "the actuator follows with play, at first in its middle", (_WIDTH,)
     ),
     "bandwidth": FaultKind(
         BANDWIDTH,
@@ -242,7 +238,7 @@ FAULT_KINDS = {
         "an oscillation is added to the position (liquid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
     ),
-    "lock_in_place": FaultKind(LOCK, EFFECTOR, INPUT_NAMES, "the effector stays where it is", memory=True),
+    "lock_in_place": FaultKind(LOCK, EFFECTOR, INPUT_NAMES, "the effector stays where it is"),
     "lock_at": FaultKind(
         LOCK_AT,
         EFFECTOR,
@@ -263,7 +259,6 @@ FAULT_KINDS = {
         INPUT_NAMES,
         "the effector runs to its stop and stays there",
         (_P("rate", "its sign says to which stop", "{}/s", -100.0, 100.0),),
-        memory=True,
     ),
     "solid_oscillation": FaultKind(
         SOLID_OSCILLATION,
@@ -271,7 +266,6 @@ FAULT_KINDS = {
         INPUT_NAMES,
         "the effector oscillates about where it was, whatever the command (solid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
-        memory=True,
     ),
     "thrust_loss": FaultKind(
         THRUST_LOSS, ENGINE_SIDE, (ENGINE,), "a share of the thrust remains", (_P("share", "share", "", 0.0, 1.0),)
@@ -285,7 +279,6 @@ FAULT_KINDS = {
         (ENGINE,),
         "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
         (*_UNSTART, *_OUTSIDE),
-        memory=True,
     ),
     "sensor_scale": FaultKind(
         SENSOR_SCALE, SENSOR, STATE_NAMES, "the sensor shows this multiple", (_P("factor", "multiple", "", -1.0, 2.0),)
@@ -317,9 +310,8 @@ FAULT_KINDS = {
         STATE_NAMES,
         "samples are lost at random, the last one is held",
         (_P("probability", "that a sample is lost", "", 0.0, 1.0),),
-        memory=True,
     ),
-    "sensor_freeze": FaultKind(SENSOR_FREEZE, SENSOR, STATE_NAMES, "the sensor shows what it showed", memory=True),
+    "sensor_freeze": FaultKind(SENSOR_FREEZE, SENSOR, STATE_NAMES, "the sensor shows what it showed"),
 }
 """The vocabulary, in the order in which faults that act at once are composed."""
 
@@ -329,7 +321,7 @@ OCCURRENCE_PARAMETERS = (
     _P("random_on", "mean time for which it acts, random; 0: it stays", "s", 0.0, 1e4, 0.0),
     _P("random_off", "mean time between", "s", 0.0, 1e4, 0.0),
 )
-"""Of a fault of any kind: always there from its start to its stop, in a period, or as a Markov chain of two states."""
+"""Parameters of faults of all types: permanent between start and stop, periodic, or as a two-state Markov chain."""
 
 
 def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
@@ -420,13 +412,13 @@ class Fault:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Its parameters by name, SI, but those that are as by default."""
+        """Parameters by name, SI, without those at their defaults."""
         table = fault_parameters(self.channel, self.type)
         return {p.name: value for p, value in zip(table, self.values, strict=True) if value != p.default}
 
 
 def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
-    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; an only one without its name.
+    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; a single one without name.
 
     Raises:
         ParameterError, QuantityError: As :meth:`Fault.of`, or a quantity is none.

@@ -35,9 +35,9 @@ DIAGNOSTICS = "diagnostics"
 ROSOUT = "/rosout"
 PARAMETER_EVENTS = "/parameter_events"
 MARKERS = "hsv/airframe"
-"""What the airframe node publishes for RViz2; no node of the graph knows of it, and no bag holds it."""
+"""Topic of the airframe node for RViz2; no node of the graph uses it, and no bag contains it."""
 WIRE_ALIGNMENT = 4
-"""What is sent over DDS is padded with zeros to a multiple of so many bytes."""
+"""Messages sent over DDS are padded with zeros to a multiple of this number of bytes."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
 
@@ -107,7 +107,7 @@ class NodeDescription:
     package: str
     executable: str
     publishes: tuple[str, ...]
-    """In the order in which a step publishes them: first what others wait for."""
+    """Topics in the order in which a step publishes them, those that others wait for first."""
     subscribes: tuple[str, ...]
     known_by: str = ""
     """Type of a message that only this role publishes: who does plays the role, whatever it and its topics are called.
@@ -118,16 +118,15 @@ class NodeDescription:
     announces: tuple[str, ...] = ()
     """Further topics that only this role publishes, not in every step."""
     block: Block | None = None
-    """What it steps, if it does."""
+    """Block that the node steps, if any."""
     delayed: tuple[str, ...] = ()
-    """Those of the topics that it subscribes, and the first of them, of which it takes the message of the step before.
-    """
+    """Subscribed topics whose message of the previous step is taken."""
     foreign: bool = False
     """Whether it is not one of this bench's: it knows the messages alone, and announces itself to nobody."""
 
     @property
     def label(self) -> str:
-        """What the process is called in words: its role, or what was started where that is not of this bench."""
+        """Name of the process in words: its role, or what was started if it is not a node of this bench."""
         return f"{self.package}/{self.executable}" if self.foreign else self.name
 
     @property
@@ -193,18 +192,18 @@ COMPOSED = NodeDescription("composed", "hsv_bringup", "composed", (), ())
 """All nodes of the graph in one process."""
 
 PEER_EMULATOR = NodeDescription("peer_emulator", "hsv_bringup", "peer_emulator", (), ())
-"""Not of the graph: takes the place of all others when one node is replayed."""
+"""Process outside the graph that replaces all other nodes when one node is replayed."""
 
 PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
-"""Not of the graph: republishes a bag."""
+"""Process outside the graph that republishes a bag."""
 
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
-"""Not of the graph: shows a flight while it is flown. Nobody waits for it, and it ends with the others."""
+"""Process outside the graph that shows a running flight. No node waits for it, and it ends with the others."""
 
 FAULT, SET_PARAMETER, TOPIC, WATCH = (
     NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic", "watch")
 )
-"""Not of the graph: commands that ask a running one."""
+"""Processes outside the graph: commands that act on a running one."""
 
 
 def controller_node(controller: str) -> NodeDescription:

@@ -1,4 +1,4 @@
-"""Between messages and the signals of the loop, one pair of functions a topic.
+"""Conversion between messages and the signals of the loop, with one pair of functions per topic.
 
 The nodes use them with ROS 2 messages, the replay with those of a bag's own definitions. Messages are objects with the
 fields of their type as attributes; those handed out are filled in place.
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 Message = Any
 MessageClass = Callable[[str], Callable[..., Message]]
-"""From ``package/msg/Type`` to what makes a message of it."""
+"""Function from ``package/msg/Type`` to the class of the message."""
 
 
 def state_vector(message: Message) -> np.ndarray:
@@ -127,7 +127,7 @@ READ: dict[str, Callable[[Message, Signals], None]] = {
     COMMAND: _read_command,
     ACTUATOR: _read_actuator,
 }
-"""By topic, from its message to the signals."""
+"""Functions by topic, from its message to the signals."""
 
 
 def stamp_of(step: int, period: float) -> tuple[int, int]:
@@ -228,7 +228,7 @@ def active_faults(message: Message) -> tuple[ActiveFault, ...]:
     """Return the faults in a message Actuator, with their first steps.
 
     Raises:
-        ParameterError: As :func:`fault_in`.
+        ParameterError: See :func:`fault_in`.
     """
     from hsv.faults.schedule import ActiveFault
 
@@ -264,4 +264,4 @@ FILL: dict[str, Callable[[Signals, Message, MessageClass], None]] = {
     TUBE_STATUS: _fill_tube_status,
     ACTUATOR: _fill_actuator,
 }
-"""By topic, from the signals to its message."""
+"""Functions by topic, from the signals to its message."""

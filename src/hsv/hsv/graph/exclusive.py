@@ -1,4 +1,4 @@
-"""What there may be only one of in a ROS domain: a run in a namespace, a node that publishes a topic.
+"""Exclusive roles in a ROS domain: one run per namespace, and one publisher per topic.
 
 Each is a name that one process of this machine can bind, an abstract socket: taken at once, before the second has sent
 anything, and free as soon as its process is gone, however that ended. On other machines of the same domain nothing is

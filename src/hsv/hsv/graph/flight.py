@@ -1,4 +1,4 @@
-"""One run of the graph from start to end: processes started, watched and ended, the bag mended where it has to be."""
+"""One run of the graph from start to end: processes started, watched and ended, the bag completed if necessary."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ def fly_graph(
     """Fly ``prepared`` with its processes, recorded to its bag; interrupted before the first step, it leaves no bag.
 
     Args:
-        prepared: What :func:`hsv.graph.preparation.prepare` returns.
+        prepared: Prepared run, from :func:`hsv.graph.preparation.prepare`.
         namespace: Namespace of all nodes, as :func:`hsv.graph.description.checked_namespace` returns it.
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
         on_snapshot: Called with what the recorder tells of the flight.
 
     Raises:
-        RunError: A process failed or is not built, or the bag cannot be mended; last words are in the message.
+        RunError: A process failed or is not built, or the bag cannot be repaired; last words are in the message.
     """
     failures = []
     try:
@@ -51,14 +51,14 @@ def fly_graph(
 
 
 def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
-    """Finish the bag of a graph whose processes have ended, and fail if anything did.
+    """Finish the bag of a graph whose processes have ended, and raise an error if anything failed.
 
     Args:
         bag: The bag directory; removed where no recorder has come to write anything.
-        failures: What went wrong with the processes, in words.
+        failures: Failures of processes, in words.
 
     Raises:
-        RunError: There are ``failures``, or the bag cannot be mended; names the bag where there is one.
+        RunError: There are ``failures``, or the bag cannot be repaired; names the bag where there is one.
     """
     words = list(failures)
     try:

@@ -11,7 +11,7 @@ from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.parameters import Parameter
 
 LOCKSTEP_PARAMETERS = (
-    Parameter("recorder", True, "whether a recorder belongs to the graph"),
+    Parameter("recorder", True, "whether the graph has a recorder"),
     *CONTROLLER_PARAMETERS,
     ESTIMATOR_ENABLED,
 )
@@ -22,10 +22,16 @@ STEP_TIMEOUT = 10.0
 
 PACE_PARAMETERS = (
     Parameter(
-        "real_time_factor", 0.0, "simulated over wall time; 0: as fast as possible", "", 0.0, 1e3, read_only=False
+        "real_time_factor",
+        0.0,
+        "ratio of simulated to wall time; 0: as fast as possible",
+        "",
+        0.0,
+        1e3,
+        read_only=False,
     ),
-    Parameter("paused", False, "whether the flight stands still, until this is false", read_only=False),
-    Parameter("start_timeout", 0.0, "wall time to wait for all nodes of the graph; 0: for ever", "s", 0.0, 1e6),
+    Parameter("paused", False, "whether the flight is paused", read_only=False),
+    Parameter("start_timeout", 0.0, "wall time to wait for all nodes of the graph; 0: no limit", "s", 0.0, 1e6),
     Parameter("step_timeout", STEP_TIMEOUT, "wall time to wait for a peer within a step", "s", 0.1, 1e6),
     Parameter("progress", False, "print the step to standard output, for a progress bar"),
 )
@@ -41,15 +47,15 @@ RECORDER_PARAMETERS = (
 LIVE_PARAMETERS = (
     Parameter("live.port", 8765, "port of the Foxglove WebSocket server; 0: any free one", "", 0, 65535),
     Parameter("live.page_port", 8766, "port of the live page; 0: any free one", "", 0, 65535),
-    Parameter("live.title", "", "what the live page calls the flight"),
-    Parameter("live.bag", "", "bag that is written of the flight, which the live page names in the end"),
+    Parameter("live.title", "", "title of the flight on the live page"),
+    Parameter("live.bag", "", "bag of the flight, which the live page names at the end"),
 )
 """Parameters of the live view."""
 
 PEER_EMULATOR_PARAMETERS = (
     Parameter("peer_emulator.bag", "", "bag to feed the node from"),
     Parameter("peer_emulator.node", "", "node under test"),
-    Parameter("peer_emulator.directory", "", "bag to write with its answers, a new directory"),
+    Parameter("peer_emulator.directory", "", "bag to write with its outputs, a new directory"),
     Parameter("peer_emulator.timeout", 30.0, "wall time to wait for an answer to a step", "s", 0.1, 1e6),
 )
 """Parameters of the peer emulator, which takes the place of all other nodes in a replay over DDS."""

@@ -29,14 +29,14 @@ from hsv.graph.description import (
     resolved,
 )
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
-from hsv.graph.progress import HUNG_AFTER, Standstill, processor_time
 from hsv.graph.snapshot import Snapshot
+from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 
 GRACE = 20.0
 """Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
 
 WARNING = "[WARN] "
-"""What ROS nodes begin a warning with, and so does the launcher."""
+"""Prefix of warnings of ROS nodes and of the launcher."""
 
 _LOOK = 0.02
 """Seconds between two looks at the processes."""
@@ -70,11 +70,15 @@ def become(node: NodeDescription, words: Sequence[str], namespace: str = "") -> 
     would end it with a traceback.
 
     Raises:
-        RunError: As :func:`executable`.
+        KeyboardInterrupt: One came during an import.
+        RunError: See :func:`executable`.
         ParameterError: ``namespace`` is none.
     """
     remapped = ["--ros-args", "-r", f"__ns:={checked_namespace(namespace)}"] if namespace else []
     path = str(executable(node))
+    left, _ = signal.setitimer(signal.ITIMER_REAL, 0.0)
+    if left > 0.0:
+        raise KeyboardInterrupt  # which was to come later: the timer would end the program in its place
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGTERM))
     os.execv(path, [path, *words, *remapped])
 
@@ -117,11 +121,11 @@ class Launcher:
         """Prepare to start processes.
 
         Args:
-            nodes: What to start, the one that ends the run last.
+            nodes: Nodes to start, the one that ends the run last.
             arguments: Command line of each.
             on_step: Called with the steps that are reported.
             on_line: Called with the name of a node and every other line that it writes, or that is to be said of it.
-            wait_timeout: For how long (s) a process may do nothing at all, where no other node would end the run.
+            wait_timeout: Time (s) for which a process may be idle if no other node would end the run.
             namespace: Namespace of all nodes.
             on_snapshot: Called with what the recorder tells of the flight.
         """
@@ -155,8 +159,8 @@ class Launcher:
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
 
-        A process that hangs is named, and again when it goes on. In flight the plant finds out for itself whom it waits
-        for in vain, and ends.
+        A process that hangs is reported, and also when it continues. In flight the plant itself detects a peer that
+        does not answer, and ends.
 
         Raises:
             RunError: It failed, or another ended before it (a plant that has landed may); with its last words. Or it
@@ -257,7 +261,7 @@ class Launcher:
         # Said now: until the others have ended and the bag is closed, a busy machine may take its time.
         self._on_line(process.description.label, WARNING + reason)
         words = "".join(f"\n  {word}" for word in process.words)
-        return RunError(f"{process.description.label} {reason}{'. Its last words:' if words else ''}{words}")
+        return RunError(f"{process.description.label} {reason}{'. Last output:' if words else ''}{words}")
 
 
 def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.socket:
@@ -272,7 +276,7 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
     where = f"ROS_DOMAIN_ID={domain}{f' and namespace {namespace}' if namespace != ROOT else ''}"
     held = claim_namespace(domain, namespace)
     if held is None:
-        raise RunError(f"another run has {where}: expected a domain or a namespace of its own for every run")
+        raise RunError(f"another run has {where}: expected a separate domain or namespace for every run")
     for node in graph() if COMPOSED in nodes else nodes:
         for topic in (resolved(name, namespace) for name in node.own_topics):
             if is_published(domain, topic):

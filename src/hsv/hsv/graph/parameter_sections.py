@@ -8,9 +8,9 @@ from typing import Any, Self
 
 import yaml
 
-from hsv.control.adjustable import TAU
 from hsv.control.design_file import parse_sections
 from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.tube_factor import TAU
 
 _ALL = "/**"
 
@@ -20,13 +20,13 @@ class ParameterSections:
     """Flat parameters by node."""
 
     shared: dict[str, Any]
-    """Of every node, as far as it has them."""
+    """Values for every node that has the parameter."""
     own: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """By node, over the shared ones."""
+    """Values by node, which override the shared ones."""
 
     @classmethod
     def gathered(cls, values: Mapping[str, Mapping[str, Any]]) -> Self:
-        """Return the parameters of the nodes in ``values``: shared is what all that have it agree on."""
+        """Return the parameters of the nodes in ``values``; a value on which all nodes agree is shared."""
         differing = differences(values)
         shared = {name: value for flat in values.values() for name, value in flat.items() if name not in differing}
         own = {node: {name: flat[name] for name in differing if name in flat} for node, flat in values.items()}
@@ -34,7 +34,7 @@ class ParameterSections:
 
     @classmethod
     def parse(cls, text: str, source: str) -> Self:
-        """Return what stands in the ``text`` of a parameter file.
+        """Return the contents of the ``text`` of a parameter file.
 
         Raises:
             DesignError: It is no parameter YAML; the message names ``source``.

@@ -1,4 +1,4 @@
-"""From a scenario to the files that a run of the graph needs: parameters, attachments, a name for the bag."""
+"""Preparation of a run of the graph from a scenario: parameters, attachments, a name for the bag."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def prepare(
     Args:
         scenario_name: Name or path of the scenario.
         text: The scenario, as :func:`hsv.simulation.scenario.scenario_text` returns it; empty: that of this name.
-        bags: Where the bag is made if ``bag`` is not given, named by scenario and time.
+        bags: Folder of the bag if ``bag`` is not given; it is named by scenario and time.
         bag: Bag to record to, a new directory.
         real_time_factor: Simulated over wall time; 0: as fast as possible; ``None``: 0, with a live view 1.
         step_timeout: Wall time (s) after which a silent node ends the run; ``None``: :data:`STEP_TIMEOUT`, or
@@ -180,7 +180,7 @@ def _started(controller: str, composed: bool) -> tuple[NodeDescription, ...]:
 
 
 def provenance(controller: str, name: str, design_hash: str, seed: int) -> dict[str, str]:
-    """Return what a bag says of where its flight comes from: controller, design with its ``name``, seed, and when."""
+    """Return the origin of a flight for its bag: controller, design with its ``name``, seed, and time."""
     library = library_digest(controller)
     return {
         "commit": commit(),
@@ -198,7 +198,7 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, 
 
     Args:
         values: Flat parameters of every node, by its role.
-        flown: Those of the node whose design it is.
+        flown: Parameters of the node whose design it is.
     """
     sections = ParameterSections.gathered(values)
     design = {parameter.name for parameter in DESIGN_PARAMETERS}
@@ -211,7 +211,7 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, 
 
 
 def design_files(design: Path) -> dict[str, str]:
-    """Return what a design brings to the attachments of a bag, by name: parameters and certificate."""
+    """Return the attachments of a bag that belong to its design, by name: parameters and certificate."""
     return {"design.yaml": read_text(design)} | _certificate(certificate_path(design))
 
 

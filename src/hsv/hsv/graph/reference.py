@@ -15,40 +15,43 @@ from hsv.simulation.blocks import LOOP
 from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
 _HEADER = """# Parameters of the nodes
-Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare from. SI units. A
-value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit code 2;
-floats need a decimal point (`-p duration:=200.0`). So does a parameter that the node does not have, with the nearest
-one named; only the sections of a file for all nodes (`/**`) may hold what other nodes have. All are fixed once a node
-runs, unless the last column says otherwise.
+Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare. All values are in
+SI units. A value of the wrong type or outside its range ends the node before it joins the graph, with one line and exit
+code 2; floats need a decimal point (`-p duration:=200.0`). So does an unknown parameter, and the line
+names the most similar one; only the sections of a file for all nodes (`/**`) may contain parameters of other nodes.
+Parameters cannot be changed once a node runs, unless the last column says otherwise.
 
-What `ros2 param dump` writes of a node can be given to it again with `--params-file` and flies the same; the recorder
-then needs another `bag.directory`, and `bag.attachments` that are still there.
+The output of `ros2 param dump` for a node can be passed to it with `--params-file` and gives the same flight; the
+recorder then needs another `bag.directory`, and the files of `bag.attachments` must still exist.
 
-`use_sim_time` may be true for every node but the plant, which makes the clock; it changes no bit, as nodes answer to
-messages only. ROS takes the time from `/clock`: in a namespace it needs `-r /clock:=/veh1/clock` besides.
+`use_sim_time` may be true for every node except the plant, which publishes the clock; it does not change a bit, because
+nodes react to messages only. ROS takes the time from `/clock`; in a namespace, also pass `-r /clock:=/veh1/clock`.
 """
 
 _LOOP = """## The loop
-The blocks that a step passes through, in this order; each is stepped by the node of its name, the controller by that of
-its own.
+The blocks that a step passes through, in this order. Each is stepped by the node of the same name; the controller is
+stepped by the node with the name of the controller.
 
 """
 
 _SIGNALS = """
-The signals, with the topics whose messages carry them; a size that depends on the flight is left out.
+The signals and the topics whose messages contain them. A size that depends on the flight is omitted.
 
 """
 
 
 def reference() -> str:
-    """Return the page: the loop, its signals, and one table a node."""
+    """Return the page: the loop, its signals, and one table per node."""
     parts = [_HEADER, _LOOP + _loop() + _SIGNALS + _signals(), "## Every node\n" + _table(LOCKSTEP_PARAMETERS)]
     parts += [f"## {node}\n" + _table(table) for node, table in NODE_PARAMETERS.items()]
     return "\n".join(parts)
 
 
 def _loop() -> str:
-    rows = ["| block | needs of the step | of the step before | gives | keeps |", "| --- | --- | --- | --- | --- |"]
+    rows = [
+        "| block | inputs of the step | inputs of the previous step | outputs | state |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for block in LOOP:
         groups = block.inputs, block.delayed, block.outputs, block.state
         rows.append(f"| {block.name} | {' | '.join(', '.join(s.name for s in group) for group in groups)} |")

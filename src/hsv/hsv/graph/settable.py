@@ -51,7 +51,7 @@ def parse(text: str, parameter: Parameter) -> bool | float | list[float]:
 
 
 def step_in(answer: str) -> int:
-    """Return the step from which on a change acts, of what a node has answered to it."""
+    """Return the step at which a change takes effect, from the reply of a node."""
     step = _STEP.search(answer)
     assert step, "a parameter that may change in flight answers from which step on"
     return int(step[1])

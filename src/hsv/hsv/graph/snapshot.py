@@ -1,4 +1,4 @@
-"""What is told of a flight while it is flown: a few numbers of a step, as a line between processes and for people."""
+"""Snapshot of a running flight: a few numbers of a step, as a line between processes and for display."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any, Self
 from hsv.units import UnitSystem, in_system, significant
 
 _MARK = "flight "
-"""How a line between processes begins."""
+"""Prefix of a line between processes."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Snapshot:
     velocity_error: float
     """Velocity less its reference"""
     tube_level: float | None
-    """At most 1 inside the tube; ``None`` of a controller or a design without one"""
+    """Level in the tube, at most 1 inside; ``None`` for a controller or a design without a tube."""
     faults: tuple[str, ...]
     """Channel and type of those that are active"""
 
@@ -46,14 +46,14 @@ class Snapshot:
 
     @classmethod
     def read(cls, line: str) -> Self | None:
-        """Return what a process has written in a line, ``None`` where it is about something else."""
+        """Return the snapshot that a process has written in a line, ``None`` for other lines."""
         if not line.startswith(_MARK + "{"):
             return None
         values = json.loads(line.removeprefix(_MARK))
         return cls(**values | {"faults": tuple(values["faults"])})
 
     def in_words(self, system: UnitSystem) -> str:
-        """Return it for people, in so many characters that the line stands still."""
+        """Return it as text for display, with a fixed number of characters."""
         altitude, length = in_system(self.altitude, "m", system)
         error, speed = in_system(self.velocity_error, "m/s", system)
         level = "-" if self.tube_level is None else significant(self.tube_level)

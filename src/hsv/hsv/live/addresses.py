@@ -1,4 +1,4 @@
-"""Where the live view listens, and who may ask: programs and pages of this machine."""
+"""Addresses of the live view, and the programs and pages of this machine that may connect."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import socket
 from hsv.errors import ParameterError, reason
 
 HOST = "127.0.0.1"
-"""Nothing listens on any other address."""
+"""The only address on which the servers accept connections."""
 
 LAST_PORT = 65535
 

@@ -42,8 +42,8 @@ def row(columns: Sequence[Column], messages: Mapping[str, Any]) -> np.ndarray:
     """Return time (s) and the value of every column (1 + columns), NaN where its topic has no message.
 
     Args:
-        columns: What to read.
-        messages: Those of one step by topic; the state is among them.
+        columns: Columns to read.
+        messages: Messages of one step by topic, including the state.
     """
     stamp = messages[STATE].header.stamp
     values = [stamp.sec + 1e-9 * stamp.nanosec]

@@ -1,4 +1,4 @@
-"""What the page may ask of a flight, checked before any node is asked."""
+"""Commands of the page for a flight, checked before any node is called."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ Command = Inject | Clear | Change
 
 
 def read_command(fields: Mapping[str, Any]) -> Command:
-    """Return what the ``fields`` of a request ask for; quantities are texts with their units.
+    """Return the command in the ``fields`` of a request; quantities are texts with their units.
 
     Raises:
         ParameterError, QuantityError: A field that is missing, unknown or wrong, and what was expected.

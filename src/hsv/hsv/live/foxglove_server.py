@@ -16,7 +16,7 @@ class FoxgloveServer:
     """Serves topics to Foxglove and Lichtblick, to read only; a client that is slow misses messages, others do not."""
 
     def __init__(self, port: int, topics: Mapping[str, str]) -> None:
-        """Listen.
+        """Start the server.
 
         Args:
             port: Port of this machine; 0: any free one.
@@ -46,11 +46,11 @@ class FoxgloveServer:
 
     @property
     def port(self) -> int:
-        """The port that it listens on."""
+        """The port of the server."""
         return self._server.port
 
     def send(self, topic: str, time: int, data: bytes) -> None:
-        """Send a serialized message of simulated ``time`` (ns) to whoever has subscribed its topic."""
+        """Send a serialized message of simulated ``time`` (ns) to all subscribers of its topic."""
         self._channels[topic].log(data, log_time=time)
 
     def start_run(self) -> None:

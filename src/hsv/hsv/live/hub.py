@@ -1,4 +1,4 @@
-"""What is known of the flight now: the latest messages, a decimated history of what is drawn, faults, diagnostics."""
+"""Current data of the flight: latest messages, a decimated history of the plotted quantities, faults, diagnostics."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ _EVENTS = 200
 
 @dataclass(frozen=True)
 class History:
-    """Rows of the history from one on, and which history it is: another one begins anew."""
+    """Rows of the history from one on, and the number of the history, which changes when it restarts."""
 
     generation: int
     first: int
     rows: np.ndarray
-    """Of time (s) and columns, single precision: (n, 1 + columns)."""
+    """Rows of time (s) and columns, single precision: (n, 1 + columns)."""
 
 
 class Hub:
-    """Gathers what the page shows; written by one thread, read by those that serve."""
+    """Collects the data of the page; written by one thread, read by the threads that serve it."""
 
     def __init__(self, decode: Callable[[str, bytes], Any], about: Mapping[str, str]) -> None:
         """Know nothing yet.
 
         Args:
             decode: Returns the message of a topic that is serialized in bytes.
-            about: What else the page says: ``title``, and where the flight is written to, ``bag``; empty where unknown.
+            about: Further texts of the page: ``title``, and the path of the ``bag``; empty if unknown.
         """
         self.columns = columns()
         self._topics = tuple(dict.fromkeys(column.topic for column in self.columns))
@@ -79,13 +79,13 @@ class Hub:
             self._say(values)
 
     def diagnose(self, node: str, level: int, words: str, values: Mapping[str, str]) -> None:
-        """Take what a node says of itself."""
+        """Store the diagnostics of a node."""
         with self._lock:
             entry = {"level": level, "words": words, "values": dict(values)}
             self._say({"diagnostics": self._status["diagnostics"] | {node: entry}})
 
     def note(self, words: str, *, step: int | None = None, warning: bool = False) -> None:
-        """Add a line to what has happened, which acts or is said at ``step``; None: now."""
+        """Add a line to the events, which takes effect or is reported at ``step``; None: now."""
         with self._lock:
             self._note(words, round(self.time * 1e-9 / self._period) if step is None else step, warning)
 
@@ -101,7 +101,7 @@ class Hub:
         return True
 
     def decode(self, most: int = MOST_ROWS) -> None:
-        """Add the rows of steps that were kept, the oldest ``most`` of them: for somebody who looks at them."""
+        """Add the rows of stored steps, the oldest ``most`` of them, for a viewer."""
         waiting, self._waiting = self._waiting[:most], self._waiting[most:]
         for serialized in waiting:
             messages = {topic: self._decode(topic, data) for topic, data in serialized.items()}
@@ -114,7 +114,7 @@ class Hub:
                 self._say(self._said(messages))
 
     def history(self, generation: int, first: int) -> History:
-        """Return the rows that a reader lacks who has those before ``first`` of a ``generation``."""
+        """Return the rows that are new to a reader who has those before ``first`` of a ``generation``."""
         with self._lock:
             first = first if generation == self._generation else 0
             return History(self._generation, first, self._rows[first : self._count].astype("<f4"))
@@ -165,7 +165,7 @@ class Hub:
         self._say({"events": [*self._status["events"], event][-_EVENTS:]})
 
     def _note_faults(self, faults: list[dict[str, Any]], step: int) -> None:
-        """Note which faults have begun, whoever has planned or injected them, and which have ended."""
+        """Record which faults have started, scheduled or injected, and which have ended."""
         before = self._status["faults"]
         for fault in (fault for fault in faults if fault not in before):
             self._note(f"{fault['words']} begins", fault["since"], True)

@@ -38,7 +38,7 @@ Answer = Callable[[dict[str, Any]], None]
 
 
 class PageServer:
-    """Serves the page in a thread of its own: a client that is slow, or never reads, keeps nobody waiting.
+    """Serves the page in a separate thread: a client that is slow, or never reads, does not delay others.
 
     Raises:
         ParameterError: The port is in use.
@@ -65,7 +65,7 @@ class PageServer:
 
     @property
     def url(self) -> str:
-        """The address of the page, with the token of its commands in the part that a browser sends to nobody."""
+        """Address of the page, with the token for commands in the fragment, which browsers do not send."""
         return f"http://{HOST}:{self.port}/#token={self._token}"
 
     @property
@@ -74,12 +74,12 @@ class PageServer:
         return bool(self._changed)
 
     def publish(self) -> None:
-        """Send what is new in the hub to everybody, whenever each is ready for it."""
+        """Send new data of the hub to all clients, to each when it is ready."""
         if self._changed:
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
-        """Send what is new, and leave the clients."""
+        """Send new data, and disconnect the clients."""
 
         async def leave() -> None:
             self._wake()

@@ -1,4 +1,4 @@
-"""How well a polytopic model agrees with the model it stands for, between its samples (paper fig. 2 and 8)."""
+"""Agreement of a polytopic model with the model that it represents, between its samples (paper fig. 2 and 8)."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class ModelAccuracy:
 
 
 def off_grid(low: float, high: float, points: int) -> np.ndarray:
-    """Return ``points`` values, evenly spread over the interior of an interval, its ends left out."""
+    """Return ``points`` equidistant values in the interior of an interval, without its ends."""
     return low + (high - low) * (np.arange(points) + 0.5) / points
 
 
@@ -73,7 +73,7 @@ def model_accuracy(
 
     Args:
         polytope: The model to judge.
-        model: What it stands for.
+        model: Model that it represents.
         altitudes: (a) m, off the samples.
         velocities: (b) m/s, off the samples.
         state_scale: (n) sizes of the states that count as equal, SI.

@@ -27,7 +27,7 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
     Limits are left out. A channel without an actuator passes its command.
 
     Args:
-        actuators: Of order 1 or 2, at most one a channel.
+        actuators: Actuators of order 1 or 2, at most one per channel.
     """
     states = sum(actuator.order for actuator in actuators)
     A, B = np.zeros((states, states)), np.zeros((states, N_INPUTS))
@@ -114,9 +114,9 @@ def held_behind(
     Args:
         A: (n, n), continuous time.
         B: (n, 2).
-        period: Of the commands (s).
-        actuators: As for :func:`actuator_system`; their states follow the n.
-        delay: Of all commands (s), any; those under way follow the actuators' states, the newest first.
+        period: Period of the commands (s).
+        actuators: See :func:`actuator_system`; their states follow the n.
+        delay: Delay (s) of all commands; delayed ones follow the actuators' states, the newest first.
 
     Returns:
         A (n + a + d, n + a + d) and B (n + a + d, 2), of a states of actuators and d commands under way.

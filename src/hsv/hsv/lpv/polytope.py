@@ -10,6 +10,7 @@ from numba import njit
 
 from hsv.elimination import solve
 from hsv.errors import DesignError
+from hsv.lanes import choose, lanes_in, least, most
 
 INTERPOLATIONS = ("linear", "cubic")
 
@@ -94,9 +95,13 @@ def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
 
 
 class PolytopeData(NamedTuple):
-    """A polytopic model as compiled functions take it: ``S`` (r, n * (n + m)) holds [A_i, B_i] row by row."""
+    """A polytopic model as compiled functions take it: ``S`` (r, n * (n + m)) holds [A_i, B_i] row by row.
+
+    ``entries``: those that are not zero in all vertices.
+    """
 
     S: np.ndarray
+    entries: np.ndarray
     altitude: AxisWeights
     velocity: AxisWeights
 
@@ -122,24 +127,22 @@ class Polytope:
 
     def data(self) -> PolytopeData:
         """Return the form that compiled functions take."""
-        S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
-        return PolytopeData(np.ascontiguousarray(S), self.altitude, self.velocity)
+        S = np.ascontiguousarray(np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1))
+        return PolytopeData(S, np.flatnonzero(S.any(axis=0)), self.altitude, self.velocity)
 
     def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
         n, m = self.B.shape[1:]
         S = np.empty(n * (n + m))
-        schedule(self.data(), altitude, velocity, S)
+        schedule(self.data(), altitude, velocity, np.empty(len(self.A)), S)
         S = S.reshape(n, n + m)
         return S[:, :n], S[:, n:]
 
 
 @njit(cache=True, inline="always")
-def _clamp(value: float, low: float, high: float) -> float:
+def _clamp(value: Any, low: float, high: float) -> Any:
     # Written so that a NaN (a diverged flight) becomes ``low`` and never an index.
-    if not value > low:
-        return low
-    return high if value > high else value
+    return choose(value > low, choose(value > high, high, value), low)
 
 
 @njit(cache=True, inline="always")
@@ -151,31 +154,62 @@ def _piece(breakpoints: np.ndarray, value: float) -> int:
 
 
 @njit(cache=True, inline="always")
-def _weight(axis: Any, piece: int, local: float, vertex: int) -> float:
+def _pieces(breakpoints: np.ndarray, value: Any) -> tuple[int, int]:
+    """Return the pieces of the least lane and of the largest."""
+    first = _piece(breakpoints, least(value))
+    return first, first if lanes_in(value) == 1 else _piece(breakpoints, most(value))
+
+
+@njit(cache=True, inline="always")
+def _cubic(axis: Any, piece: int, value: Any, vertex: int) -> Any:
     c = axis.coefficients
+    local = value - axis.breakpoints[piece]
     return ((c[0, piece, vertex] * local + c[1, piece, vertex]) * local + c[2, piece, vertex]) * local + c[
         3, piece, vertex
     ]
 
 
 @njit(cache=True, inline="always")
-def schedule(polytope: Any, altitude: float, velocity: float, S: np.ndarray) -> bool:
-    """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope."""
+def _weight(axis: Any, first: int, last: int, value: Any, vertex: int) -> Any:
+    """Return the weight of a vertex; ``first`` and ``last``: see :func:`_pieces`."""
+    weight = _cubic(axis, first, value, vertex)
+    for piece in range(first + 1, last + 1):
+        weight = choose(value >= axis.breakpoints[piece], _cubic(axis, piece, value, vertex), weight)
+    return weight
+
+
+@njit(cache=True, inline="always")
+def schedule(polytope: Any, altitude: Any, velocity: Any, weights: Any, S: Any) -> Any:
+    """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope.
+
+    ``weights`` (r): scratch.
+    """
     h_axis, v_axis = polytope.altitude, polytope.velocity
     h = _clamp(altitude, h_axis.breakpoints[0], h_axis.breakpoints[-1])
     v = _clamp(velocity, v_axis.breakpoints[0], v_axis.breakpoints[-1])
-    h_piece = _piece(h_axis.breakpoints, h)
-    v_piece = _piece(v_axis.breakpoints, v)
-    h_local = h - h_axis.breakpoints[h_piece]
-    v_local = v - v_axis.breakpoints[v_piece]
+    h_first, h_last = _pieces(h_axis.breakpoints, h)
+    v_first, v_last = _pieces(v_axis.breakpoints, v)
     n_h = h_axis.coefficients.shape[2]
     n_v = v_axis.coefficients.shape[2]
-    S[:] = 0.0
+    for e in range(len(S)):
+        S[e] = 0.0
     for i in range(n_h):
-        h_weight = _weight(h_axis, h_piece, h_local, i)
+        h_weight = _weight(h_axis, h_first, h_last, h, i)
         for j in range(n_v):
-            weight = h_weight * _weight(v_axis, v_piece, v_local, j)
-            vertex = polytope.S[i * n_v + j]
-            for e in range(len(S)):
-                S[e] += weight * vertex[e]
-    return h == altitude and v == velocity
+            r = i * n_v + j
+            weight = h_weight * _weight(v_axis, v_first, v_last, v, j)
+            if lanes_in(h) == 1:
+                vertex = polytope.S[r]
+                for e in range(len(S)):
+                    S[e] += weight * vertex[e]
+            else:
+                weights[r] = weight
+    # The same sums in the same order: of one flight a register holds several entries, of lanes one. The weights are
+    # finite, so that what is zero in all vertices stays it.
+    if lanes_in(h) > 1:
+        for e in polytope.entries:
+            total = S[e]
+            for r in range(n_h * n_v):
+                total += weights[r] * polytope.S[r, e]
+            S[e] = total
+    return (h == altitude) & (v == velocity)

@@ -50,9 +50,9 @@ def tensor_product(
         state_scale: (n) sizes of the states that count as equal, SI.
         input_scale: (m) sizes of the inputs, SI.
         tolerance: Singular values below this share of the largest are left out; the rest are the rank r.
-        functions: What spans the model in a variable: the constant and r - 1 ``"singular"`` functions, which have the
-            least error of all entries together, or the ``"polynomial"`` of degree r - 1, which at a low rank spreads
-            the error more evenly over small and large entries.
+        functions: Functions that span the model in a variable: the constant and r - 1 ``"singular"`` functions, which
+            have the least total error, or the ``"polynomial"`` of degree r - 1, which at a low rank distributes the
+            error more evenly over small and large entries.
 
     Raises:
         DesignError: Shapes that do not match, unknown functions, too few samples for the rank, or no hull.

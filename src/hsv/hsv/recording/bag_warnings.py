@@ -19,7 +19,7 @@ def bag_warnings(bag: Bag) -> list[str]:
     if any(map(being_recorded, bag.files)):
         words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
     elif not bag.complete and not bag.loss.files:
-        words.append(f"cut off after {bag.span[1] * 1e-9:.2f} s, hsv recover mends it")
+        words.append(f"truncated after {bag.span[1] * 1e-9:.2f} s, hsv recover completes it")
     elif bag.loss:
         words.append("hsv recover makes a whole bag of the rest")
     if missing := [bag.name_of(topic) for topic in _expected(bag) if topic not in bag.roles]:
@@ -38,7 +38,7 @@ def _expected(bag: Bag) -> list[str]:
 
 
 def loss_in_words(loss: Loss) -> list[str]:
-    """Say which files a bag lacks, where it is damaged, and how much of it cannot be read."""
+    """Return which files are missing in a bag, where it is damaged, and how much of it cannot be read."""
     words = [f"lacks its file {name}" for name in loss.files[:_NAMED]]
     if (more := len(loss.files) - _NAMED) > 0:
         words.append(f"lacks {more} more of its files")

@@ -28,12 +28,12 @@ surplus on; what is received over DDS does not have it."""
 
 
 class Columns(dict[str, NDArray[Any]]):
-    """One array per field, by field path; a field that the definition lacks is a RecordingError when it is read."""
+    """One array per field, by field path; reading a field that the definition does not have is a RecordingError."""
 
     def __init__(self, source: str = "") -> None:
         super().__init__()
         self.source = source
-        """Where the messages come from, for errors."""
+        """Source of the messages, for error messages."""
 
     def rows(self, rows: NDArray[np.intp]) -> Columns:
         """Return these rows of every column."""
@@ -56,21 +56,15 @@ def columns_at_once(types: Typesdict, message_type: str, messages: Sequence[byte
     on nothing but the lengths of text and sequences. It is found by walking the definition along the first message;
     all messages that are as long and hold the same lengths in the same places have it too.
 
-    Parameters
-    ----------
-    types
-        The definitions of the type and of those it depends on.
-    message_type
-        ``package/msg/Type``.
-    messages
-        At least one message in CDR with its header.
-    source
-        Where the messages come from, for errors.
+    Args:
+        types: The definitions of the type and of those it depends on.
+        message_type: ``package/msg/Type``.
+        messages: At least one message in CDR with its header.
+        source: Where the messages come from, for errors.
 
     Raises:
-    ------
-    NoCommonLayoutError
-        If the messages differ in layout, or have text or messages in a sequence: see :func:`columns_one_by_one`.
+        NoCommonLayoutError: If the messages differ in layout, or have text or messages in a sequence: see
+            :func:`columns_one_by_one`.
     """
     size = len(messages[0])
     raw = b"".join(messages)
@@ -103,14 +97,14 @@ def columns_one_by_one(types: Typesdict, message_type: str, messages: Sequence[o
 
 
 class _Layout:
-    """Where the fields of a message lie, found by walking the definition along one message."""
+    """Offsets of the fields in a message, found by walking the definition along one message."""
 
     def __init__(self, types: Typesdict, message: bytes) -> None:
         self.types = types
         self.message = message
         self.position = _HEADER
         self.columns: dict[str, str] = {}
-        """What each column is: number, text, time, empty text, empty list."""
+        """Kind of each column: number, text, time, empty text, empty list."""
         self.numbers: dict[str, tuple[Any, int]] = {}
         """Format and offset of what lies at fixed places."""
         self.lengths: list[int] = []

@@ -17,7 +17,7 @@ from hsv.recording.track import Track
 
 @dataclass(frozen=True)
 class Difference:
-    """One field of one message that is not what was expected."""
+    """A field of a message that differs from the expected one."""
 
     topic: str
     step: int
@@ -33,7 +33,7 @@ class Difference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What comparing two tracks found; ``first`` is None where all is equal within the tolerance."""
+    """Result of comparing two tracks; ``first`` is None if all is equal within the tolerance."""
 
     topic: str
     expected_count: int
@@ -43,7 +43,7 @@ class Comparison:
     different_bytes: int
     """Messages whose bytes differ, among those that both tracks have."""
     different_padding: int = 0
-    """Those of them that differ only in padding: DDS leaves in it what its buffers held before."""
+    """Number of those that differ only in padding: DDS leaves there whatever its buffers held before."""
     first: Difference | None = None
     largest: dict[str, float] = field(default_factory=dict)
     """Largest |a - b| of each field that is not everywhere equal; not a number where it is no number that differs."""
@@ -65,8 +65,8 @@ def compare(expected: Track, actual: Track, ignored: Sequence[str] = (), toleran
     infinity; integers, text and lists only where they are the same (lists of messages element by element as numbers).
 
     Args:
-        expected: What was recorded.
-        actual: What is compared to it.
+        expected: Recorded messages.
+        actual: Messages to compare with them.
         ignored: Field paths that do not count.
         tolerance: Absolute and relative at once.
     """
@@ -119,7 +119,7 @@ def _apart(expected: Track, actual: Track) -> Difference:
 
 
 def _content(track: Track, message: bytes) -> bytes:
-    """Return a message serialized anew, with zeros for padding."""
+    """Return a message serialized again from its fields, with zeros for padding."""
     try:
         return bytes(track.types.serialize_cdr(track.types.deserialize_cdr(message, track.type), track.type))
     except SerdeError:

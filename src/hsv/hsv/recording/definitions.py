@@ -18,21 +18,16 @@ SEPARATOR = "=" * 80
 def definition(message_type: str) -> str:
     """Return the definition of a type with those it depends on, in the ``ros2msg`` format of MCAP.
 
-    Parameters
-    ----------
-    message_type
-        ``package/msg/Type``; looked up as ``share/package/msg/Type.msg`` below each prefix of AMENT_PREFIX_PATH.
+    Args:
+        message_type: ``package/msg/Type``; looked up as ``share/package/msg/Type.msg`` below each prefix of
+            AMENT_PREFIX_PATH.
 
     Returns:
-    -------
-    str
-        The root text, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text.
-        Without ``msg``, as rosbag2 writes it: Foxglove and Lichtblick look types up by what stands in the fields.
+        The root text, then for each dependency a line of 80 ``=``, a line ``MSG: package/Type`` and its text. Without
+        ``msg``, as rosbag2 writes it: Foxglove and Lichtblick look types up by what stands in the fields.
 
     Raises:
-    ------
-    RecordingError
-        If the type or one of its dependencies is not installed or cannot be read.
+        RecordingError: If the type or one of its dependencies is not installed or cannot be read.
     """
     texts: dict[str, str] = {}
     waiting = [message_type]
@@ -50,9 +45,7 @@ def type_hash(message_type: str) -> str:
     """Return the hash of a type (``RIHS01_`` and 64 digits) from its installed description.
 
     Raises:
-    ------
-    RecordingError
-        If the type is not installed.
+        RecordingError: If the type is not installed.
     """
     description = json.loads(_share_file(message_type, ".json").read_text(encoding="utf-8"))
     return next(str(row["hash_string"]) for row in description["type_hashes"] if row["type_name"] == message_type)

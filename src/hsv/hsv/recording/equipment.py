@@ -1,4 +1,4 @@
-"""What a bag tells of sensors, links, effectors and air that are not ideal."""
+"""Sensors, links, effectors and air in a bag that are not ideal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def measurement_errors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def held(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the steps (n) in which a link kept all of what it had in the step before although more was there.
+    """Return the steps (n) in which a link held all of its old payload although a newer one was due.
 
     Of measurement and command, where there are any; arguments as of :func:`measurement_errors`.
     """
@@ -55,7 +55,7 @@ def _repeats(rows: np.ndarray) -> np.ndarray:
 
 
 def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return where those effectors were (n), SI, that were not where they were told to be, over the period of a step.
+    """Return the positions (n), SI, of effectors that differed from the command, over the period of a step.
 
     The last is not known, NaN; arguments as of :func:`measurement_errors`.
     """
@@ -67,7 +67,7 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields of :data:`AIR` (n) that are not those of calm air, over the period of a step, as above."""
+    """Return the fields of :data:`AIR` (n) that differ from calm air, over the period of a step, as above."""
     air = {name: _over_the_period(topics, name) for name in AIR}
     return {name: y for name, y in air.items() if (np.isfinite(y) & (y != AIR[name][1])).any()}
 

@@ -18,11 +18,11 @@ from hsv.recording.reader import Bag
 from hsv.recording.units import Units, units_of
 
 INCOMPLETE = "incomplete"
-"""Where an export says what its bag lacks."""
+"""Name of the file that lists what is missing in the exported bag."""
 
 
 class Format(StrEnum):
-    """What a bag can be exported as."""
+    """Export formats of a bag."""
 
     csv = "csv"
     parquet = "parquet"
@@ -103,7 +103,7 @@ def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> di
 
     Args:
         columns: The fields of messages, as :mod:`hsv.recording.columns` has them.
-        units: Of every field, from :func:`hsv.recording.units.units_of`.
+        units: Unit of every field, from :func:`hsv.recording.units.units_of`.
     """
     table: dict[str, NDArray[Any]] = {}
     for name, column in columns.items():

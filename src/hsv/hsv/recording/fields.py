@@ -25,7 +25,7 @@ class Field:
     type: str
     """``package/msg/Type`` or the name of a base type."""
     format: str | None
-    """What numpy calls a number of this type; None for text and messages."""
+    """Name of this number type in numpy; None for text and messages."""
     count: Literal["one", "array", "sequence"]
     length: int
     """Number of elements of an array; 0 otherwise."""

@@ -15,7 +15,7 @@ from hsv.errors import DocumentError, RecordingError
 from hsv.recording.metadata import file_names, read_metadata
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
-"""How compressed data begin. Neither an MCAP file nor a message in CDR does."""
+"""Beginning of compressed data; neither an MCAP file nor a message in CDR begins like this."""
 _MAGIC = 4
 _NAME = re.compile(r".+\.mcap(?:\.zstd|\.zst|\.lz4)?")
 _NUMBER = re.compile(r"_(\d+)\.mcap")
@@ -88,7 +88,7 @@ def _number(name: str) -> int:
 
 
 def read_file(path: Path) -> bytes:
-    """Return what is in a file of a bag, as far as it can be decompressed.
+    """Return the contents of a file of a bag, as far as it can be decompressed.
 
     Raises:
         RecordingError: It cannot be read.

@@ -1,4 +1,4 @@
-"""From a bag to what the metrics are made of."""
+"""Extraction of the data for metrics from a bag."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _RIGID = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate"
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:
-    """Return a name for each of ``bags``, no two the same: its scenario, with as much of its path as tells it apart."""
+    """Return a distinct name for each of ``bags``: its scenario, with as much of its path as necessary."""
     scenarios = [bag.custom_data.get("scenario", bag.path.stem) for bag in bags]
     names = scenarios
     for details in (
@@ -82,7 +82,7 @@ def flight_fingerprint(bag: Bag) -> str | None:
         return None
     if not all(np.array_equal(bag.columns(topic)["step"], every) for topic in topics):
         return None
-    return fingerprint(
+    columns = (
         state_columns(state),
         filtered["filtered_pitch_rate"],
         state_columns(nominal, "deviation."),
@@ -90,3 +90,4 @@ def flight_fingerprint(bag: Bag) -> str | None:
         input_columns(command),
         input_columns(actuator),
     )
+    return fingerprint(np.column_stack(columns))

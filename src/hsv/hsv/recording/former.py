@@ -1,4 +1,4 @@
-"""Where bags of the first interface version hold what has moved since: the faults of a step, and what is saturated."""
+"""Bags of the first interface version: where they hold the faults of a step, and which inputs are limited."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ FAULT_STATUS = "hsv/fault_status"
 """The topic of the faults of a step, now said with what the actuators do."""
 
 FORMER_TYPES = {ACTUATOR: "hsv_msgs/msg/ControlInput", FAULT_STATUS: "hsv_msgs/msg/FaultStatus"}
-"""By role; that of the faults has no other."""
+"""Former message types by role; that of the faults has no replacement."""
 
 
 def require_interface_version(bag: Bag) -> None:
-    """Refuse a bag that tells that its messages are of another interface version: no node of this one takes them.
+    """Reject a bag with messages of another interface version, which no node of this version accepts.
 
     Raises:
         RecordingError: Names both versions.

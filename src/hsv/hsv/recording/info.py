@@ -1,4 +1,4 @@
-"""What is in a bag, as plain data that can become JSON."""
+"""Contents of a bag, as plain data for JSON."""
 
 from __future__ import annotations
 
@@ -28,11 +28,9 @@ from hsv.vehicle.dynamics import INPUT_NAMES
 
 
 def describe(bag: Bag) -> dict[str, Any]:
-    """Return what a bag holds and what happened in it; a caller may add to it, such as metrics.
+    """Return the contents and events of a bag; a caller may add to it, such as metrics.
 
     Returns:
-    -------
-    dict
         ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
         ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
         nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
@@ -124,7 +122,7 @@ def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], s
     """Return the parameters of a described fault: the quantity of a single one, names and quantities of several.
 
     Args:
-        fault: As described.
+        fault: Description of the fault.
         written: Writes a number with its SI unit, which is empty where it has none or the fault is of no known type.
     """
     given = fault["parameters"]

@@ -1,4 +1,4 @@
-"""What rosbag2 (version 9) wants to know of a bag: its metadata.yaml, and the same as a record in the MCAP file."""
+"""Metadata of a bag for rosbag2 (version 9): metadata.yaml, and the same as a record in the MCAP file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ROOT = "rosbag2_bagfile_information"
 VERSION = 9
 DISTRO = "jazzy"
 EMPTY_BAG_START = 2**63 - 1
-"""What rosbag2 writes as the starting time of a bag without messages."""
+"""Starting time that rosbag2 writes for a bag without messages."""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""What a viewer cannot work out of the topics: nominal state, edges of the tube about it, active faults in words.
+"""Data for viewers that cannot be computed from a single topic: nominal state, bounds of the tube, active faults.
 
 Viewers plot fields and do not add them up; the nominal state is the sum of two, an edge of the tube of four.
 """
@@ -43,8 +43,8 @@ def overview_message(
 
     Args:
         nominal: Reference and deviation together, the rigid states first, SI.
-        centre: Of the set of errors, the rigid states first; empty where the design has none.
-        half_width: Of it, as ``centre``.
+        centre: Centre of the set of errors, the rigid states first; empty if the design has none.
+        half_width: Half-width of the set, ordered like ``centre``.
         faults: Channel and type of those that are active.
     """
     nominal = np.asarray(nominal[:N_RIGID], float)

@@ -34,7 +34,7 @@ def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks
     Args:
         flights: The flights by label.
         system: Units that are drawn.
-        remarks: What has to be said of the flights, such as that steps are missing; stands above the panels.
+        remarks: Remarks on the flights, such as missing steps, printed above the panels.
     """
     with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
         figure = Figure(figsize=(10, 9), layout="constrained")

@@ -36,11 +36,11 @@ from hsv.recording.track import Track
 from hsv.recording.typestore import message_types
 
 _OURS = "/hsv/"
-"""In the names of this project's topics, unless they are remapped."""
+"""Common prefix of this project's topics, unless they are remapped."""
 _USUAL = {resolved(role): kinds for role, kinds in KINDS.items()}
 """Types of the topics of a graph by the names that they have unless they are moved or remapped."""
 _STAMP_START, _STAMP_END = 4, 12
-"""Where the messages of a step carry their stamp: seconds and nanoseconds, of four bytes each."""
+"""Range of bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
 _BIG_ENDIAN = b"\x00\x00"
 
 
@@ -56,7 +56,7 @@ class RecordedTopic:
 
 @dataclass
 class _Recorded:
-    """What files hold of a topic; its channels differ at most in their quality of service."""
+    """A topic in the files of a bag; its channels differ at most in their quality of service."""
 
     channel: Channel
     schema: Schema
@@ -66,7 +66,7 @@ class _Recorded:
 
 @dataclass
 class Loss:
-    """What a bag has lost, as far as its files tell."""
+    """Losses of a bag, as far as its files tell."""
 
     files: list[str] = field(default_factory=list)
     """Files that the bag should have."""
@@ -89,15 +89,12 @@ class Bag:
 
     A topic is asked for by its name in the bag, ``/veh1/hsv/state``, or by its role in the graph, ``hsv/state``.
 
-    Parameters
-    ----------
-    path
-        A bag directory, or a file in it.
+    Args:
+        path: A bag directory, or a file in it.
 
     Raises:
-    ------
-    RecordingError
-        If there is no such bag, it is no MCAP file, nothing of it can be read, or it is not of this project.
+        RecordingError: If there is no such bag, it is no MCAP file, nothing of it can be read, or it is not of this
+            project.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -109,7 +106,7 @@ class Bag:
         self.folder = self.files[0].parent
         """The bag directory."""
         self.complete = not missing
-        """Whether the writer closed every file; a killed writer leaves one that is cut off."""
+        """Whether the writer closed every file; a killed writer leaves one that is truncated."""
         self.loss = Loss(files=missing)
         self.attachments: dict[str, bytes] = {}
         self.media_types: dict[str, str] = {}
@@ -153,9 +150,7 @@ class Bag:
         """Return the simulated times of the messages of a topic, shape (n,), in nanoseconds.
 
         Raises:
-        ------
-        RecordingError
-            If the topic is not in the bag, or a message of a step is too short to have a stamp.
+            RecordingError: If the topic is not in the bag, or a message of a step is too short to have a stamp.
         """
         recorded, name = self._of(topic), self.name_of(topic)
         if name in self._step_topics:
@@ -175,15 +170,11 @@ class Bag:
         """Return all messages of a topic, decoded, one array per field.
 
         Returns:
-        -------
-        Columns
             Arrays with the messages along the first axis, by field path; see :mod:`hsv.recording.columns`. They are
-            decoded once: whoever asks again gets the same.
+            decoded once and then cached.
 
         Raises:
-        ------
-        RecordingError
-            If the topic is not in the bag or a message does not fit its definition.
+            RecordingError: If the topic is not in the bag or a message does not fit its definition.
         """
         name = self.name_of(topic)
         if name not in self._columns:
@@ -194,9 +185,7 @@ class Bag:
         """Yield time in nanoseconds and message of a topic, deserialized one by one.
 
         Raises:
-        ------
-        RecordingError
-            As :meth:`columns`.
+            RecordingError: As :meth:`columns`.
         """
         return self.track(topic).decode()
 
@@ -204,9 +193,7 @@ class Bag:
         """Return the messages of a topic with what decodes them.
 
         Raises:
-        ------
-        RecordingError
-            If the topic is not in the bag.
+            RecordingError: If the topic is not in the bag.
         """
         recorded, name = self._of(topic), self.name_of(topic)
         if (kind := recorded.schema.name) not in self.types.fielddefs:
@@ -217,9 +204,7 @@ class Bag:
         """Return an attachment as text.
 
         Raises:
-        ------
-        RecordingError
-            If it is not in the bag or no text.
+            RecordingError: If it is not in the bag or no text.
         """
         if name not in self.attachments:
             raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
@@ -392,7 +377,7 @@ class Bag:
             file, damage = self.loss.damages[0]
             raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
         if not self._topics and not self.complete:
-            raise RecordingError(f"{self.path}: is cut off before its first messages")
+            raise RecordingError(f"{self.path}: is truncated before its first messages")
         if not any(_OURS in topic for topic in (*self._topics, *map(resolved, self.roles))):
             raise RecordingError(f"{self.path}: has no topic below {_OURS}, expected a bag of this project")
 

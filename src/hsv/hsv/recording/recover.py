@@ -30,11 +30,11 @@ from hsv.recording.metadata import (
 )
 from hsv.recording.reader import Bag
 from hsv.recording.scan import MESSAGE_HEADER, Scan, content
-from hsv.recording.topic import mended_profiles
+from hsv.recording.topic import repaired_profiles
 from hsv.recording.writer import CHUNK_BYTES, mcap_path
 
 _PROFILES = "offered_qos_profiles"
-"""Where the metadata of a channel has the quality of service."""
+"""Key of the quality of service in the metadata of a channel."""
 
 RECOVERED = {"recovered": "true"}
 """Custom data of a recovered bag: its end is not the end of the run."""
@@ -42,7 +42,7 @@ RECOVERED = {"recovered": "true"}
 
 @dataclass(frozen=True, slots=True)
 class Recovery:
-    """What a recovery did."""
+    """Result of a recovery."""
 
     bag: Bag
     """The bag as it was found."""
@@ -55,22 +55,17 @@ class Recovery:
 
 
 def recover(path: Path | str, target: Path | None = None) -> Recovery:
-    """Write a new bag with everything whole of a bag that is cut off or damaged; the old one stays as it is.
+    """Write a new bag with everything whole of a bag that is truncated or damaged; the old one is not modified.
 
     The new one is of one file, with summary, indexes and metadata.yaml. Of a bag that is whole, nothing is written.
 
-    Parameters
-    ----------
-    path
-        A bag directory, or a file in it.
-    target
-        The new bag directory; default: beside the old one, named after it with ``_recovered``.
+    Args:
+        path: A bag directory, or a file in it.
+        target: The new bag directory; default: beside the old one, named after it with ``_recovered``.
 
     Raises:
-    ------
-    RecordingError
-        If its recorder still runs, nothing of the bag can be read (see :class:`hsv.recording.reader.Bag`), the target
-        exists, or there is no space left.
+        RecordingError: If its recorder still runs, nothing of the bag can be read (see
+            :class:`hsv.recording.reader.Bag`), the target exists, or there is no space left.
     """
     with _nobody_writing(find_files(Path(path))[0]):
         bag = Bag(path)
@@ -104,9 +99,8 @@ def finalise(directory: Path) -> None:
     interrupted leaves the bag as it was.
 
     Raises:
-    ------
-    RecordingError
-        If its recorder still runs, nothing of the bag can be read, it is damaged, or there is no space left.
+        RecordingError: If its recorder still runs, nothing of the bag can be read, it is damaged, or there is no space
+            left.
     """
     with _nobody_writing(find_files(directory)[0]):
         bag = Bag(directory)
@@ -119,7 +113,7 @@ def finalise(directory: Path) -> None:
             beside.replace(mcap)
             write_metadata(directory, values)
         except OSError as error:
-            raise RecordingError(f"{mcap}: cannot be mended: {error.strerror}") from None
+            raise RecordingError(f"{mcap}: cannot be repaired: {error.strerror}") from None
         finally:
             beside.unlink(missing_ok=True)
 
@@ -177,7 +171,7 @@ class _Copy:
         self._tallies: dict[str, Tally] = {}
 
     def add(self, data: bytes) -> None:
-        """Copy what is whole in a file."""
+        """Copy the intact data of a file."""
         found = list(Scan(data).records())
         schemas: dict[int, Schema] = {}
         numbers: dict[int, tuple[int, Tally]] = {}
@@ -228,7 +222,7 @@ class _Copy:
             self._schemas[key] = self._writer.register_schema(*key)
         name = channel.topic
         if name not in self._channels:
-            profiles = mended_profiles(channel.metadata.get(_PROFILES, ""))
+            profiles = repaired_profiles(channel.metadata.get(_PROFILES, ""))
             channel = replace(channel, metadata={**channel.metadata, _PROFILES: profiles})
             self._topics[name] = channel, schema
             self._tallies[name] = Tally()

@@ -1,4 +1,4 @@
-"""Which topic of a bag plays which role of the graph: namespaces and remappings change the names, not the roles."""
+"""Roles of the topics of a bag: namespaces and remappings change the names, not the roles."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
     Args:
         topics: Types of the topics, ``package/msg/Type``, by name.
         custom_data: Custom data of the bag.
-        source: Where the bag is, for errors.
+        source: Path of the bag, for error messages.
 
     Raises:
         RecordingError: A topic has not the type of its role, or there are topics of two graphs.

@@ -39,10 +39,10 @@ _FOOTER = 20
 # A known opcode and a length below 2^40.
 _CANDIDATE = re.compile(rb"(?=[\x01-\x0f].{5}\x00{3})", re.DOTALL)
 _DATA_STARTS = (b"\x00", b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18")
-"""How the data of a message begin: CDR, or compressed with zstd or lz4 by rosbag2."""
+"""Beginning of the data of a message: CDR, or compressed with zstd or lz4 by rosbag2."""
 
 DAMAGE = (EndOfFile, CRCValidationError, ZstdError, struct.error, UnicodeDecodeError, OverflowError, MemoryError)
-"""What the package raises on records whose lengths, texts or checksums are wrong."""
+"""Exceptions of the package for records whose lengths, texts or checksums are wrong."""
 
 _RECORDS = {
     Opcode.HEADER: kinds.Header,
@@ -70,7 +70,7 @@ class Damage:
     length: int
     """Bytes."""
     what: str
-    """What was there, as far as it is known."""
+    """Description of the damaged record, as far as it is known."""
 
     def __str__(self) -> str:
         return f"{self.what} at byte {self.offset}"
@@ -82,27 +82,25 @@ def content(body: memoryview) -> ReadDataStream:
 
 
 class Scan:
-    """One walk through the records of a file; what it finds out besides them is complete when the walk is.
+    """One walk through the records of a file; its other findings are complete when the walk is.
 
-    Parameters
-    ----------
-    data
-        The whole file.
+    Args:
+        data: The whole file.
     """
 
     def __init__(self, data: bytes) -> None:
         self.damages: list[Damage] = []
-        """What cannot be read before the last whole record."""
+        """Damage before the last intact record."""
         self.closed = False
         """Whether the writer closed the file: its footer is there."""
         self.statistics: kinds.Statistics | None = None
-        """What the writer counted, if its summary is whole."""
+        """Statistics of the writer, if its summary is intact."""
         self.indexed = 0
         """Messages that the indexes behind the chunks tell of."""
         self._data = memoryview(data)
         self._size = len(data)
         self._chunks: set[int] = set()
-        """Digests of the chunks read, to know one that stands there twice."""
+        """Digests of the chunks read, to know one that occurs twice."""
 
     @property
     def is_mcap(self) -> bool:
@@ -203,7 +201,7 @@ class Scan:
         return next((m.start() for m in candidates if self._end(m.start(), searching=True) is not None), None)
 
     def _chunk_within(self, position: int, end: int) -> int:
-        """Return where a chunk begins in a damaged one, because part of it stands there twice; else ``end``."""
+        """Return where a chunk begins in a damaged one, because part of it occurs twice; else ``end``."""
         candidates = (match.start() for match in _CANDIDATE.finditer(self._data, position, end + _FRAME.size))
         return next((at for at in candidates if self._data[at] == Opcode.CHUNK and self._end(at)), end)
 

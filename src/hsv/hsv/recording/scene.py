@@ -35,7 +35,7 @@ def scene_of(bag: Bag) -> Path:
     """Return the file of ``bag`` with pictures, written now unless there is one that is no older than the bag.
 
     Raises:
-        RecordingError: As :func:`write_scene`.
+        RecordingError: See :func:`write_scene`.
     """
     target = scene_path(bag)
     if not target.is_file() or target.stat().st_mtime < bag.path.stat().st_mtime:

@@ -1,4 +1,4 @@
-"""Which steps the topics of a bag hold, and rows of the same step."""
+"""Steps for which the topics of a bag have messages, and rows of the same step."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hsv.recording.recover import RECOVERED
 
 
 def cut_off(bag: Bag) -> bool:
-    """Whether what was recorded last may be missing: the recorder was killed, even if the bag was mended since."""
+    """Whether the last messages may be missing: the recorder was killed, even if the bag was completed since."""
     return not bag.complete or RECOVERED.items() <= bag.custom_data.items()
 
 
@@ -93,7 +93,7 @@ def complete_stamps(bag: Bag) -> NDArray[np.int64]:
 
 
 def lost_seconds(bag: Bag) -> float:
-    """Return the simulated time of the steps that the bag lacks, or has without one of its topics.
+    """Return the simulated time of the steps that are missing in the bag, or have not all of its topics.
 
     Raises:
         RecordingError: A message does not fit its definition.
@@ -108,7 +108,7 @@ def lost_seconds(bag: Bag) -> float:
 def irregularities(bag: Bag) -> list[str]:
     """Say which steps are missing, on all topics or on some, or twice or out of order; nothing of a whole bag.
 
-    Of a bag that is cut off, the steps count that all topics have reached.
+    Of a bag that is truncated, the steps count that all topics have reached.
 
     Raises:
         RecordingError: A message does not fit its definition.

@@ -1,4 +1,4 @@
-"""What a bag knows about a topic: name, type, definition, type hash and the quality of service it was offered with."""
+"""Description of a topic in a bag: name, type, definition, type hash and offered quality of service."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Qos:
     depth: int = 10
     reliability: str = "reliable"
     durability: str = "volatile"
-    """``transient_local`` for latched topics: a player must offer them so again."""
+    """``transient_local`` for latched topics; a player must offer them with the same durability."""
     deadline: int = INFINITE
     lifespan: int = INFINITE
     liveliness: str = "automatic"
@@ -50,7 +50,7 @@ class Qos:
 
     @classmethod
     def from_yaml(cls, text: str) -> Qos:
-        """Return the first profile of the text that :meth:`as_yaml` makes; the default for what it does not say."""
+        """Return the first profile of the text that :meth:`as_yaml` makes, with defaults for missing entries."""
         profiles = readable_profiles(text) or [{}]
         given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
         for key, value in given.items():
@@ -64,7 +64,7 @@ class Qos:
 
 
 def readable_profiles(text: str) -> list[dict[str, Any]]:
-    """Return the profiles in the metadata of a channel, the default for what a damage has left of no sense."""
+    """Return the profiles in the metadata of a channel, with defaults for damaged entries."""
     try:
         profiles = parse_yaml(text)
     except DocumentError:
@@ -75,8 +75,8 @@ def readable_profiles(text: str) -> list[dict[str, Any]]:
     return [{key: _sound(key, profile.get(key), default) for key, default in usual.items()} for profile in profiles]
 
 
-def mended_profiles(text: str) -> str:
-    """Return the ``text`` of profiles, written anew where it is damaged; empty where nothing of it is left."""
+def repaired_profiles(text: str) -> str:
+    """Return the ``text`` of profiles, repaired if it is damaged; empty if nothing of it is left."""
     profiles = readable_profiles(text)
     if not profiles:
         return ""

@@ -16,7 +16,7 @@ from hsv.recording.columns import Columns, NoCommonLayoutError, columns_at_once,
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Tell a field that is read from a message inside, but that its definition lacks, as what it is.
+    """Convert the access to a field that the definition of a message does not have into a clear error.
 
     Raises:
         RecordingError: It names ``source``, the message's type and the field.
@@ -45,7 +45,7 @@ class Track:
     data: list[bytes]
     """CDR with its header of four bytes."""
     source: str = ""
-    """Where the messages come from, for errors."""
+    """Source of the messages, for error messages."""
 
     def cut(self, count: int) -> Track:
         """Return the first ``count`` messages."""
@@ -75,7 +75,7 @@ class Track:
         """Yield time in nanoseconds and message, deserialized one by one.
 
         Raises:
-            RecordingError: As :meth:`columns`.
+            RecordingError: See :meth:`columns`.
         """
         for time, message in zip(self.times, self.data, strict=True):
             try:

@@ -19,7 +19,7 @@ def message_types(
 
     Args:
         definitions: Name and text of each, in the ``ros2msg`` format of MCAP.
-        source: Where they come from, for errors.
+        source: Source of the definitions, for error messages.
         optional: More of them; what cannot be used of these is left out.
 
     Raises:

@@ -25,13 +25,13 @@ class Viewer:
     programs: tuple[str, ...]
     """Names under which it may be installed."""
     arguments: Callable[[Path, Path | None], list[str]]
-    """From the MCAP file and the layout to the arguments of the program."""
+    """Function from the MCAP file and the layout to the arguments of the program."""
     layout: str
     """File name of the layout; empty where there is none."""
     imports: bool
     """Whether the layout has to be imported in the program by hand."""
     source: str
-    """Where to get it."""
+    """Address from which to get it."""
     scene: bool = False
     """Whether it draws the vehicle in 3-D, from a file that the bag is copied to."""
 
@@ -101,4 +101,4 @@ VIEWERS = {
     ),
     "rerun": Viewer("Rerun", ("rerun",), _file, "", False, "pip install rerun-sdk"),
 }
-"""In the order in which they are tried."""
+"""Viewers in the order in which they are tried."""

@@ -39,19 +39,14 @@ class BagWriter:
     progress and nothing else; :func:`hsv.recording.recover.recover` then makes a proper bag of the rest. Until then
     the file is locked, so that nobody takes it for one whose writer was killed.
 
-    Parameters
-    ----------
-    directory
-        The bag directory, ``<name>/`` with ``<name>_0.mcap``; new, or empty.
-    topics
-        The topics known from the start.
-    custom_data
-        What is known of the run before it starts (run id, seed, commit, design hash); kept by a killed run too.
+    Args:
+        directory: The bag directory, ``<name>/`` with ``<name>_0.mcap``; new, or empty.
+        topics: The topics known from the start.
+        custom_data: What is known of the run before it starts (run id, seed, commit, design hash); kept by a killed run
+            too.
 
     Raises:
-    ------
-    RecordingError
-        If the directory holds something already or cannot be made.
+        RecordingError: If the directory holds something already or cannot be made.
     """
 
     def __init__(
@@ -86,9 +81,7 @@ class BagWriter:
         """Add a topic; also in flight, before its first message.
 
         Raises:
-        ------
-        RecordingError
-            If the bag has a topic of this name.
+            RecordingError: If the bag has a topic of this name.
         """
         if topic.name in self._channels:
             raise RecordingError(f"topic {topic.name}: is in the bag already, expected a new name")
@@ -111,19 +104,13 @@ class BagWriter:
     def write(self, topic: str, time_ns: int, data: bytes) -> None:
         """Write one message.
 
-        Parameters
-        ----------
-        topic
-            Name of an added topic.
-        time_ns
-            Simulated time in nanoseconds, kept as log time and as publish time.
-        data
-            The message in CDR with its header of four bytes.
+        Args:
+            topic: Name of an added topic.
+            time_ns: Simulated time in nanoseconds, kept as log time and as publish time.
+            data: The message in CDR with its header of four bytes.
 
         Raises:
-        ------
-        RecordingError
-            If the topic was not added or the file cannot be written (no space left).
+            RecordingError: If the topic was not added or the file cannot be written (no space left).
         """
         try:
             channel = self._channels[topic]
@@ -142,7 +129,7 @@ class BagWriter:
             self._stream.flush()
 
     def flush(self) -> None:
-        """End the chunk in progress and hand it to the operating system: what was written outlives this process."""
+        """End the current chunk and hand it to the operating system: its data survive the end of this process."""
         with self._writing():
             self._writer.flush()
         self._pending = 0
@@ -150,10 +137,8 @@ class BagWriter:
     def close(self, custom_data: Mapping[str, str] | None = None) -> None:
         """Finish the file and write metadata.yaml.
 
-        Parameters
-        ----------
-        custom_data
-            What is known only at the end (outcome, wall time); added to that given at the start.
+        Args:
+            custom_data: What is known only at the end (outcome, wall time); added to that given at the start.
         """
         self.add_custom_data(custom_data or {})
         topics = [
@@ -168,7 +153,7 @@ class BagWriter:
             write_metadata(self.directory, values)
 
     def add_custom_data(self, custom_data: Mapping[str, str]) -> None:
-        """Add to what is known of the run, over what was said before."""
+        """Add to the metadata of the run, replacing earlier values."""
         if custom_data:
             self._custom_data |= custom_data
             with self._writing():

@@ -1,4 +1,4 @@
-"""What a bag says of how it was made: the parameters attached to it, and what was changed in flight."""
+"""Origin of a bag: the parameters attached to it, and what was changed in flight."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.adjustable import TAU, change_parameters, factors, scheduled_changes
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.tube_factor import TAU, change_parameters, rigid_factors, scheduled_changes
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
 from hsv.faults.injector import FaultInjector
@@ -58,7 +58,7 @@ ACTIVE_INPUT = 1e-6
 
 
 def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
-    """Give a bag attachments that it lacks, in place of those that it has: as if it had been flown with these.
+    """Give a bag attachments that it does not have, or replace its own, as if it had been flown with them.
 
     Args:
         bag: Any bag of a flight.
@@ -208,7 +208,7 @@ def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
     flown: list[tuple[int, np.ndarray]] = []
     planned = []
     for status in recorded_status:
-        recorded = factors(status.tau, TAU.name)
+        recorded = rigid_factors(status.tau, TAU.name)
         if not flown or np.any(recorded != flown[-1][1]):
             flown.append((status.step, recorded))
         planned.append(np.all(recorded == [tau for start, tau in schedule if start <= status.step][-1]))

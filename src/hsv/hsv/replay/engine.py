@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -14,15 +14,13 @@ from rosbags.typesys.store import Typestore
 from hsv.errors import RecordingError
 from hsv.graph.description import CLOCK, COMMAND, PLANT, STATE, TOPICS, WIRE_ALIGNMENT, step_topics
 from hsv.graph.parameter_sections import ParameterSections
+from hsv.progress import Progress
 from hsv.recording.compare import Comparison, compare
 from hsv.recording.fields import blank, nanoseconds
 from hsv.recording.reader import Bag
 from hsv.recording.track import Track, expecting_fields
 from hsv.replay.attached import broken_off, complete_steps, estimated
 from hsv.replay.processes import Process, processes_of
-
-Progress = Callable[[str, int, int], None]
-"""Name of what is done, steps done, steps in all."""
 
 PROGRESS_INTERVAL = 200
 
@@ -46,7 +44,7 @@ class ProcessComparison:
 
 
 class _Outputs:
-    """Output messages of a process, filled again at every step and kept as bytes."""
+    """Output messages of a process, refilled at every step and stored as bytes."""
 
     def __init__(self, types: Typestore, topics: Mapping[str, str], source: str) -> None:
         self._source = source
@@ -57,7 +55,7 @@ class _Outputs:
         self.tracks = {topic: Track(topic, kind, types, [], [], "replay") for topic, kind in topics.items()}
 
     def keep(self) -> None:
-        """Serialize what stands in the messages now."""
+        """Serialize the current messages."""
         for topic, message in self.messages.items():
             if vars(message).keys() != self._fields[topic]:
                 new = ", ".join(sorted(vars(message).keys() - self._fields[topic]))
@@ -76,7 +74,7 @@ class _Outputs:
 
 
 def replay(bag: Bag, process: Process, values: ParameterSections, progress: Progress) -> ProcessComparison:
-    """Feed ``process`` with its recorded inputs and compare what it makes of them.
+    """Feed ``process`` with its recorded inputs and compare its outputs.
 
     Args:
         bag: The recorded run.
@@ -116,7 +114,7 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
-    """Fly the whole loop again in this process and compare every step topic.
+    """Repeat the whole loop in this process and compare every step topic.
 
     Args:
         bag: The recorded run.
@@ -149,7 +147,7 @@ def fly(
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
         progress: Told how far it is.
-        source: What defines ``types``, for errors.
+        source: Source of ``types``, for error messages.
         commands: Recorded ones, with their times, of a controller that is a node of its own and not here.
 
     Raises:

@@ -10,9 +10,10 @@ from hsv.errors import RecordingError
 from hsv.graph.description import PEER_EMULATOR, PLANT, RUN, STATE, NodeDescription, graph, step_topics
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.parameter_sections import ParameterSections
+from hsv.progress import Progress
 from hsv.recording.reader import Bag
 from hsv.replay.attached import estimated
-from hsv.replay.engine import ProcessComparison, Progress, compare_process, require
+from hsv.replay.engine import ProcessComparison, compare_process, require
 from hsv.replay.processes import processes_of
 
 
@@ -47,7 +48,7 @@ def replay_all(
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> Iterator[ProcessComparison]:
-    """Fly the whole graph again and compare every step topic.
+    """Repeat the run of the whole graph and compare every step topic.
 
     Raises:
         RecordingError: A topic is missing; no process has been started.

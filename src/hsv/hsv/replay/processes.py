@@ -34,7 +34,7 @@ _TOLERANCES = {
 
 @dataclass(frozen=True)
 class Process:
-    """A process under test; what it reads and writes is in its ``node`` description."""
+    """A process under test; its ``node`` description has its inputs and outputs."""
 
     node: NodeDescription
     block: Block
@@ -51,7 +51,7 @@ class Process:
 
     @property
     def restarts(self) -> bool:
-        """Whether it owns time: a step begins from recorded state and input of the one before, the first from none."""
+        """Whether it owns time: a step starts from recorded state and input of the previous one; the first has none."""
         return self.block is VEHICLE
 
     @property
@@ -61,7 +61,7 @@ class Process:
 
     @property
     def delayed(self) -> tuple[str, ...]:
-        """Those of them that one step needs of the step before, of which the first needs none."""
+        """Inputs that a step takes from the previous step; the first step has none."""
         return () if self.restarts else self.node.delayed
 
     @property

@@ -1,1 +1,1 @@
-"""What each controller survives: faults of rising severity, at two times, on the nominal vehicle and at corners."""
+"""Resilience of controllers: faults of increasing severity, at two times, on the nominal vehicle and at corners."""

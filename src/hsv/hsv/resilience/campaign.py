@@ -1,4 +1,4 @@
-"""What a resilience campaign flies: controllers, each in its own scenario, by faults and times of occurrence."""
+"""Definition of a resilience campaign: controllers, each in its own scenario, by faults and times of occurrence."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ CONTROLLERS = ("case1", "case2", "case1_qp", "case1_integral_heavy", "case1_rmpc
 """Scenarios flown by default: nested gains, adjustable factor, quadratic programme, integral action, robust MPC."""
 
 _EVERY = 8
-"""Of the screening corners, each so many-th is flown: two and their mirror images."""
+"""Stride in the list of screening corners; it selects two corners and their mirror images."""
 
 BISECTION = 5
 """Flights that the bisection of a case is expected to take, beside those with its severities. The estimate of a
@@ -61,7 +61,7 @@ class Subject:
             moment: When the fault starts; the flight ends so long after it.
             vehicle: Number of the vehicle, whose changes take the place of the scenario's.
             fault: The only fault; none for the flight that the others are compared with.
-            value: Of the parameter that is its severity.
+            value: Value of the parameter that is its severity.
         """
         table = scenario_table(self.text, self.name)
         start = self.start(moment)

@@ -46,7 +46,7 @@ class TriedFault:
     parameter: str
     """A parameter of its kind or occurrence, or :data:`DURATION`"""
     unit: str
-    """Of that parameter, as it is written"""
+    """Unit of that parameter, as it is written."""
     harmless: float
     """Value at severity 0, in that unit"""
     worst: float
@@ -142,11 +142,10 @@ TRIED = {
     "pitch_rate_scale": TriedFault(_RATE, "sensor_scale", "factor", "1", 1.0, 0.0, (0.9, 0.7, 0.5)),
     "pitch_rate_drop_out": TriedFault(_RATE, "sensor_drop_out", "probability", "1", 0.0, 1.0, (0.1, 0.5, 0.8)),
 }
-"""By name. The mild values are usual ones: the paper's 0.9 as loss of effectiveness, published bandwidths, one degree
-of elevator as the moment of an unstart (0.0225), fine noise; the severe ones are where controllers begin to differ.
-Ranges go on to where the baseline is lost, or to what is physically there: no elevator, no fuel, no thrust.
-
-The elevator is trimmed at 12 deg and ends at 30 deg, so that what takes up its positive travel is the worse sign of a
-bias, a drift and a moment. Lock and float come and go, and the severity is the share of time for which they act; a
-hard-over, at the 100 deg/s of usual actuators, ends when a monitor has passivated it, and the severity is how long that
-takes."""
+"""Faults by name. The mild values are realistic: the paper's 0.9 as loss of effectiveness, published bandwidths, one
+degree of elevator as the moment of an unstart (0.0225), low noise; the severe ones are where controllers begin to
+differ. Ranges extend to the loss of the baseline, or to the physical limit: no elevator, no fuel, no thrust. The
+elevator is trimmed at 12 deg and limited to 30 deg, so that the sign that uses up its positive travel is the worse one
+for a bias, a drift and a moment. Lock and float are intermittent, and the severity is the fraction of time for which
+they act; a hard-over, at the 100 deg/s of usual actuators, ends when a monitor has passivated it, and the severity is
+the time until then."""

@@ -34,12 +34,12 @@ _ALTITUDE, _ATTITUDE = 0, slice(2, 4)
 
 @dataclass(frozen=True)
 class FlownFault:
-    """What became of a flight; distances are those from the same vehicle's flight without the fault."""
+    """Result of a flight; deviations are measured from the same vehicle's flight without the fault."""
 
     severity: str
     """One of :data:`SEVERITIES`"""
     value: float
-    """Of the fault's parameter, in its unit"""
+    """Value of the fault's parameter, in its unit."""
     vehicle: int
     """0: the nominal one"""
     survived: bool
@@ -69,7 +69,7 @@ class Boundary:
 
 
 class SubjectRunner:
-    """Flies one controller's flights around one time of occurrence; what they share is built once."""
+    """Flies one controller's flights for one time of occurrence; what they share is built once."""
 
     def __init__(self, subject: Subject, moment: Moment) -> None:
         if library_digest(subject.scenario.controller) != subject.library:
@@ -114,7 +114,7 @@ class SubjectRunner:
         return FlownFault(severity, value, vehicle, survived, attitude, altitude, recovery, loss, None)
 
     def survives(self, fault: TriedFault, severity: float) -> bool:
-        """Tell whether the nominal vehicle comes to the end of its flight."""
+        """Return whether the nominal vehicle comes to the end of its flight."""
         try:
             return self.fly(0, fault, fault.value(severity)).status is FlightStatus.FINISHED
         except ControllerError:
@@ -125,9 +125,9 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
     """Return largest distances of attitude (rad) and altitude (m), and recovery time (s), after ``start`` (s).
 
     Args:
-        flight: With the fault.
+        flight: Flight with the fault.
         without: The same flight without it; where either ends early, what both have is compared.
-        start: Of the fault.
+        start: Start of the fault.
     """
     rows = min(len(flight.time), len(without.time))
     after = np.flatnonzero(flight.time[:rows] >= start - 1e-9)
@@ -149,7 +149,7 @@ def boundary(
 
     Args:
         survives: Tells it of a severity.
-        known: What is known already, by severity.
+        known: Known results by severity.
         resolution: Largest difference of the two.
         at: Returns the severity that is flown for one, where only some can be.
     """
@@ -194,8 +194,8 @@ def time_flight(text: str, number: int) -> bytes:
     """Fly one fault on the nominal vehicle as :func:`fly_case` does; return how long it took (s), as a text.
 
     Args:
-        text: Of the campaign.
-        number: Of the case, times the number of severities, plus that of the severity.
+        text: Text of the campaign.
+        number: Number of the case times the number of severities, plus the number of the severity.
     """
     number, chosen = divmod(number, len(SEVERITIES))
     case = _campaign(text).cases[number]

@@ -34,9 +34,9 @@ def write_results(results: ResilienceResults, out: Path, command: str) -> list[P
     """Write page, Markdown and the scenario of the worst flight of every cell into ``out``; return page and Markdown.
 
     Args:
-        results: Of a campaign.
+        results: Results of a campaign.
         out: A folder.
-        command: That makes them, which they name.
+        command: Command that produces them, printed on the page.
 
     Raises:
         CampaignError: A file cannot be written.
@@ -70,7 +70,7 @@ def flight_text(cell: Cell) -> str:
 
 
 def vehicle_words(vehicle: int) -> str:
-    """Return what a vehicle is, by its number."""
+    """Return the description of a vehicle by its number."""
     return f"corner {vehicle}" if vehicle else "nominal vehicle"
 
 

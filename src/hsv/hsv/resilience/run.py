@@ -1,4 +1,4 @@
-"""Running a resilience campaign to its end; a case that was flown before, with the same code, is not flown anew."""
+"""Run of a resilience campaign; cases that were flown before with the same code are not repeated."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TIMED = 6
 """Flights that are timed before the start, of each controller and for each of its vehicles."""
 
 _BYTES = 8000
-"""On the disk, of a case: its numbers and the scenarios of its worst flights."""
+"""Disk space of a case: its numbers and the scenarios of its worst flights."""
 
 Outcome = tuple[tuple[FlownFault, ...], Boundary]
 """Flights of a case, and between which severities it is lost."""
@@ -31,7 +31,7 @@ Outcome = tuple[tuple[FlownFault, ...], Boundary]
 
 @dataclass(frozen=True)
 class Flown:
-    """What a run flew: number of cases, and how long that took (s), beside how long it was expected to."""
+    """Cases flown in a run: their number, the time they took (s), and the expected time."""
 
     cases: int
     wall_time: float
@@ -48,7 +48,7 @@ class CaseStore:
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Make the folder and hold it: one process at a time may fly into it.
+        """Create and lock the folder: only one process at a time may fly into it.
 
         Raises:
             CampaignError: It cannot be made, or is in use.
@@ -61,7 +61,7 @@ class CaseStore:
             yield
 
     def keep(self, case: Case, content: bytes) -> None:
-        """Keep a case that was flown, and drop what it was with other code.
+        """Store the results of a case, and remove those of other code.
 
         Raises:
             CampaignError: It cannot be written.
@@ -71,7 +71,7 @@ class CaseStore:
         drop_older(path)
 
     def read(self, case: Case) -> Outcome | None:
-        """Return what a case brought, None where it was not flown or its file is damaged."""
+        """Return the results of a case, None if it was not flown or its file is damaged."""
         try:
             values = parse_json(read_text(self._path(case)))
             return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
@@ -95,7 +95,7 @@ def run_resilience(
 
     Args:
         campaign: The campaign.
-        store: Where cases are kept.
+        store: Store of the cases.
         executor: The back end that flies them.
         expect: Called once, after flights that are timed, with the capacity that the run needs.
         progress: Called with the number of finished flights, those found at the start included.

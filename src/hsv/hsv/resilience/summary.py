@@ -1,4 +1,4 @@
-"""What a resilience campaign shows: cells of severity, time and fault, and the worst flight of each."""
+"""Summary of a resilience campaign: cells of severity, time and fault, and the worst flight of each."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class ResilienceResults:
 
     campaign: ResilienceCampaign
     squares: dict[tuple[str, str], Square]
-    """By fault and controller"""
+    """Squares by fault and controller."""
 
     @classmethod
     def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
@@ -150,7 +150,7 @@ def said_boundaries(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) ->
 
 
 def parameter_words(name: str) -> str:
-    """Return what the severity of a fault is: mild, medium and severe values, range, and what is fixed."""
+    """Return the description of a fault's severity: mild, medium and severe values, range, and fixed parameters."""
     fault = TRIED[name]
     fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
     tried = f"{fault.said(*fault.values)} ({fault.harmless:g} to {fault.said(fault.worst)}){fixed}"

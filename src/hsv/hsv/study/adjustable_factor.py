@@ -1,8 +1,8 @@
-"""What the adjustable factor tau buys and costs: the designs of section 4 over tau, flown."""
+"""Benefits and costs of the adjustable tube factor tau: the designs of section 4 over tau, flown."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -12,11 +12,12 @@ import numpy as np
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
 from hsv.design.common_lyapunov import common_lyapunov
-from hsv.design.factor import certified_loops, relaxed_bound
+from hsv.design.factor_range import certified_loops, relaxed_bound
 from hsv.design.inputs import DesignInputs, with_tau
 from hsv.design.region import Corner, Region, region_parameters
 from hsv.design.tube import MeasuredSet, measured_set
 from hsv.errors import DesignError
+from hsv.progress import Progress
 from hsv.simulation.assembly import assemble
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
@@ -25,13 +26,11 @@ from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
-Progress = Callable[[str, int, int], None]
-
 FACTORS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5)
-"""Of the designs that are made and flown, unless fewer are asked for."""
+"""Tube factors of the designs that are made and flown, unless fewer are requested."""
 
 FINE = np.linspace(0.25, 1.0, 76)
-"""Of the linear loops."""
+"""Tube factors of the linear loops."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +66,7 @@ class FactorRow:
 
 @dataclass(frozen=True)
 class FactorStudy:
-    """The rows; the linear loops; what is certified.
+    """The rows of the study, the linear loops, and the certified ones.
 
     ``growth``: by coupling set, the rightmost pole (1/s) over :data:`FINE` of the nominal vehicle and of the worst,
     (2, f). ``limits``: by coupling set, the factor below which the loop is not stable, of the nominal vehicle and of
@@ -87,7 +86,7 @@ def factor_study(
     """Design and fly at each of ``factors``.
 
     Args:
-        inputs: As of the shipped adjustable design.
+        inputs: Inputs, such as those of the shipped adjustable design.
         factors: The first is 1.
         over: Vehicles of the linear loops, the nominal one first.
         progress: Called with what is done.

@@ -11,15 +11,14 @@ import numpy as np
 
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
+from hsv.simulation.closed_loop import Flight
 from hsv.simulation.scenario import load_scenario
+from hsv.simulation.side_by_side import fly_perturbed
 from hsv.study.measures import flight_measures
 from hsv.study.sources import DIGITS, digest_of, flight_digest, kept, measuring_code
-from hsv.threads import over_threads
 from hsv.vehicle.plant import FlightStatus
-
-Progress = Callable[[str, int, int], None]
 
 Table = dict[str, np.ndarray]
 """Columns (flights) by measure, the nominal vehicle first; what a flight does not define is not a number."""
@@ -34,7 +33,7 @@ def fly_over(
     """Fly the flat parameters ``values`` with each of the vehicles in ``over``, in as many threads as processors.
 
     Args:
-        values: Of the nominal flight.
+        values: Parameters of the nominal flight.
         over: Relative changes of the vehicle's parameters, one flight each.
         half_width: (5) as for :func:`hsv.study.measures.flight_measures`.
         progress: Called with the number of flights done.
@@ -42,8 +41,7 @@ def fly_over(
     parts = assemble(values)
     levels = TubeLevels(parts)
 
-    def job(corner: Corner) -> dict[str, float]:
-        flight = fly(parts.perturbed(corner))
+    def job(corner: Corner, flight: Flight) -> dict[str, float]:
         data = flight.data()
         level = levels.worst(data)
         return {
@@ -53,7 +51,7 @@ def fly_over(
             **flight_measures(data, half_width),
         }
 
-    rows = over_threads(job, over, progress)
+    rows = fly_perturbed(parts, over, job, progress)
     names = list(dict.fromkeys(name for row in rows for name in row))
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
 
@@ -71,7 +69,7 @@ def corner_table(
     Args:
         scenario: Its name.
         over: Relative changes of the vehicle's parameters, one flight each.
-        folder: Where tables are kept, under a digest of what they depend on.
+        folder: Folder of the tables, named by a digest of what they depend on.
         half_width: (5) as above.
         progress: Called with what is done.
         changes: Flat parameters in place of the scenario's.

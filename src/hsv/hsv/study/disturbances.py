@@ -13,9 +13,9 @@ from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Corner, record
 from hsv.design.tube_problem import channel_model
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
+from hsv.simulation.closed_loop import Flight
 from hsv.simulation.scenario import load_scenario
-from hsv.threads import over_threads
+from hsv.simulation.side_by_side import fly_perturbed
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -32,8 +32,8 @@ def largest_disturbances(scenario: str, over: Sequence[Corner]) -> dict[str, np.
     model = channel_model(design, Vehicle.from_parameters(values))
     parts = assemble(values)
 
-    def largest(corner: Corner) -> np.ndarray:
-        return np.asarray(np.abs(model.signals(record(fly(parts.perturbed(corner)))).channels).max(axis=0))
+    def largest(corner: Corner, flight: Flight) -> np.ndarray:
+        return np.asarray(np.abs(model.signals(record(flight)).channels).max(axis=0))
 
-    rows = np.array(over_threads(largest, over))
+    rows = np.array(fly_perturbed(parts, over, largest))
     return {channel.name: column for channel, column in zip(CHANNELS, rows.T, strict=True)}

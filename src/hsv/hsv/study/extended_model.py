@@ -19,7 +19,7 @@ def extended_model(
     """Return A (11, 11), B (11, 2) of the ECM under held inputs.
 
     Args:
-        inputs: Of the co-design: its filter and period.
+        inputs: Inputs of the co-design: its filter and period.
         coupling: Name of the set, or a multiple of the derived.
         point: Altitude (m) and velocity (m/s) of the trim.
     """

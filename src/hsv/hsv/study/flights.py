@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import mkdtemp
@@ -15,14 +14,12 @@ from hsv.graph.description import COMPOSED
 from hsv.graph.flight import fly_graph
 from hsv.graph.launcher import executable
 from hsv.graph.preparation import prepare
+from hsv.progress import Progress
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import FlightData
 from hsv.simulation.scenario import load_scenario
 from hsv.study.sources import DIGITS, drop_older, flight_digest
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 def graph_is_there() -> bool:

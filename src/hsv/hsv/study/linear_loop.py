@@ -27,7 +27,7 @@ TARGET = (86100.0 * FOOT, 8150.0 * FOOT)
 """Altitude (m) and velocity (m/s) at which Case 1 starts and ends."""
 
 EFFECTIVENESS = (1.0, 0.9)
-"""Of the elevator, before and after the fault."""
+"""Effectiveness of the elevator before and after the fault."""
 
 ELEVATOR = 1
 
@@ -37,7 +37,7 @@ COUPLING_SCALES = tuple(0.05 * step for step in range(26))
 
 @dataclass(frozen=True)
 class Hardware:
-    """What is between command and vehicle: linear ``actuators``, at most one a channel, and a ``delay`` (s)."""
+    """Hardware between command and vehicle: linear ``actuators``, at most one per channel, and a ``delay`` (s)."""
 
     actuators: tuple[ActuatorSet, ...] = ()
     delay: float = 0.0
@@ -111,7 +111,7 @@ def sampled_loop(
         notch: Sections of the filter, none: the pitch rate passes.
         period: Control period (s).
         point: Altitude (m) and velocity (m/s) of the trim.
-        effectiveness: Of the elevator.
+        effectiveness: Effectiveness of the elevator.
         hardware: Between command and vehicle.
 
     Raises:
@@ -145,7 +145,7 @@ def worst_growth(
     """Return the largest growth (1/s) of the loop at both ends of Case 1's step, before and after its fault.
 
     Args:
-        vehicle: As for :func:`sampled_loop`, and so are ``feedback``, ``notch`` and ``period``.
+        vehicle: See :func:`sampled_loop`, also for ``feedback``, ``notch`` and ``period``.
         feedback: (2, 9).
         notch: Sections of the filter.
         period: Control period (s).
@@ -164,7 +164,7 @@ def stability_limit(growth: Callable[[float], float], along: Sequence[float], to
     Args:
         growth: Largest real part (1/s) of a loop's poles over a scalar, such as kappa.
         along: Values of the scalar, increasing or decreasing, so dense that no loss is over between two of them.
-        tolerance: Of the limit, as a share of the interval it lies in.
+        tolerance: Tolerance of the limit, as a fraction of the interval it lies in.
 
     Returns:
         The limit; the first value if the loop is not stable there; ``None`` if it

@@ -20,7 +20,7 @@ LAST = 1.0
 
 
 def flight_measures(flight: FlightData, half_width: np.ndarray) -> dict[str, float]:
-    """Return the metrics of a flight with those of the study; what it does not define is left out.
+    """Return the metrics of a flight with those of the study; undefined ones are omitted.
 
     Args:
         flight: Flown to its end or not.

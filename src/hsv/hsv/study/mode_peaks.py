@@ -34,7 +34,7 @@ class Peak:
 
 @dataclass(frozen=True)
 class PeakFall:
-    """The peak of a mode without the filter and what is left of it with the filter, ``None``: no local maximum.
+    """The peak of a mode without the filter and the remaining peak with the filter, ``None``: no local maximum.
 
     ``natural_frequency``: of the mode, rad/s; the peak is beside it, where what else answers adds to it.
     """
@@ -45,7 +45,7 @@ class PeakFall:
 
     @property
     def decibel(self) -> float:
-        """By how much the highest point falls, peak to peak, dB: the peak may move; infinite if none is left."""
+        """Decrease of the highest point, peak to peak, in dB; the peak may move; infinite if none is left."""
         return float("inf") if self.after is None else self.before.magnitude - self.after.magnitude
 
 

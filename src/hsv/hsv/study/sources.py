@@ -1,4 +1,4 @@
-"""What the outcome of a flight depends on, as one digest: results are kept under it and found again by it."""
+"""Digest of everything that the outcome of a flight depends on; results are stored and found by it."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ def code_digest() -> str:
 
 
 def measuring_code(*further: str) -> list[bytes]:
-    """Return the code on which what is measured of flights hangs, beside what they hang on; ``further``: modules."""
+    """Return the code on which measurements of flights depend besides the flights; ``further``: modules."""
     modules = ("hsv.study.corner_flights", "hsv.study.measures", "hsv.campaign.tube_levels", *further)
     return [Path(str(spec.origin)).read_bytes() for spec in map(find_spec, modules) if spec]
 
 
 @cache
 def nodes_digest() -> str:
-    """Return the digest of what a run of the graph hangs on beside the flight: nodes, messages, starting, recording.
+    """Return the digest of everything that a run of the graph depends on besides the flight: nodes, messages, start.
 
     The nodes are those of the sourced workspace, wherever it is: of all its packages named hsv_* the modules as they
     would be imported and the definitions of messages and services.
@@ -86,7 +86,7 @@ def flight_digest(scenario: str, *, graph: bool = False) -> str:
 def kept(
     path: Path, make: Callable[[], Result], save: Callable[[Path, Result], None], load: Callable[[Path], Result]
 ) -> Result:
-    """Return what is kept in the file ``path``, whose name ends in a digest; if nothing is, make and keep it.
+    """Return the contents of the file ``path``, whose name ends in a digest; if there is none, compute and store them.
 
     A file is there only when it is whole, and what was kept under another digest is dropped.
     """
@@ -102,7 +102,7 @@ def kept(
 
 
 def drop_older(path: Path) -> None:
-    """Remove what was kept beside ``path`` under the same name and another digest: what it depended on is gone."""
+    """Remove outdated files: those with the name of ``path`` and another digest."""
     name, _, rest = path.name.rpartition("_")
     for other in path.parent.glob(f"{name}_{'[0-9a-f]' * DIGITS}{rest[DIGITS:]}"):
         if other != path:

@@ -46,7 +46,7 @@ class BoxSet(InvariantSet):
 
 @dataclass(frozen=True)
 class Infeasibility:
-    """Why there is no box: ``multipliers`` y (r, n), what they give, and the spectral radii that explain it.
+    """Proof that no box exists: ``multipliers`` y (r, n), their result, and the spectral radii that explain it.
 
     ``columns`` is the largest entry of sum_i (I - |A_i|)' y_i, at most zero; ``gain`` is sum_i w_i' y_i, above zero;
     ``radii`` (r) of |A_i + B_i F|; ``radius`` of their elementwise maximum.

@@ -18,7 +18,7 @@ _INFLATION = 1.002
 def ellipsoid(
     problem: TubeProblem, state_scale: np.ndarray, input_scale: np.ndarray, contractions: list[float]
 ) -> EllipsoidSet:
-    """Return the ellipsoid whose half-widths and feedback, scaled, have the least sum of squares (for paper eq. 26).
+    """Return the ellipsoid with the least sum of squares of scaled half-widths and feedback (for paper eq. 26).
 
     Args:
         problem: Error system and disturbances.

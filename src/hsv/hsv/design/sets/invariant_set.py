@@ -1,4 +1,4 @@
-"""What every invariant set of the tube offers, however it was computed."""
+"""Interface of the invariant sets of the tube, however they were computed."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class TubeProblem:
     disturbance: DisturbanceSet
 
     def centre(self) -> np.ndarray:
-        """Return where the mean vertex comes to rest under the mid-points of the disturbances (n)."""
+        """Return the equilibrium of the mean vertex under the mid-points of the disturbances (n)."""
         A, G = self.system.A.mean(axis=0), self.system.G.mean(axis=0)
         return np.linalg.solve(np.eye(len(A)) - A, G @ self.disturbance.centre)
 

@@ -56,7 +56,7 @@ class ZonotopeSet(InvariantSet):
         return float(-1.0 / found.fun) if found.status == 0 and found.fun < 0.0 else np.inf
 
     def certify(self) -> dict[str, Any]:
-        """Recompute that W_a bounds what the vertices add, over the set."""
+        """Recompute that W_a bounds the contribution of the vertices over the set."""
         sums = _Sums.of(self.problem, self.powers, self.columns)
         margin = 1.0 - sums.needed(self.problem, self.centre, self.absorbed) / self.absorbed
         if not margin.min() >= 0.0:
@@ -128,7 +128,7 @@ class _Sums:
         return np.asarray(partial + self.last @ z)
 
     def needed(self, problem: TubeProblem, centre: np.ndarray, absorbed: np.ndarray) -> np.ndarray:
-        """Return the box (n) of what the vertices add to the mean one, over the set."""
+        """Return the box (n) of the differences between the vertices and the mean one, over the set."""
         r, n, _ = problem.system.A.shape
         states = self.support(absorbed)[-r * n :].reshape(r, n)
         columns = problem.columns(centre)

@@ -1,1 +1,1 @@
-"""Recomputing a design from its parameter file and certificate, claim by claim; no hash is relied on."""
+"""Verification of a design by recomputing it from its parameter file and certificate; no hash is relied on."""

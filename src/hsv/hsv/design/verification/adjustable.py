@@ -1,4 +1,4 @@
-"""Claims of the adjustable design: Z at tau = 1, what the relaxed bounds follow from, the coupled vehicle's poles."""
+"""Checks of the adjustable design: Z at tau = 1, what the relaxed bounds follow from, the coupled vehicle's poles."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ import numpy as np
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import nominal_problem
 from hsv.design.coupled_poles import largest_real_parts
-from hsv.design.factor import relaxed_bound
+from hsv.design.factor_range import relaxed_bound
 from hsv.design.nominal_problem import certified_cost
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, vertex_residuals
 from hsv.design.tightening import tighten
-from hsv.design.verification.claims import Claim, Subject, above, at_most, same, same_parameter
+from hsv.design.verification.checks import Check, Subject, above, at_most, same, same_parameter
 from hsv.design.verification.invariant_set import stored_set
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.trim import trim
 
 
-def adjustable_claims(subject: Subject) -> Iterable[Claim]:
-    """Recompute Z at tau = 1, what the relaxed bounds follow from it, and the poles of the coupled vehicle."""
+def adjustable_checks(subject: Subject) -> Iterable[Check]:
+    """Recompute Z at tau = 1, the bounds that follow from it, and the poles of the coupled vehicle."""
     design, stored = subject.design, subject.certificate.get("adjustable")
     if stored is None:
         return
     one = replace(design, tau=np.ones(N_RIGID), tau_minimum=np.ones(N_RIGID))
-    complete = yield from _set_claims("Z at tau = 1", subject, one, stored["complete"])
-    incomplete = yield from _set_claims("Z' of the unrelaxed plan", subject, design, stored["incomplete"])
+    complete = yield from _set_checks("Z at tau = 1", subject, one, stored["complete"])
+    incomplete = yield from _set_checks("Z' of the unrelaxed plan", subject, design, stored["incomplete"])
     tau = np.append(design.tau_minimum, np.full(len(complete.half_width) - N_RIGID, design.tau_minimum[-1]))
     yield same("tau Z, half-widths", stored["scaled_half_width"], tau * complete.half_width, "half-widths")
     yield same_parameter(subject, "feedback.tau", design.tau, stored["tau"])
@@ -52,9 +52,9 @@ def adjustable_claims(subject: Subject) -> Iterable[Claim]:
     yield same("its value as certified", derived, full["largest_real_part"]["full_state"]["derived"], "rightmost poles")
 
 
-def _set_claims(
+def _set_checks(
     name: str, subject: Subject, design: ControlDesign, stored: dict[str, Any]
-) -> Generator[Claim, None, EllipsoidSet]:
+) -> Generator[Check, None, EllipsoidSet]:
     found = stored_set(design, subject.vehicle, stored)
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield above(f"{name}, invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0)

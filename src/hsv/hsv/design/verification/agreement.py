@@ -1,4 +1,4 @@
-"""How far a design that is computed anew is from the one that was shipped, in scaled coordinates."""
+"""Difference between a recomputed design and the shipped one, in scaled coordinates."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsv.control.design import ControlDesign
-from hsv.design.verification.claims import Subject
+from hsv.design.verification.checks import Subject
 from hsv.design.verification.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
 
 

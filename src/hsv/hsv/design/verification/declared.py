@@ -1,4 +1,4 @@
-"""Which models of hardware and air a scenario declares, or options of the command line describe.
+"""Models of hardware and air that a scenario declares or that options of the command line describe.
 
 Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.noise` pass one time in
 370: their own bound is :data:`hsv.noise.LARGEST`. What has no bound is named, and certifies nothing.
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
-from hsv.design.verification.claims import Subject
+from hsv.design.verification.checks import Subject
 from hsv.design.verification.effects import Measured, Model, air, unexplained
 from hsv.design.verification.plan import Plan
 from hsv.errors import DesignError, QuantityError
@@ -38,7 +38,7 @@ LARGEST_REACH = float(np.ceil(1e3 * LARGEST)) / 1e3
 
 
 def sensors(data: SensorData, plan: Plan, reach: float = REACH, of: str = "sensor") -> dict[str, Model]:
-    """Return what sensors of the rigid states do, by name; what is ideal is left out.
+    """Return the sensor models of the rigid states by name; ideal ones are omitted.
 
     Noise and a Gauss-Markov bias count ``reach`` standard deviations, and so do biases and scales that are drawn once a
     flight; a quantum counts half; what is late is so exactly.

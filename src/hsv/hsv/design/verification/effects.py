@@ -1,4 +1,4 @@
-"""What models of hardware and air add to the disturbance set of a design.
+"""Contributions of hardware and air models to the disturbance set of a design.
 
 Sensors, wind and density add channels to the structured set, bounded as if they could take any value within at every
 step. Errors of a measurement act through the feedback and the notch filter, and through the scheduling of the nominal
@@ -32,7 +32,7 @@ from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
 
 _WIND_FORWARD, _WIND_UP, _DENSITY = 0, 1, 2
-"""Of the conditions that :func:`hsv.vehicle.dynamics.forces_in` takes."""
+"""Indices into the conditions that :func:`hsv.vehicle.dynamics.forces_in` takes."""
 
 N_SCHEDULING = 2
 """The nominal model is scheduled by the first states, altitude and velocity."""
@@ -55,13 +55,13 @@ class Effect:
     feedthrough: np.ndarray
     half_width: np.ndarray
     widening: np.ndarray = field(default_factory=lambda: np.zeros(len(CHANNELS)))
-    """What is added to both bounds of the structured set (7)"""
+    """Increase of both bounds of the structured set (7)."""
     late: np.ndarray = field(default_factory=lambda: np.zeros(N_RIGID, int))
     """Steps (5) by which each rigid state is seen late"""
 
 
 Model = Callable[[ErrorSystem], Effect]
-"""From the error system that it acts on to the effect of a model."""
+"""Function from the error system on which a model acts to the effect of the model."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Measured:
 
 
 def entering(system: ErrorSystem) -> np.ndarray:
-    """Return what a measurement of the rigid states does (r, n, 5) within a period, by feedback and notch filter."""
+    """Return the effect of a measurement of the rigid states (r, n, 5) in a period, by feedback and notch filter."""
     columns = system.B @ system.F[:, :N_RIGID]
     filtered = np.array([name.startswith("filter_") for name in system.names])
     columns[:, filtered, PITCH_RATE] += system.A[:, filtered, PITCH_RATE]
@@ -127,7 +127,7 @@ def delayed(system: ErrorSystem, late: np.ndarray) -> ErrorSystem:
 
 
 def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, density: float = 0.0) -> Model:
-    """Return air that moves by at most these velocities (m/s) and whose density is off by at most this share.
+    """Return the model of air with at most these velocities (m/s) and a density off by at most this fraction.
 
     Its effect is that at mid-envelope, held over a ``period`` (s).
     """
@@ -153,7 +153,7 @@ def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, 
 
 
 def with_models(problem: TubeProblem, models: Sequence[Model]) -> TubeProblem:
-    """Return ``problem`` with the channels of ``models`` beside its own, but for those that are bounded by zero.
+    """Return ``problem`` with the additional channels of ``models``, except those that are bounded by zero.
 
     Samples of a state that several make late are late by the sum.
     """

@@ -1,4 +1,4 @@
-"""Claims of flights and random sequences: levels, disturbances and plans of a design, flown and drawn again."""
+"""Checks of repeated flights and random sequences: levels, disturbances and nominal inputs of a design."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.sampling import sample
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
-from hsv.design.verification.claims import Claim, Subject, above, at_most, same
+from hsv.design.verification.checks import Check, Subject, above, at_most, same
 from hsv.design.verification.invariant_set import certified_set, lag_feedback
 from hsv.design.verification.tolerances import ROUNDING, TOLERANCES
 
 _FLIGHTS, _FLIGHT_SEED = 48, 7
-"""How many corners, drawn with which seed, are flown again beside those that set a bound."""
+"""Number and seed of random corners that are flown in addition to those that determine a bound."""
 
 
-def flight_claims(subject: Subject) -> Iterable[Claim]:
-    """Fly the corners that set a bound, and a sample of all, again."""
+def flight_checks(subject: Subject) -> Iterable[Check]:
+    """Repeat the flights at the corners that determine a bound, and at a sample of all corners."""
     stored, share = subject.certificate["tube"], incomplete_share(subject.inputs)
     # As certified: in flight the factor may be another one.
     design = replace(subject.design, tau=subject.design.tau_minimum)
@@ -61,7 +61,7 @@ def _sample(region: Region, found: EllipsoidSet, model: ChannelModel) -> list[Fl
     )
 
 
-def _worst(name: str, flown: list[FlightEvidence], kept: dict[str, Any]) -> Iterable[Claim]:
+def _worst(name: str, flown: list[FlightEvidence], kept: dict[str, Any]) -> Iterable[Check]:
     allowance = 1.0 + TOLERANCES["flights"].relative
     level = max(f.level or 0.0 for f in flown)
     yield at_most(f"level of {name}", level, min(1.0, kept["worst_level"] * allowance))
@@ -69,8 +69,8 @@ def _worst(name: str, flown: list[FlightEvidence], kept: dict[str, Any]) -> Iter
     yield at_most(f"disturbances of {name}", ratio, kept["disturbance_membership"]["worst_ratio"] * allowance)
 
 
-def sequence_claims(subject: Subject) -> Iterable[Claim]:
-    """Draw the random sequences again."""
+def sequence_checks(subject: Subject) -> Iterable[Check]:
+    """Repeat the random sequences."""
     kept: dict[str, Any] = subject.certificate["tube"]["invariant_set"]["sampling"]
     drawn = sample(certified_set(subject), kept["sequences"], kept["steps"], kept["seed"])
     yield at_most("worst level of random sequences", drawn["worst_level"], 1.0)

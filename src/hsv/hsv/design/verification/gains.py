@@ -1,4 +1,4 @@
-"""Claims of the gains: F = M N^-1 with (24), K = Y Q^-1 with (33)-(35)."""
+"""Checks of the gains: F = M N^-1 with (24), K = Y Q^-1 with (33)-(35)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hsv.control.nominal_trajectory import nominal_data
 from hsv.design.lmi import smallest_eigenvalues, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.nominal_problem import NominalProblem, certified_cost, decrease_between, step_deviation
-from hsv.design.verification.claims import Claim, Subject, above, at_most, inverse, required, same, same_parameter
+from hsv.design.verification.checks import Check, Subject, above, at_most, inverse, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
 from hsv.vehicle.dynamics import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
 
@@ -22,10 +22,10 @@ _POINTS, _SEED = 100, 11
 """Points of the boundary of an ellipsoid where an interpolated input is compared on both sides, and their seed."""
 
 _BESIDE, _JUMP = 1e-9, 1e-4
-"""How far beside the boundary, relative, and by which share of its bound the input may differ there."""
+"""Relative distance from the boundary, and the fraction of its bound by which the input may differ there."""
 
 
-def feedback_claims(subject: Subject) -> Iterable[Claim]:
+def feedback_checks(subject: Subject) -> Iterable[Check]:
     """Recompute F, the eigenvalues of (24) and the spectral radii."""
     design, stored = subject.design, subject.certificate["feedback"]
     A, B, F = design.polytope.A, design.polytope.B, design.feedback_gain
@@ -40,7 +40,7 @@ def feedback_claims(subject: Subject) -> Iterable[Claim]:
     yield required(at_most("spectral radius of A + BF, all states", spectral_radii(A + B @ F).max(), 1.0 - 1e-6))
 
 
-def nominal_claims(subject: Subject) -> Iterable[Claim]:
+def nominal_checks(subject: Subject) -> Iterable[Check]:
     """Recompute every K and its inequalities."""
     design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
     A, B = design.polytope.A, design.polytope.B
@@ -82,15 +82,15 @@ def nominal_claims(subject: Subject) -> Iterable[Claim]:
         yield above(f"ellipsoid {i + 1} inside the one before", room, 0.0)
     interpolated = bool(inputs.get("interpolated"))
     yield required(
-        Claim("nominal.interpolated", str(design.interpolated), str(interpolated), design.interpolated == interpolated)
+        Check("nominal.interpolated", str(design.interpolated), str(interpolated), design.interpolated == interpolated)
     )
     if design.interpolated:
-        yield from _interpolation_claims(design, problem, stored, ellipsoids)
+        yield from _interpolation_checks(design, problem, stored, ellipsoids)
 
 
-def _interpolation_claims(
+def _interpolation_checks(
     design: ControlDesign, problem: NominalProblem, stored: list[dict[str, Any]], ellipsoids: list[np.ndarray]
-) -> Iterable[Claim]:
+) -> Iterable[Check]:
     """Recompute what holds between two ellipsoids: the level decreases, inputs keep their bounds, and do not jump.
 
     The bounds follow from (35) at both ends, which is linear in gain and P; the flown function is asked nevertheless.

@@ -1,4 +1,4 @@
-"""Claims of the invariant set: invariance at every vertex, half-widths, disturbance bounds, tightened bounds."""
+"""Checks of the invariant set: invariance at every vertex, half-widths, disturbance bounds, tightened bounds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hsv.design.disturbance import DisturbanceSet, Extremes
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
-from hsv.design.verification.claims import Claim, Subject, above, at_most, required, same, same_parameter
+from hsv.design.verification.checks import Check, Subject, above, at_most, required, same, same_parameter
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -33,12 +33,12 @@ def lag_feedback(tightening: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]
     return (np.array(lag["lower"]), np.array(lag["upper"])) if lag else None
 
 
-def set_claims(subject: Subject) -> Iterable[Claim]:
+def set_checks(subject: Subject) -> Iterable[Check]:
     """Recompute invariance, half-widths and tightened bounds from the stored matrices; milliseconds."""
     stored, design = subject.certificate["tube"], subject.design
     s = stored["invariant_set"]
-    yield Claim("invariant set", s["kind"], "ellipsoid", s["kind"] == "ellipsoid")
-    yield Claim("tube parameters", str(design.tube is not None), "True", design.tube is not None)
+    yield Check("invariant set", s["kind"], "ellipsoid", s["kind"] == "ellipsoid")
+    yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
     found = certified_set(subject)
     if design.tube is not None:
         seen = found.seen()
@@ -66,7 +66,7 @@ def set_claims(subject: Subject) -> Iterable[Claim]:
     yield above("room of the nominal plan", margins.min(), 0.0)
     low, high = plan["pitch_acceleration"]
     allowed = plan_bounds(bounds, np.append(plan["lowest"], low), np.append(plan["highest"], high))
-    yield Claim("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
+    yield Check("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
     if design.plan_bounds is not None:
         for name, value in vars(design.plan_bounds).items():
             parameter = f"nominal.{name}"

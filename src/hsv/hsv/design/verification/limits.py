@@ -23,7 +23,7 @@ from hsv.vehicle.trim import trim
 
 @dataclass(frozen=True)
 class Reach:
-    """How far one actuator may go: position between ``lowest`` and ``highest``, magnitude of the rate up to ``rate``.
+    """Range of one actuator: position between ``lowest`` and ``highest``, magnitude of the rate up to ``rate``.
 
     ``stop`` and ``rate_limit`` are its own, infinite where it has none. SI.
     """

@@ -1,4 +1,4 @@
-"""Claims of the model: vertices, weights and limits from the vehicle and the design inputs."""
+"""Checks of the model: vertices, weights and limits from the vehicle and the design inputs."""
 
 from __future__ import annotations
 
@@ -6,24 +6,24 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hsv.design.verification.claims import Claim, Subject, above, required, same, same_parameter
+from hsv.design.verification.checks import Check, Subject, above, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
 
 
-def input_claims(subject: Subject) -> Iterable[Claim]:
-    """Compare what a design copies from its inputs, and check that weights are weights."""
+def input_checks(subject: Subject) -> Iterable[Check]:
+    """Compare the values that a design copies from its inputs, and check its weights."""
     design, inputs = subject.design, subject.certificate["inputs"]
     yield same("period", design.period, inputs["model"]["period"], "copied")
     notch = [[section[name] for name in vars(design.notch[0])] for section in inputs["notch"]]
     yield same("notch", [list(vars(section).values()) for section in design.notch], notch, "copied")
     coupling = inputs["disturbance"]["coupling"]
-    yield Claim("design.coupling", design.coupling, repr(coupling), design.coupling == coupling)
+    yield Check("design.coupling", design.coupling, repr(coupling), design.coupling == coupling)
     known = " ".join(name for name in (inputs.get("actuator") or {}).values() if name)
     yield required(
-        Claim("design.actuators", " ".join(design.actuators), repr(known), " ".join(design.actuators) == known)
+        Check("design.actuators", " ".join(design.actuators), repr(known), " ".join(design.actuators) == known)
     )
     limits, digest = subject.vehicle.decoupled, subject.vehicle.digest
-    yield Claim("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest)
+    yield Check("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest)
     yield same_parameter(subject, "input.minimum", design.input_minimum, limits.input_minimum)
     yield same_parameter(subject, "input.maximum", design.input_maximum, limits.input_maximum)
     for axis, (_, weights) in (("altitude", design.altitude_samples), ("velocity", design.velocity_samples)):
@@ -32,7 +32,7 @@ def input_claims(subject: Subject) -> Iterable[Claim]:
         yield above(f"scheduling.{axis}.weights, least", weights.min(), -ROUNDING)
 
 
-def model_claims(subject: Subject) -> Iterable[Claim]:
+def model_checks(subject: Subject) -> Iterable[Check]:
     """Compare vertices and weights with those recomputed from the vehicle's parameters."""
     design, model = subject.design, subject.model
     for name, value, expected in (
@@ -41,7 +41,7 @@ def model_claims(subject: Subject) -> Iterable[Claim]:
     ):
         yield same_parameter(subject, name, value, expected, f"{name} from the vehicle")
     interpolation = design.interpolation
-    yield Claim(
+    yield Check(
         "scheduling.interpolation", interpolation, repr(model.interpolation), interpolation == model.interpolation
     )
     for axis, samples, recomputed in (

@@ -1,4 +1,4 @@
-"""What the effects of hardware need of a design's nominal plan: the nominal vehicle's flight of the declared region."""
+"""Data of the nominal trajectory for the effects of hardware: the nominal vehicle's flight of the declared region."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hsv.design.disturbance import CHANNELS, DisturbanceSet, Record, acceleratio
 from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, incomplete_share, measure, record
 from hsv.design.tube_problem import channel_model, known_actuators
-from hsv.design.verification.claims import Subject
+from hsv.design.verification.checks import Subject
 from hsv.lpv.actuated import respond, sampled_actuators
 from hsv.lpv.polytope import schedule
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
@@ -29,7 +29,7 @@ _EXPLAINED, _RESIDUAL = [0, 1, 2], [5, 6]
 
 @dataclass(frozen=True)
 class Plan:
-    """A plan (k rows); what it returns as bounds is inflated as the design inflates its own.
+    """A plan (k rows); its bounds are inflated like those of the design.
 
     ``states`` x_r + x_n (k, 5) and ``inputs`` u_r + u_n (k, 2); ``record`` of the flight.
     """
@@ -50,7 +50,7 @@ class Plan:
 
     @property
     def inflation(self) -> float:
-        """Of bounds."""
+        """Inflation of bounds."""
         return float(self.subject.inputs.disturbance.inflation)
 
     @property
@@ -77,6 +77,7 @@ class Plan:
         width = N_STATES + N_INPUTS
         x_n, u_n = self.record.deviation, self.record.nominal_input
         there, here = np.empty(N_STATES * width), np.empty(N_STATES * width)
+        weights = np.empty(len(polytope.S))
         columns = acceleration_channels(self.subject.vehicle, self.subject.design.period)
         inverse = np.linalg.inv(columns[_ACCELERATED])
         largest = np.zeros(len(CHANNELS))
@@ -85,9 +86,9 @@ class Plan:
             if not np.abs(row).max() > 0.0:
                 continue
             altitude, velocity = self.record.state[k, :2]
-            schedule(polytope, altitude, velocity, here)
+            schedule(polytope, altitude, velocity, weights, here)
             for first, second in product((-1.0, 1.0), repeat=2):
-                schedule(polytope, altitude + first * errors[0], velocity + second * errors[1], there)
+                schedule(polytope, altitude + first * errors[0], velocity + second * errors[1], weights, there)
                 off = ((there - here).reshape(N_STATES, width) @ row)[:N_RIGID]
                 accelerations = inverse @ off[_ACCELERATED]
                 largest[_EXPLAINED] = np.maximum(largest[_EXPLAINED], np.abs(accelerations))

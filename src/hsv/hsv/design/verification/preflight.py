@@ -1,4 +1,4 @@
-"""The check of a design before it flies: the quick claims, for the controller node to make at its start."""
+"""Check of a design before a flight: the quick checks, which the controller node makes at its start."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from functools import partial
 
 from hsv.control.design import ControlDesign
 from hsv.design.certificate import find_certificate, read_certificate
-from hsv.design.verification.claims import Subject, gathered, require
+from hsv.design.verification.checks import Subject, gathered, require
 from hsv.design.verification.quick import QUICK
 from hsv.errors import DesignError
 
 
 def preflight(design: ControlDesign, certificate: str = "") -> str:
-    """Return what is to be warned of before ``design`` flies, mostly nothing.
+    """Return warnings about ``design`` before a flight, usually none.
 
     A design that differs from the one that was certified may fly, people tune, as long as what its safety rests on
     holds for it: sizes and types; gains stable at every vertex; one Lyapunov function for F with (24), one for every K
@@ -22,15 +22,15 @@ def preflight(design: ControlDesign, certificate: str = "") -> str:
     design's own file.
 
     Raises:
-        DesignError: Names the claim that refuses, or the certificate that cannot be read.
+        DesignError: Names the check that fails, or the certificate that cannot be read.
     """
     path = find_certificate(design.name, certificate)
     if path is None:
         return f"design {design.name!r}: no certificate found, not verified"
     subject = Subject(design, read_certificate(path))
-    claims = [claim for name, part in QUICK.items() for claim in gathered(name, partial(part, subject))]
+    checks = [check for name, part in QUICK.items() for check in gathered(name, partial(part, subject))]
     try:
-        require(claim for claim in claims if claim.required)
+        require(check for check in checks if check.required)
     except DesignError as error:
         raise DesignError(f"design {design.name!r}: {error}") from error
-    return next((f"design {design.name!r} is not as certified: {claim}" for claim in claims if not claim.ok), "")
+    return next((f"design {design.name!r} is not as certified: {check}" for check in checks if not check.ok), "")

@@ -1,4 +1,4 @@
-"""Claims of a scenario's flight: whether it keeps to what the tube of its design was computed for."""
+"""Checks of a scenario's flight: whether it keeps to what the tube of its design was computed for."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hsv.design.region import Corner, fraction, incomplete_share
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
-from hsv.design.verification.claims import Claim, Subject, above, at_most
+from hsv.design.verification.checks import Check, Subject, above, at_most
 from hsv.design.verification.invariant_set import certified_set, lag_feedback
 from hsv.design.verification.tolerances import ROUNDING
 from hsv.errors import DesignError
@@ -26,9 +26,9 @@ def bounding_corners(subject: Subject) -> list[Corner]:
     return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
 
 
-def scenario_claims(
+def scenario_checks(
     subject: Subject, scenario: Scenario, over: Iterable[Corner] = ({},), progress: Callable[[int], None] | None = None
-) -> Iterable[Claim]:
+) -> Iterable[Check]:
     """Fly ``scenario`` with the design, the vehicle changed to each of ``over``, and check level, disturbances, plan.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The one table of tolerances of designs: ``python -m hsv.design.verification.tolerances > docs/tolerances.md``."""
+"""Table of tolerances of designs: ``python -m hsv.design.verification.tolerances > docs/tolerances.md``."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far an entry may be from what it is recomputed to: the larger of two bounds.
+    """Tolerance of an entry when it is compared with its recomputed value: the larger of two bounds.
 
     ``relative`` to the recomputed entry, or ``absolute`` in scaled coordinates, a share of the entry's size; the latter
     is what counts for entries that are zero, exactly or to rounding. ``size`` and ``reason`` are for the page.
@@ -30,16 +30,16 @@ class Tolerance:
 
 
 _HEADER = """# Tolerances of designs
-Made by `python -m hsv.design.verification.tolerances > docs/tolerances.md`, the table that `hsv verify` computes with.
+Made by `python -m hsv.design.verification.tolerances > docs/tolerances.md`, from the table that `hsv verify` uses.
 
-Two processors do not round alike, and what a solver or an eigenvalue routine returns they do not even round in the same
-order. So what `hsv verify` recomputes may differ from what is written, an entry by the larger of two bounds: the
-*relative* one, of the recomputed entry, and the *absolute* one, a share of the entry's size in scaled coordinates. The
-second is for entries that are zero, or would be without rounding. An entry that is changed by ten times that fails, for
-every entry of every shipped design (`tests/design/verification/test_every_entry.py`).
+Processors round differently, and the results of solvers and eigenvalue routines are not even rounded in the same order.
+A value recomputed by `hsv verify` may therefore differ from the stored one by the larger of two bounds: the *relative*
+one, with respect to the recomputed entry, and the *absolute* one, a fraction of the entry's size in scaled coordinates.
+The second bound is for entries that are zero, or would be without rounding. An entry changed by ten times this
+tolerance fails, for every entry of every shipped design (`tests/design/verification/test_every_entry.py`).
 
-A design computed anew agrees with the shipped one if no entry is farther from it than 1e-3 of the larger of the entry
-and its size (`hsv design NAME --check`); found are 4e-8 and less ([why](design.md)).
+A recomputed design agrees with the shipped one if no entry differs by more than 1e-3 of the larger of the entry and its
+size (`hsv design NAME --check`); the differences found are at most 4e-8 ([why](design.md)).
 
 | entries | relative | absolute | of the size | reason |
 | --- | ---: | ---: | --- | --- |"""
@@ -49,14 +49,14 @@ _DIAGONAL = "root of the product of the two diagonal entries"
 _ONE = "1 (SI)"
 
 TOLERANCES: dict[str, Tolerance] = {
-    "copied": Tolerance(1e-12, 1e-12, _ONE, "The same numbers, but for the rounding of a change of units."),
+    "copied": Tolerance(1e-12, 1e-12, _ONE, "The same numbers, except for rounding in a unit conversion."),
     "model.a": Tolerance(
         1e-7,
         5e-12,
         "scale of the row's state over that of the column's, `[model.tensor_product]`",
         "The last function kept has a relative singular value of 1e-9: processors that round differently agree on its "
         "direction to 1e-7, and on vertices to 1e-8. They are rounded to 1e-12 of their size, which "
-        "leaves zero of what no physics makes.",
+        "makes entries zero that are zero in the physical model.",
     ),
     "model.b": Tolerance(
         1e-7, 5e-12, "scale of the row's state over that of the input, `[model.tensor_product]`", "As model.a."
@@ -65,47 +65,48 @@ TOLERANCES: dict[str, Tolerance] = {
         1e-6,
         4e-8,
         _ONE,
-        "As model.a; weights see that direction itself: 1.3e-8 between processors. The least that is not zero is 7e-6.",
+        "As model.a; the weights depend on that direction directly: 1.3e-8 between processors. The smallest nonzero "
+        "weight is 7e-6.",
     ),
     "sums": Tolerance(1e-9, 1e-9, _ONE, "Weights of a point sum to one."),
     "feedback gain": Tolerance(1e-9, 1e-12, _GAIN, "M N^-1, with N scaled to a unit diagonal."),
     "nominal gains": Tolerance(1e-8, 1e-11, _GAIN, "Y Q^-1, with Q scaled to a unit diagonal."),
     "ellipsoids": Tolerance(
-        1e-6, 1e-10, _DIAGONAL, "Q^-1, with Q scaled to a unit diagonal; its least entries cancel."
+        1e-6, 1e-10, _DIAGONAL, "Q^-1, with Q scaled to a unit diagonal; its smallest entries cancel."
     ),
     "relaxed bounds": Tolerance(
         1e-7, 1e-9, _ONE, "A copy of the inputs' (baseline), or (52) recomputed from two sets (adjustable)."
     ),
     "centre": Tolerance(1e-9, 1e-9, "half-width of the set", "A copy of the certificate's."),
     "half-widths": Tolerance(1e-9, 1e-12, "half-width of the set", "Roots of quadratic forms of Q."),
-    "plans": Tolerance(1e-9, 1e-9, "range of the certified plans", "Tightened bounds and plans, added up."),
-    "tightened bounds": Tolerance(1e-9, 1e-12, _ONE, "Limits of the inputs less half-ranges of the feedback."),
-    "disturbance bounds": Tolerance(1e-9, 1e-12, _ONE, "Measured ones, inflated."),
+    "plans": Tolerance(1e-9, 1e-9, "range of the certified plans", "Sums of tightened bounds and nominal inputs."),
+    "tightened bounds": Tolerance(1e-9, 1e-12, _ONE, "Limits of the inputs minus half-ranges of the feedback."),
+    "disturbance bounds": Tolerance(1e-9, 1e-12, _ONE, "Measured values, inflated."),
     "eigenvalues": Tolerance(
         1e-6,
         1e-9,
         _ONE,
-        "Of symmetric matrices scaled to a unit diagonal, through factors of condition 1e5.",
+        "Eigenvalues of symmetric matrices scaled to a unit diagonal, through factors of condition 1e5.",
     ),
     "spectral radii": Tolerance(1e-8, 1e-8, _ONE, "Eigenvalues of matrices that are far from normal."),
     "certified costs": Tolerance(1e-6, 1e-12, _ONE, "A largest eigenvalue, through two Cholesky factors."),
     "rightmost poles": Tolerance(1e-6, 1e-6, _ONE, "Logarithms of eigenvalues near 1, over a period."),
-    "room of plans": Tolerance(1e-6, 1e-9, _ONE, "Differences of tightened bounds and plans."),
+    "room of plans": Tolerance(1e-6, 1e-9, _ONE, "Differences of tightened bounds and nominal inputs."),
     "inequalities": Tolerance(
-        0.0, 1e-9, _ONE, "Of (34) and of weights, which are at zero by construction; all others hold with room."
+        0.0, 1e-9, _ONE, "Inequality (34) and weights, which are zero by construction; all others hold with a margin."
     ),
     "flights": Tolerance(
         1e-6,
         1e-12,
         _ONE,
-        "Differences of states over a period: rounding is 1e-7 of the least channel.",
+        "Differences of states over a period: rounding is 1e-7 of the smallest channel.",
     ),
     "random sequences": Tolerance(1e-6, 1e-12, _ONE, "Levels after 600 contracting steps."),
 }
-"""By what is compared."""
+"""Tolerances by the quantity compared."""
 
 RECOMPUTED_DESIGN = 1e-3
-"""Largest deviation, in scaled coordinates, of a design that is computed anew."""
+"""Largest deviation, in scaled coordinates, of a recomputed design."""
 
 PARAMETERS = {
     "period": "copied",
@@ -141,7 +142,7 @@ PARAMETERS = {
 
 
 ROUNDING = TOLERANCES["inequalities"].absolute
-"""By how much an inequality that is at zero by construction may seem to fail."""
+"""Amount by which an inequality that is zero by construction may appear to be violated."""
 
 
 def entry_size(parameter: str, certificate: Mapping[str, Any]) -> np.ndarray:

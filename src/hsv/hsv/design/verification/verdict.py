@@ -7,7 +7,7 @@ the certificate has to fit into what it leaves of the inputs. Whether limits of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -22,12 +22,13 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.tightening import left_by
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.design.verification.claims import Subject
+from hsv.design.verification.checks import Subject
 from hsv.design.verification.effects import N_SCHEDULING, Measured, Model, with_models
 from hsv.design.verification.invariant_set import lag_feedback
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.errors import DesignError
+from hsv.progress import Progress
 from hsv.units import UnitSystem, in_words
 from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
 from hsv.vehicle.dynamics import (
@@ -35,8 +36,6 @@ from hsv.vehicle.dynamics import (
     INPUT_UNITS,
     N_RIGID,
 )
-
-Progress = Callable[[str, int, int], None]
 
 Lag = tuple[np.ndarray, np.ndarray] | None
 """Least and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
@@ -60,9 +59,9 @@ class Verdict:
     start: float = 0.0
     """Largest level at which a flight may start: x_n takes errors of the first measurement for the truth"""
     reaches: tuple[Reach, ...] = ()
-    """Of the actuators, over the set"""
+    """Ranges of the actuators over the set."""
     without_limits: Verdict | None = None
-    """Where this one is on the limits of actuators: the verdict without them"""
+    """For a verdict on the limits of actuators: the verdict without them."""
 
     def said(self, units: UnitSystem = UnitSystem.metric) -> str:
         """Return by how much, in words."""
@@ -110,10 +109,10 @@ def certified_with(
 
     Args:
         subject: The design with its certificate.
-        models: By name.
+        models: Models by name.
         actuators: Names with commas between, or "ideal"; empty: those that the design knows.
         progress: Told of every verdict.
-        unbounded: What else there is, for which no bound is known: with that nothing is certified.
+        unbounded: Further effects for which no bound is known; with any of them nothing is certified.
 
     Raises:
         DesignError: Unknown actuators, two of one channel, or a design without an ellipsoid.
@@ -176,14 +175,14 @@ def verdict(
     models: Sequence[Model] = (),
     lag: Lag = None,
 ) -> Verdict:
-    """Return whether ``design`` is certified with ``models`` beside the disturbances of its certificate.
+    """Return whether ``design`` is certified with ``models`` in addition to its certificate's disturbances.
 
     Args:
-        name: Of the verdict.
-        design: That of ``subject``, with the actuators that are to be known.
+        name: Name of the verdict.
+        design: Design of ``subject``, with the actuators to certify.
         subject: The design with its certificate.
         models: Beside those disturbances.
-        lag: Of the plan.
+        lag: Lag of the nominal input.
     """
     tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
     disturbance = DisturbanceSet.from_report(tube["disturbance"]["channels"])

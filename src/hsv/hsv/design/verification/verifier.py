@@ -1,27 +1,24 @@
-"""Verifying a design file: every claim of its certificate recomputed, the first that fails named."""
+"""Verification of a design file: everything that its certificate states is recomputed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
 from hsv.control.design_file import read_design
 from hsv.design.certificate import certificate_path, read_certificate
-from hsv.design.verification.adjustable import adjustable_claims
-from hsv.design.verification.claims import Claim, Subject, gathered
-from hsv.design.verification.flights import flight_claims, sequence_claims
-from hsv.design.verification.model import model_claims
+from hsv.design.verification.adjustable import adjustable_checks
+from hsv.design.verification.checks import Check, Subject, gathered
+from hsv.design.verification.flights import flight_checks, sequence_checks
+from hsv.design.verification.model import model_checks
 from hsv.design.verification.quick import QUICK, Part
+from hsv.progress import Progress
 
-Progress = Callable[[str, int, int], None]
+RECOMPUTED: dict[str, Part] = {"polytopic model": model_checks, "adjustable design": adjustable_checks}
+"""Checks by section that need units, models and the vehicle; they take a second or two."""
 
-
-RECOMPUTED: dict[str, Part] = {"polytopic model": model_claims, "adjustable design": adjustable_claims}
-"""What needs units, models and the vehicle, by part; a second or two."""
-
-FLOWN: dict[str, Part] = {"flights": flight_claims, "random sequences": sequence_claims}
-"""What takes longer, by part."""
+FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence_checks}
+"""Checks by section that take longer."""
 
 
 def load_subject(path: Path) -> Subject:
@@ -33,14 +30,14 @@ def load_subject(path: Path) -> Subject:
     return Subject(read_design(path), read_certificate(certificate_path(path)))
 
 
-def verify(subject: Subject, quick: bool = False, progress: Progress | None = None) -> dict[str, list[Claim]]:
-    """Return every claim recomputed, by part; with ``quick`` only those that need no flights or random sequences."""
+def verify(subject: Subject, quick: bool = False, progress: Progress | None = None) -> dict[str, list[Check]]:
+    """Return every check recomputed, by part; with ``quick`` only those that need no flights or random sequences."""
     parts = QUICK | RECOMPUTED | ({} if quick else FLOWN)
-    claims: dict[str, list[Claim]] = {}
+    checks: dict[str, list[Check]] = {}
     for name, part in parts.items():
         if progress:
             progress(name, 0, 1)
-        claims[name] = gathered(name, partial(part, subject))
+        checks[name] = gathered(name, partial(part, subject))
         if progress:
             progress(name, 1, 1)
-    return claims
+    return checks

@@ -11,7 +11,7 @@ from hsv.recording.report.values import Value
 
 @dataclass(frozen=True)
 class Row:
-    """A parameter; ``values`` holds one value where all runs agree, else one a run, None where it lacks it."""
+    """A parameter; ``values`` holds one value if all runs agree, else one per run, None if a run does not have it."""
 
     name: str
     description: str

@@ -1,4 +1,4 @@
-"""From a bag to the arrays that the panels draw."""
+"""Extraction of the arrays for the panels from a bag."""
 
 from __future__ import annotations
 

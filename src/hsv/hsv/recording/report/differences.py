@@ -1,4 +1,4 @@
-"""How runs differ from the first of them: step by step, in double precision, before anything is rounded to be drawn."""
+"""Differences between runs and the first of them, step by step, in double precision, before any rounding."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ NEARLY = 0.01
 
 @dataclass(frozen=True)
 class RunDifference:
-    """What a run has less what the first one has, SI, at the steps (n) that both have; time in seconds."""
+    """Difference of a run from the first one, SI, at the steps (n) that both have; time in seconds."""
 
     run: int
     time: np.ndarray
     y: np.ndarray
     range: float
-    """From the least to the largest value of the first run."""
+    """Range from the smallest to the largest value of the first run."""
 
     @property
     def largest(self) -> float:
@@ -34,7 +34,7 @@ class RunDifference:
 
     @property
     def at(self) -> float:
-        """Its time, seconds."""
+        """Time of the difference in seconds."""
         return float(self.time[np.nanargmax(np.abs(self.y))])
 
     @property
@@ -54,7 +54,7 @@ class Difference:
 
     @property
     def name(self) -> str:
-        """Of the panel that draws them."""
+        """Name of the panel that plots them."""
         return f"difference_{self.panel.name}"
 
     @property

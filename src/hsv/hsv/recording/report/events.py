@@ -1,4 +1,4 @@
-"""What happened in a flight, in the order of time: faults, limits, the tube, warnings, changed parameters."""
+"""Events of a flight in chronological order: faults, limits, the tube, warnings, changed parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a report opens with: the verdict in one sentence, what happened, and one picture of the flight."""
+"""Opening of a report: the verdict in one sentence, the events, and one picture of the flight."""
 
 from __future__ import annotations
 

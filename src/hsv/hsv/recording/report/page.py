@@ -35,7 +35,7 @@ def write_report(bags: Sequence[Bag], out: Path, *, units: UnitSystem = UnitSyst
     Args:
         bags: One flight or several, which are then compared.
         out: File to write.
-        units: In which the page opens; they can be switched there.
+        units: Initial units of the page; they can be switched there.
 
     Raises:
         RecordingError: A bag holds no flight, or the file cannot be written.

@@ -1,4 +1,4 @@
-"""What the report plots: a table of panels, each a quantity over time with the curves that belong into it."""
+"""Plots of the report: a table of panels, each a quantity over time with its curves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hsv.vehicle.dynamics import STATE_NAMES, STATE_UNITS
 
 
 class Kind(StrEnum):
-    """What a curve shows; the page draws and switches each kind in its own way."""
+    """Kind of a curve; the page draws and switches each kind in its own way."""
 
     actual = "actual"
     nominal = "nominal"
@@ -43,7 +43,7 @@ class Panel:
     group: str
     curves: tuple[Curve, ...]
     shading: str = ""
-    """What else is shaded here, besides the faults: ``tube`` or the name of an input."""
+    """Further shading, in addition to the faults: ``tube`` or the name of an input."""
 
 
 GROUPS = {
@@ -127,7 +127,7 @@ MEASUREMENT_ERRORS = {
     name: Panel(f"measurement_error_{name}", f"Measured less true {name.replace('_', ' ')}", unit, "sensors", ())
     for name, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
 }
-"""By state; the curve is a difference of two topics."""
+"""Panels by state; the curve is the difference of two topics."""
 
 AIR_PANELS = {
     name: Panel(name, title, AIR[name][0], "air", ())
@@ -137,7 +137,7 @@ AIR_PANELS = {
         ("density_factor", "Density for that of the model"),
     )
 }
-"""By field of the air."""
+"""Panels by field of the air."""
 
 
 def error_panel(component: int) -> Panel:

@@ -1,4 +1,4 @@
-"""What the page's script draws: numbers in one compressed block, and a description of the panels that use them."""
+"""Data for the page's script: numbers in one compressed block, and a description of the panels that use them."""
 
 from __future__ import annotations
 

@@ -14,12 +14,12 @@ BUCKETS = 400
 """Stretches of time of which a curve keeps its least and its largest value, so that no peak is lost."""
 
 WIDTH, HEIGHT = 1000.0, 100.0
-"""Of the drawing of a plot; the page stretches it."""
+"""Size of the drawing of a plot; the page scales it."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A curve over time (s), in SI; ``y`` (n) may hold what is no number."""
+    """A curve over time (s), in SI; ``y`` (n) may contain NaN."""
 
     look: str
     """Classes of the page's style: ``run0``, ``nominal``, ``reference``, ``bound``."""
@@ -63,7 +63,7 @@ class TimePlot:
     unit: str
     paths: tuple[Path, ...]
     ticks: dict[str, tuple[Tick, ...]]
-    """By system of units, from below."""
+    """Ticks by system of units, from below."""
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ class ReportedRun:
     label: str
     description: dict[str, Any]
     scenario: Scenario | None
-    """None where the bag holds none that can be read; :attr:`remark` says why."""
+    """Scenario of the flight; None if the bag has none that can be read, and :attr:`remark` says why."""
     scenario_text: str
     remark: str
     metrics: dict[str, float]
@@ -43,15 +43,15 @@ class ReportedRun:
     curves: FlightCurves
     events: list[Event]
     parameters: dict[str, dict[str, Value]]
-    """Of the scenario and of the design."""
+    """Parameters of the scenario and of the design."""
     input_limits: dict[str, tuple[float, float]]
     certificate: Value | None
     incomplete: str
-    """Of how many of its steps the bag has every topic; empty if of all."""
+    """Number of steps with all topics, and number of steps; empty if the bag is complete."""
 
     @property
     def custom(self) -> dict[str, str]:
-        """What the recorder was told about the run: run id, commit, design and its hash, ..."""
+        """Custom data that the recorder received about the run: run id, commit, design and its hash, ..."""
         return dict(self.description["custom_data"])
 
     @property
@@ -66,12 +66,12 @@ class ReportedRun:
 
     @property
     def failure(self) -> str:
-        """How the flight failed to come to its end; empty if it did not."""
+        """Reason for which the flight did not finish; empty if it did."""
         return next((event.text for event in self.events if event.kind == "error" and event.subject == "plant"), "")
 
     @property
     def warnings(self) -> list[str]:
-        """What the bag lacks, in words."""
+        """Warnings about what is missing in the bag."""
         return list(self.description["warnings"])
 
     @property
@@ -81,7 +81,7 @@ class ReportedRun:
 
 
 def reported_runs(bags: Sequence[Bag]) -> list[ReportedRun]:
-    """Return what the page says about each of ``bags``, labelled so that they can be told apart.
+    """Return the runs of a report, one for each of ``bags``, with distinct labels.
 
     Raises:
         RecordingError: A bag holds no flight.

@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from hsv.units import UnitSystem, in_system
 
 SYSTEMS = {UnitSystem.metric: "SI, degrees", UnitSystem.si: "strict SI", UnitSystem.paper: "paper (ft, deg)"}
-"""What the switch of a page calls the systems of units."""
+"""Names of the systems of units in the switch of a page."""
 
 
 def unit_html(unit: str) -> str:
@@ -49,13 +49,13 @@ def unit(unit: str, *, share: bool = False) -> Markup:
 
 
 def in_brackets(unit: str, *, share: bool = False) -> Markup:
-    """Return the unit in all systems as it stands behind what has it; nothing for a pure number."""
+    """Return the unit in all systems as printed after a heading; nothing for a dimensionless number."""
     names = {system: unit_html(in_system(1.0, unit, system, share=share)[1]) for system in SYSTEMS}
     return switched({system: f" [{name}]" if name else "" for system, name in names.items()})
 
 
 def units_of(unit: str, *, share: bool = False) -> dict[str, dict[str, float | str]]:
-    """Return what the script of a page needs to draw a quantity of an SI ``unit``: by system, factor and unit."""
+    """Return the data with which a page's script draws a quantity of an SI ``unit``: by system, factor and unit."""
     found = {system: in_system(1.0, unit, system, share=share) for system in SYSTEMS}
     return {str(system): {"unit": unit_html(name), "factor": scale} for system, (scale, name) in found.items()}
 

@@ -40,7 +40,7 @@ class Table:
 
     @property
     def size(self) -> str:
-        """Its size in words."""
+        """Size of the table in words."""
         width = len(self.rows[0]) if self.rows else 0
         if self.height:
             count = len(self.rows) // self.height
@@ -64,7 +64,7 @@ def parameters(values: Mapping[str, Any], declared: Mapping[str, Parameter]) -> 
 
 
 def tree(value: Any, unit: str = "") -> Value:
-    """Return plain data, as JSON and YAML hold it, as a tree; booleans and what is missing become words."""
+    """Return plain data, as in JSON and YAML, as a tree; booleans and missing values become words."""
     match value:
         case None:
             return "none"

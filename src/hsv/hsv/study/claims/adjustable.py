@@ -23,7 +23,7 @@ def relaxed(evidence: Evidence) -> dict[str, Any]:
 
 
 def step(evidence: Evidence) -> dict[str, Any]:
-    """Return how the step of Case 1 settles over the baseline, and what the ramp of Case 2 takes of the inputs (%)."""
+    """Return the settling of the step of Case 1 relative to the baseline, and the inputs used by Case 2's ramp (%)."""
     adjustable, baseline = evidence.adjustable_step(), evidence.corners("case1")
     found: dict[str, Any] = {"tau": _tau(evidence), "used": 100 * used_inputs(evidence, "case2", DESIGN)}
     for axis in ("velocity", "altitude"):
@@ -33,7 +33,7 @@ def step(evidence: Evidence) -> dict[str, Any]:
 
 
 def less_robust(evidence: Evidence) -> dict[str, Any]:
-    """Return what the worst vehicle does with tau over what the worst one does with the whole feedback."""
+    """Return the ratio between the worst vehicle with tau and the worst one with the whole feedback."""
     ramp, whole = evidence.corners("case2"), evidence.corners("case2_tau1")
     measures = {"attitude": "post_fault_attitude_from_nominal", "altitude": "altitude_end_error"}
     return {"tau": _tau(evidence)} | {

@@ -19,13 +19,13 @@ Vehicle = Literal["uncertain", "nominal", "worst"]
 Actuators = Literal["none", "ideal", "elevator_150", "elevator_50", "elevator_20"]
 
 _AS_PAPER = ("", "none", IDEAL)
-"""What is read with the paper's actuators: none named, none that have to do with it, and those."""
+"""Readings with the paper's actuators: none named, independent of actuators, and ideal."""
 
 _VEHICLES = {"uncertain": "uncertain parameters", "nominal": "nominal vehicle", "worst": "worst corner"}
 
 
 class Row(BaseModel, frozen=True, extra="forbid"):
-    """What is measured, on which vehicles, and what it is to keep to; the fields are explained in ``claims.toml``."""
+    """Quantity of a reading, its vehicles and its threshold; the fields are explained in ``claims.toml``."""
 
     what: str = ""
     flight: str = ""
@@ -45,7 +45,7 @@ class Row(BaseModel, frozen=True, extra="forbid"):
 
 
 class Claim(BaseModel, frozen=True, extra="forbid"):
-    """A statement, word for word, where it stands, and how it is measured: a claim of ``claims.toml``."""
+    """A statement, word for word, its place in the paper, and how it is measured: a claim of ``claims.toml``."""
 
     name: str
     quote: str
@@ -98,7 +98,7 @@ class _Measured:
     numbers: dict[str, Any]
 
     def readings(self, row: Row, what: str, actuators: str = "") -> list[Reading]:
-        """Return the readings of a row: one, or one a vehicle."""
+        """Return the readings of a row: one, or one per vehicle."""
         at_most, at_least = (None if limit is None else self.named(limit) for limit in (row.at_most, row.at_least))
         if row.vehicle or not row.flight or row.beyond is not None:
             asked = {what: row.vehicle or "nominal"}
@@ -110,7 +110,7 @@ class _Measured:
         ]
 
     def fact(self, row: Row) -> _Fact:
-        """Return what a row measures, for the words."""
+        """Return the measured quantity of a row, for the text."""
         return _Fact(self.value(row, row.vehicle or "nominal"), row.unit)
 
     def named(self, limit: float | str) -> float:

@@ -15,7 +15,7 @@ from hsv.vehicle.dynamics import N_RIGID
 
 
 def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndarray) -> float:
-    """Return the most that x' P x keeps over a step under u = K x, at worst vertex and state: below 1 it decreases.
+    """Return the largest factor on x' P x in a step under u = K x, at worst vertex and state: below 1 it decreases.
 
     What holds at the vertices holds in the whole polytope, x' P x being convex.
 
@@ -50,7 +50,7 @@ def input_set(evidence: Evidence) -> dict[str, Any]:
 
 
 def nominal(evidence: Evidence) -> dict[str, Any]:
-    """Return what the nominal gains keep of their Lyapunov functions, and the level of x_n over the flights."""
+    """Return the factors on the Lyapunov functions of the nominal gains, and the level of x_n over the flights."""
     flown = evidence.design("baseline").flown
     A, B = flown.polytope.A[:, :N_RIGID, :N_RIGID], flown.polytope.B[:, :N_RIGID]
     step, ramp = _levels(evidence, "case1"), _levels(evidence, "case2_baseline")

@@ -1,8 +1,8 @@
-"""What claims are measured on: designs with their certificates, flights of many vehicles, and the sampled loop."""
+"""Sources for measuring claims: designs with their certificates, flights of many vehicles, and the sampled loop."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from hsv.control.design_file import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.design.region import Corner, corners, screening_corners
+from hsv.progress import Progress
 from hsv.simulation.assembly import flight_parameters
 from hsv.simulation.scenario import load_scenario
 from hsv.study.corner_flights import Table, corner_table, fly_over
@@ -20,8 +21,6 @@ from hsv.study.flights import Flights
 from hsv.study.linear_loop import Hardware, worst_growth
 from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
 from hsv.vehicle.vehicle import load_vehicle
-
-Progress = Callable[[str, int, int], None]
 
 FUEL = ACTUATOR_SETS["fuel_10"]
 """The fuel delivery that goes with every elevator which is not ideal."""
@@ -44,10 +43,10 @@ class Evidence:
         """Keep tables in ``folder``.
 
         Args:
-            folder: Of tables and flights.
+            folder: Folder of tables and flights.
             progress: Told of what is measured.
             over: The vehicles, the nominal one first, all corners unless given.
-            actuators: What loops and flights have between command and vehicle, of :data:`ELEVATORS`.
+            actuators: Actuators in loops and flights, from :data:`ELEVATORS`.
             loops: The vehicles of loops, those of flights unless given.
         """
         self._folder = folder
@@ -118,7 +117,7 @@ class Evidence:
         return np.array(found)
 
     def adjustable_step(self) -> dict[str, float]:
-        """Return what was measured on the step of Case 1 with the adjustable design."""
+        """Return the measurements on the step of Case 1 with the adjustable design."""
         design = read_parameters(find_design("adjustable"))
         return self._flown({**design, **load_scenario("case1").parameters()})
 
@@ -144,7 +143,7 @@ class Evidence:
 
 
 def nominal(table: Table, measure: str) -> float:
-    """Return what was measured on the nominal vehicle."""
+    """Return the measurements on the nominal vehicle."""
     return float(table[measure][0])
 
 

@@ -10,7 +10,7 @@ from hsv.units import UnitSystem, in_system
 
 
 class Verdict(StrEnum):
-    """What became of a claim."""
+    """Verdict on a claim."""
 
     HOLDS = "holds"
     CONDITIONS = "holds under conditions"
@@ -27,7 +27,7 @@ def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper) -> str:
 
 @dataclass(frozen=True)
 class Reading:
-    """One way to read a claim: a number (SI) that is to be at most, or at least, a threshold."""
+    """One way to read a claim: a number (SI) that must be at most, or at least, a threshold."""
 
     what: str
     value: float
@@ -35,7 +35,7 @@ class Reading:
     at_most: float | None = None
     at_least: float | None = None
     actuators: str = ""
-    """Those between command and vehicle, by name; empty where the claim names none: the paper's"""
+    """Actuators between command and vehicle, by name; empty if the claim names none: the paper's."""
 
     def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
         """Return the number with its unit."""
@@ -50,7 +50,7 @@ class Reading:
 
     @property
     def holds(self) -> bool:
-        """Whether the number keeps to the threshold; what is not a number does not."""
+        """Whether the number satisfies the threshold; NaN does not."""
         if self.at_most is not None:
             return bool(self.value <= self.at_most)
         return bool(self.at_least is not None and self.value >= self.at_least)
@@ -58,7 +58,7 @@ class Reading:
 
 @dataclass(frozen=True)
 class Finding:
-    """The readings of a claim, and why they come out as they do.
+    """The readings of a claim, and the reasons for their results.
 
     The first ``leading`` readings are the statement itself under the paper's own conditions, one a number it speaks of;
     the others ask the same under further conditions.

@@ -10,7 +10,7 @@ from hsv.vehicle.vehicle import load_vehicle
 
 
 def case1(evidence: Evidence, scenario: str = "case1") -> dict[str, Any]:
-    """Return in words the ranges of the inputs over all flights of a scenario, and what is allowed."""
+    """Return in words the ranges of the inputs over all flights of a scenario, and the permitted ranges."""
     table, limits, words = evidence.corners(scenario), load_vehicle().decoupled, []
     for name, unit, said in (("fuel_equivalence_ratio", "1", "fuel ratio"), ("elevator_deflection", "rad", "elevator")):
         low, high = float(table[f"{name}_minimum"].min()), float(table[f"{name}_maximum"].max())

@@ -92,7 +92,7 @@ def _smallest(margins: list[Margin]) -> float:
 
 
 def phase_margin(evidence: Evidence) -> dict[str, Any]:
-    """Return what the notch does (rad) to the phase margins of the loop broken at the elevator, by vehicle."""
+    """Return the effect (rad) of the notch on the phase margins of the loop broken at the elevator, by vehicle."""
     notch, derived = evidence.design("baseline").flown.notch, load_vehicle().coupled("derived")
     vehicles = [load_vehicle().coupled("paper_like").perturbed(corner) for corner in evidence.over]
     pairs = [(margins(evidence, (), vehicle), margins(evidence, notch, vehicle)) for vehicle in vehicles]

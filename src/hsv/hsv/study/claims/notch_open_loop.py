@@ -86,7 +86,7 @@ def falls(evidence: Evidence) -> dict[str, Any]:
 
 
 def passed(evidence: Evidence) -> dict[str, Any]:
-    """Return what the filter does off its centre: loss (dB) and lag (rad), and the change of gain (dB) far off."""
+    """Return the effect of the filter off its centre: loss (dB), lag (rad), and the change of gain (dB) far off."""
     section, crossover = _section(evidence), margins(evidence, ())[0].frequency
     response = notch_response([section], np.array([1.0, crossover]))
     (slow_loss, loss), (slow_lag, lag) = -bode(response)[0], -np.angle(response)

@@ -27,24 +27,25 @@ def _elevator(name: str) -> str:
 _BANDWIDTHS = ", ".join(_elevator(name) for name, actuators in ELEVATORS.items() if actuators)
 
 _HEADER = f"""# The paper's claims
-Made by `hsv claims --out docs/claims.md`, every number measured. A claim is quoted word for word and read in one or
-more ways, each a number with a threshold (±0.5° and the limits of the inputs are the paper's; it gives no others, the
-rest are ours, with the reason beside them). The readings in bold are the statement itself, on the paper's own
-conditions; the others ask the same under further ones: other couplings, corners where the paper does not speak of them,
-stricter readings. A claim **holds** if all readings do, **holds under conditions** if those in bold do and another does
-not, and **does not hold** if one in bold does not, whatever the others say.
+Made by `hsv claims --out docs/claims.md`; every number is measured. Each claim is quoted word for word and read in one
+or more ways; each reading is a number with a threshold (±0.5° and the limits of the inputs are the paper's; the paper
+gives no others, the rest are ours and have a reason). Readings in bold are the statement itself, under the paper's own
+conditions; the others ask the same under other conditions: other couplings, corners where the paper does not mention
+them, stricter readings. A claim **holds** if all readings do, **holds under conditions** if those in bold do but
+another does not, and **does not hold** if one in bold does not, regardless of the others.
 
-*Uncertain parameters*: the paper flies one perturbation and gives its bounds only; ours is half of each bound
+*Uncertain parameters*: the paper flies one perturbation and gives only its bounds; ours is half of each bound
 (`case1_uncertain`, `case2_uncertain`). *Corners*: all {_CORNERS} combinations of the bounds, each flown, and
-the nominal vehicle; the *worst corner* is the vehicle least in favour of the claim. The *paper-like* coupling is meant
-where none is named ([assumptions](assumptions.md)). What the paper says of flights without the notch filter rests, with
-that coupling, on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).
+the nominal vehicle; the *worst corner* is the vehicle least favourable to the claim. The *paper-like* coupling is used
+unless another is named ([assumptions](assumptions.md)). With that coupling, the paper's statements on flights without
+the notch filter depend on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).
 
-*Actuators* are the paper's, ideal, where none is named. What the notch filter is good for depends on them: without it a
-slow elevator stabilises the elastic modes. So claims on the filter name theirs, reading by reading: none (it is of the
-filter or the vehicle alone), ideal, or an elevator of the second order with this bandwidth ({_BANDWIDTHS})
-beside a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary says with which of them all readings hold,
-*yes*, and with which not. In flights behind an elevator the *worst corner* is that of {len(_SCREENED) - 1}, in loops
+*Actuators* are ideal, like the paper's, unless others are named. The benefit of the notch filter depends on them: even
+without the filter, a slow elevator stabilises the elastic modes. Readings of claims on the filter therefore name their
+actuators: none (the reading concerns only the filter or the vehicle), ideal, or a second-order elevator with this
+bandwidth ({_BANDWIDTHS})
+together with a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary says with which of them all readings hold
+(*yes*) and with which not. In flights with an elevator, the *worst corner* is that of {len(_SCREENED) - 1}; for loops,
 that of all.
 
 {REASONS}"""

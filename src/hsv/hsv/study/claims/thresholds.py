@@ -29,7 +29,7 @@ A_LOT = 1.5
 """Ratio from which on something is a lot more."""
 
 SIGNIFICANT, SLIGHT = 0.5, 0.75
-"""What is left of something: after a significant reduction at most, after a slight one at least."""
+"""Remaining fractions: at most, after a significant reduction; at least, after a slight one."""
 
 CLEARLY = 0.95
 """Times what it was: a change of 5 % can be seen in a figure."""

@@ -14,11 +14,11 @@ RMPC_SINGLE = ("case1_uncertain_rmpc", "case1_rmpc")
 """Scenarios with uncertain and with nominal parameters."""
 
 SCENARIOS = (*NOTCH, *NO_NOTCH, *RMPC)
-"""Of Figures 10 to 12."""
+"""Scenarios of Figures 10 to 12."""
 
 
 def conditions(nominal: str = "thin") -> str:
-    """Return what is flown, in words; ``nominal``: where the flights with nominal parameters are seen."""
+    """Return a description of the flights; ``nominal``: where those with nominal parameters are shown."""
     return (
         "Uncertain parameters as in `case1_uncertain` (mass +5 %, moment of inertia -5 %, the rest at half its bound), "
         f"elevator effectiveness 0.9 from 100 s; {nominal}: nominal parameters. Robust MPC flies the decoupled model "

@@ -15,7 +15,7 @@ SCENARIOS = (*ADJUSTABLE, *WHOLE, *BASELINE)
 
 
 def conditions(nominal: str = "thin") -> str:
-    """Return what is flown, in words; ``nominal``: where the flights with nominal parameters are seen."""
+    """Return a description of the flights; ``nominal``: where those with nominal parameters are shown."""
     return (
         "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator "
         f"effectiveness 0.9 from 100 s; {nominal}: nominal parameters. The adjustable design at the paper's tau = 0.8 "

@@ -1,4 +1,4 @@
-"""What a figure of the study is: the paper's number and caption, what it needs, how it is drawn, what is to be said."""
+"""Definition of a figure: the paper's number and caption, what it needs, how it is drawn, and the remarks on it."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ class FlightSource(Protocol):
 
 @dataclass
 class Material:
-    """What figures are drawn from."""
+    """Data from which figures are drawn."""
 
     flights: FlightSource
-    """By scenario."""
+    """Flights by scenario."""
     _designs: dict[str, Design] = field(default_factory=dict)
 
     def design(self, name: str) -> Design:

@@ -12,7 +12,7 @@ from hsv.study.figures.time_histories import ELASTIC, Zoom, histories
 from hsv.units import to_paper
 
 _UNIT = "√slug ft/s"
-"""As it reads in a page."""
+"""Unit as displayed on a page."""
 
 
 def draw(material: Material) -> Drawing:

@@ -1,4 +1,4 @@
-"""What the remarks on the figures say of flights, measured on those that are drawn."""
+"""Numbers in the remarks on the figures, measured on the flights that are drawn."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ LIMITS = (
     f"{_LIMITS.input_minimum[0]:g} to {_LIMITS.input_maximum[0]:g} and {np.degrees(_LIMITS.input_minimum[1]):g} deg to "
     f"{np.degrees(_LIMITS.input_maximum[1]):g} deg"
 )
-"""Of both inputs."""
+"""Limits of both inputs."""
 
 
 def measured(material: Material, scenario: str, metric: str, unit: str) -> float:

@@ -29,7 +29,7 @@ RC: Any = {
     "pdf.fonttype": 42,
     "figure.facecolor": "white",
 }
-"""Of all figures of the study."""
+"""Settings of all figures of the study."""
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0b4f9e", "#c0392b", "#1f7a3d", "#c77700", "#777777"
 

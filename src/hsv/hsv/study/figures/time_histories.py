@@ -41,7 +41,7 @@ class Panel:
     shown: tuple[float, float] | None = None
     """Range of the axis, in the paper's unit, where something runs out of it."""
     limits: tuple[float, ...] = ()
-    """What the quantity may not exceed, SI."""
+    """Limits of the quantity, SI."""
 
 
 @dataclass(frozen=True)
@@ -106,16 +106,16 @@ def histories(
     nominal_apart: bool = False,
     height: float = 2.0,
 ) -> Figure:
-    """Return one row a panel, over the whole flight and beside it closer; every sample of a flight is drawn.
+    """Return a figure with one row per panel, over the whole flight and enlarged; all samples are drawn.
 
     Args:
-        panels: What to show.
+        panels: Panels to show.
         curves: Whom to show, the last one on top.
-        zoom: Where a last column looks closer.
+        zoom: Range of an additional, enlarged column.
         reference: Whether the panels are altitude and velocity, with their commands.
         nominal_apart: Give nominal flights a column of their own, where they would hide behind vibration; otherwise
             they are thin lines on top.
-        height: Of a row, inches.
+        height: Height of a row, inches.
     """
     columns = _columns(zoom, nominal_apart)
     figure = new_figure(height * len(panels) + 0.5)
@@ -139,7 +139,7 @@ def histories(
 
 
 class _Column(NamedTuple):
-    """What a column shows: flights with uncertain, with nominal parameters or both, between which times."""
+    """Contents of a column: flights with uncertain or nominal parameters or both, and the time range."""
 
     title: str
     width: float

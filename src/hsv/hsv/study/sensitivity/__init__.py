@@ -1,1 +1,1 @@
-"""How far the results carry: sweeps over what the paper leaves open, until each controller is lost."""
+"""Sensitivity of the results: sweeps over what the paper leaves open, until each controller is lost."""

@@ -76,7 +76,7 @@ def of_scenarios(names: Sequence[str]) -> list[Controller]:
 
 
 SAID_RMPC = "RMPC flies the fourth gain of the nominal family"
-"""For the pages: which of the gains it is."""
+"""Description of the RMPC gain for the pages."""
 
 
 def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
@@ -85,7 +85,7 @@ def corners_of(scale: float, coarseness: float = 1.0) -> list[Corner]:
 
 
 def said_corners(over: Sequence[Corner]) -> str:
-    """Return how many corners ``over`` holds beside the nominal vehicle, and of how many."""
+    """Return the number of corners in ``over`` besides the nominal vehicle, and the number of all."""
     return f"{len(over) - 1} of the {2 ** len(load_vehicle().uncertainty)} corners"
 
 

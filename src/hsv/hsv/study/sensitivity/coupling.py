@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.study.figures.style import GREY, letter, new_figure, plain_log
 from hsv.study.linear_loop import COUPLING_SCALES
 from hsv.study.sensitivity.controllers import (
@@ -22,7 +23,7 @@ from hsv.study.sensitivity.controllers import (
     growth,
     said_corners,
 )
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_figures import draw_metric, legend, lost_where, widths
 from hsv.vehicle.vehicle import load_vehicle

@@ -10,10 +10,11 @@ from matplotlib.axes import Axes
 
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.design.region import Corner, fraction
+from hsv.progress import Progress
 from hsv.study.adjustable_factor import FACTORS, FINE, FactorStudy, factor_study
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.sensitivity.controllers import corners_of, said_corners
-from hsv.study.sensitivity.study import Outcome, Progress, Study
+from hsv.study.sensitivity.study import Outcome, Study
 from hsv.units import to_paper
 from hsv.vehicle.vehicle import load_vehicle
 

@@ -40,7 +40,7 @@ class Shape:
 
     @property
     def said(self) -> str:
-        """In words."""
+        """Description in words."""
         return f"1 - cos over {self.length / FOOT:g} ft that {'stays' if self.stays else 'falls as it rose'}"
 
 
@@ -60,7 +60,7 @@ _ATTITUDE = [STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angl
 
 
 class Answer(NamedTuple):
-    """What a gust does: largest change of an attitude angle and largest |elevator command| (rad), flight lost or not.
+    """Response to a gust: largest change of an attitude angle and largest |elevator command| (rad), flight lost or not.
 
     The command is the one before anything limits it.
     """
@@ -84,7 +84,7 @@ class GustLimits:
 
     @property
     def said(self) -> str:
-        """In words."""
+        """Description in words."""
         what = {"half a degree of attitude": self.attitude, "elevator at its stop": self.elevator, "lost": self.lost}
         reached = [f"{name} from {_velocity(value)} on" for name, value in what.items() if value is not None]
         others = " or ".join(name for name, value in what.items() if value is None)
@@ -98,7 +98,7 @@ def _velocity(value: float) -> str:
 
 @cache
 def answer(controller: Controller, coupling: str, shape: Shape, up: float) -> Answer:
-    """Return what a gust of velocity ``up`` (m/s) does to a controller's flight with this coupling."""
+    """Return the response of a controller's flight to a gust of velocity ``up`` (m/s) with this coupling."""
     altitude, velocity = TARGET
     values = controller.parameters()
     own = {f"reference.{name}": list(column) for name, column in breakpoints(altitude, velocity, ())._asdict().items()}

@@ -1,4 +1,4 @@
-"""Which actuators, delay and sensor noise the linear loop of each controller bears, and which gust its flight."""
+"""Limits of each controller: actuators, delay and sensor noise of its linear loop, and the gust of its flight."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.sensors import SENSOR_SETS
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.linear_loop import START, TARGET, Hardware, crossings, sampled_loop, stability_limit, worst_growth
@@ -25,7 +26,7 @@ from hsv.study.sensitivity.controllers import (
     said_corners,
 )
 from hsv.study.sensitivity.gusts import HALF_DEGREE, SHAPES, STOP, VELOCITIES, gust_limits, worse
-from hsv.study.sensitivity.study import Outcome, Progress, Study
+from hsv.study.sensitivity.study import Outcome, Study
 from hsv.units import to_paper
 from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.dynamics import STATE_NAMES
@@ -46,7 +47,7 @@ class Case:
 
     @property
     def label(self) -> str:
-        """For plots and sentences."""
+        """Label in plots and sentences."""
         return f"{self.controller.label}, {self.coupling.replace('_', '-')} coupling"
 
 
@@ -204,7 +205,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a case bears.
+    """Limits that a case tolerates.
 
     ``growths`` (1/s) with each of :data:`ELEVATORS`; ``bandwidths`` (rad/s) at which stability changes, of the nominal
     vehicle and of the worst of the corners; ``delays`` (s) with ideal and realistic actuators, nominal and worst;
@@ -219,7 +220,7 @@ class Limits:
 
     @classmethod
     def of(cls, case: Case, over: Sequence[Corner]) -> Limits:
-        """Return the limits of ``case``, the corners ``over`` beside the nominal vehicle."""
+        """Return the limits of ``case`` over the nominal vehicle and the corners ``over``."""
 
         def nominal(bandwidth: float) -> float:
             return growth(case, elevator(bandwidth))

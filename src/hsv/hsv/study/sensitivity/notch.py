@@ -1,4 +1,4 @@
-"""Where the notch filter may be, and how deep it has to be."""
+"""Permitted frequencies of the notch filter, and its required depth."""
 
 from __future__ import annotations
 
@@ -14,11 +14,12 @@ from matplotlib.contour import ContourSet
 from hsv.control.design_file import find_design, read_design
 from hsv.control.notch_filter import NotchSection
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREY, RED, letter, new_figure, plain_log
 from hsv.study.linear_loop import stability_limit
 from hsv.study.sensitivity.controllers import Controller, corners_of, growth, said_corners
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.vehicle.vehicle import load_vehicle
@@ -112,7 +113,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where the loop is stable: from ``least`` to ``largest`` centre (rad/s), up to ``shallowest`` damping of zeros.
+    """Range of stability: from ``least`` to ``largest`` centre (rad/s), up to ``shallowest`` damping of zeros.
 
     Along the one the other is the baseline's. ``None``: to the end of what was looked at; not a number: nowhere.
     """

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hsv.progress import Progress
 from hsv.study.figures.style import GREY, new_figure
 from hsv.study.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, said_corners
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_figures import LOSSES, draw_losses, finding
 

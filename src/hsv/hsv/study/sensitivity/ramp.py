@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from hsv.control.design_file import find_design, read_parameters
+from hsv.progress import Progress
 from hsv.simulation.commands import CommandTable
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, letter, new_figure
 from hsv.study.sensitivity.controllers import Controller, corners_of, said_corners
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_figures import draw_metric, legend
 from hsv.study.sensitivity.sweep_result import SweepResult

@@ -10,11 +10,12 @@ from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, write_design
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
+from hsv.progress import Progress
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, RED, letter, new_figure
 from hsv.study.linear_loop import COUPLING_SCALES, worst_growth
 from hsv.study.sensitivity.controllers import Controller, corners_of, coupling_limits, said_corners
-from hsv.study.sensitivity.study import Outcome, Progress, Study, grid
+from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.study.sources import DIGITS, code_digest, digest_of, kept, package_digest

@@ -1,4 +1,4 @@
-"""What a sensitivity study is and what comes out of it."""
+"""Definition and results of a sensitivity study."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-Progress = Callable[[str, int, int], None]
+from hsv.progress import Progress
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """A study done: its figure, a sentence on what is shown, what was found, and the numbers behind it (SI)."""
+    """Results of a study: its figure, a sentence on what is shown, the findings, and the numbers behind it (SI)."""
 
     figure: Figure
     shows: str

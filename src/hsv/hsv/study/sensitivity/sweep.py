@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.study.corner_flights import fly_over
 from hsv.study.sensitivity.controllers import Controller
-from hsv.study.sensitivity.study import Progress
 from hsv.study.sensitivity.sweep_result import SweepResult, sweep_result
 from hsv.study.sources import DIGITS, code_digest, digest_of, kept, measuring_code
 
@@ -32,12 +32,12 @@ class Point:
 def sweep(
     name: str, along: Mapping[Controller, Sequence[Point]], folder: Path, progress: Progress
 ) -> dict[Controller, SweepResult]:
-    """Fly every controller at its points and return what comes of it.
+    """Fly every controller at its points and return the results.
 
     Args:
-        name: Of the study.
+        name: Name of the study.
         along: Points by controller; the nominal vehicle is the first of each point.
-        folder: Where results are kept, under a digest of what they depend on.
+        folder: Folder of the results, named by a digest of what they depend on.
         progress: Called with what is done.
     """
     total, done = sum(map(len, along.values())), 0

@@ -31,7 +31,7 @@ def draw_metric(
 
 
 def draw_share(axis: Axes, x: np.ndarray, results: dict[Controller, SweepResult]) -> None:
-    """Draw the share of flights that come to their end (solid), and without being at their limits (dotted)."""
+    """Draw the share of flights that finish (solid), and of those that finish without saturation (dotted)."""
     for (controller, columns), width in zip(results.items(), widths(len(results)), strict=True):
         shares = {name: 100.0 * np.array(columns[name]) for name in ("finished", "without_limits")}
         axis.plot(x, shares["finished"], color=controller.color, linewidth=width, label=controller.label)
@@ -41,7 +41,7 @@ def draw_share(axis: Axes, x: np.ndarray, results: dict[Controller, SweepResult]
 
 
 def legend(figure: Figure, *, shares: bool) -> None:
-    """Put the controllers and what the line styles mean above the panels; ``shares``: one panel is of shares."""
+    """Add a legend of controllers and line styles above the panels; ``shares``: one panel is of shares."""
     controllers, _ = figure.axes[0].get_legend_handles_labels()
     styles = {"-": "nominal vehicle", "--": "worst corner"}
     if shares:
@@ -57,8 +57,8 @@ def draw_losses(figure: Figure, x: np.ndarray, results: dict[Controller, SweepRe
     Args:
         figure: Empty.
         x: Values along the sweeps.
-        results: By controller.
-        label: What ``x`` is.
+        results: Results by controller.
+        label: Label of ``x``.
     """
     axes = np.asarray(figure.subplots(3, 1, sharex=True))
     draw_share(axes[0], x, results)
@@ -76,7 +76,7 @@ LOSSES = (
     "(a) Share of flights that come to their end (solid), and without a second at the limits of the inputs (dotted); "
     "(b), (c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost."
 )
-"""What :func:`draw_losses` shows, in words."""
+"""Description of the plot of :func:`draw_losses`."""
 
 
 def finding(
@@ -89,14 +89,14 @@ def finding(
     rising: bool = True,
     nominal: bool = True,
 ) -> str:
-    """Return in words between which points a controller comes to its limits and is lost, going along ``x``.
+    """Return in words between which points a controller reaches its limits and is lost, going along ``x``.
 
     Args:
         controller: Whose sweep it is.
         x: Values along the sweep, increasing.
-        columns: Of the sweep.
+        columns: Columns of the sweep.
         words: Around a value, which stands for ``{}``.
-        digits: Of a value, behind the point.
+        digits: Decimals of a value.
         rising: Go from the least value on, else from the largest.
         nominal: Whether the sweep changes the nominal vehicle's flight, too.
     """

@@ -13,18 +13,18 @@ from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import disturbance_columns, nominal_family, nominal_problem, with_family
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs, InputSize, RigidScale, find_inputs, read_inputs
+from hsv.progress import Progress
 from hsv.study.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv.study.sensitivity.controllers import PURPLE
-from hsv.study.sensitivity.study import Progress
 from hsv.vehicle.dynamics import N_RIGID, N_STATES
 
 FACTORS = (0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0)
-"""By which a group is multiplied; 1: the baseline's own."""
+"""Factors by which a group is multiplied; 1: the baseline's own value."""
 
 
 @dataclass(frozen=True)
 class Group:
-    """What is varied together: fields of state scale, input scale or input bound; colour in the plots."""
+    """Fields that are varied together, of state scale, input scale or input bound, and their colour in the plots."""
 
     label: str
     color: str
@@ -55,7 +55,7 @@ WEIGHTS = (
 """The weights are one over the squares of these scales: psi and sigma of K (eq. 31), and those of F likewise."""
 
 BOUNDS = Group("bounds of the nominal inputs", PURPLE, bounds=_INPUTS)
-"""Of K alone (eq. 35)."""
+"""Groups of K alone (eq. 35)."""
 
 GROUPS = {"F": WEIGHTS, "K": (*WEIGHTS, BOUNDS)}
 
@@ -68,7 +68,7 @@ class Variations:
     flown: ControlDesign
 
     def feedback(self, group: Group, factor: float) -> ControlDesign:
-        """Return the design with F made anew, ``group`` of its weights times ``factor``.
+        """Return the design with F recomputed, with ``group`` of its weights multiplied by ``factor``.
 
         Raises:
             DesignError: No solution.
@@ -90,7 +90,7 @@ class Variations:
         return replace(self.flown, feedback_gain=gain, tube=None)
 
     def nominal(self, group: Group, factor: float) -> ControlDesign:
-        """Return the design with the family of K made anew, ``group`` of its weights or bounds times ``factor``.
+        """Return the design with the family of K recomputed, ``group`` of its weights or bounds times ``factor``.
 
         Raises:
             DesignError: No solution.

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
 from hsv.design.region import Corner
+from hsv.progress import Progress
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import letter, new_figure
 from hsv.study.linear_loop import stability_limit, worst_growth
@@ -24,7 +25,7 @@ from hsv.study.sensitivity.controllers import (
     corners_of,
     said_corners,
 )
-from hsv.study.sensitivity.study import Outcome, Progress, Study
+from hsv.study.sensitivity.study import Outcome, Study
 from hsv.study.sensitivity.sweep import Point, sweep
 from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.study.sensitivity.variations import (

@@ -1,4 +1,4 @@
-"""Claims of the adjustable factor that a flight rests on: one Lyapunov function for every factor that is certified."""
+"""Checks of the adjustable factor that a flight rests on: one Lyapunov function for every factor that is certified."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hsv.design.factor import certified_loops, room_at_one
+from hsv.design.factor_range import certified_loops, room_at_one
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.verification.claims import Claim, Subject, above, required, same, same_parameter
+from hsv.design.verification.checks import Check, Subject, above, required, same, same_parameter
 from hsv.vehicle.dynamics import N_RIGID
 
 
-def factor_claims(subject: Subject) -> Iterable[Claim]:
-    """Recompute what the range of the factor rests on; that of a design without one is 1 alone."""
+def factor_checks(subject: Subject) -> Iterable[Check]:
+    """Recompute the basis of the range of the tube factor; for a design without one the range is 1 alone."""
     design, stored = subject.design, subject.certificate.get("adjustable")
     filtered = stored is not None
-    yield required(Claim("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
+    yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
     if stored is None:
         yield required(same_parameter(subject, "feedback.tau_minimum", design.tau_minimum, np.ones(N_RIGID)))
         return

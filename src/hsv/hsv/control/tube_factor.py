@@ -26,7 +26,7 @@ TAU_CHANGE_PARAMETERS = (
 )
 
 
-def factors(values: Sequence[float], name: str) -> np.ndarray:
+def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
     """Return the factor of each rigid state (5) from one ``values`` for all or five.
 
     Raises:
@@ -49,7 +49,7 @@ def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name
     Raises:
         ParameterError: Names the value that does not, and the range.
     """
-    tau = factors(values, name)
+    tau = rigid_factors(values, name)
     outside = np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))
     # One value for a range that differs by dimension: the range of any one of them would mislead.
     blurred = len(values) == 1 and np.ptp(minimum) > 0.0

@@ -1,4 +1,4 @@
-"""Claims: what is recomputed, what came out, what was expected."""
+"""Checks of a design: an item that is recomputed, the value found, and the value expected."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """One statement of a design, recomputed: ``value`` is what came out, ``expected`` says in words what was due.
+class Check:
+    """One item of a design, recomputed: ``value`` is the value found, ``expected`` describes the expected one in words.
 
-    ``required``: a design that fails it must not fly; other claims tell that it is not the one that was written.
+    A design that fails a ``required`` check must not fly; other checks only show that it is not the design as written.
     """
 
     name: str
@@ -37,13 +37,13 @@ class Claim:
 
     @property
     def shown(self) -> str:
-        """What came out, as text."""
+        """The value found, as text."""
         return self.value if isinstance(self.value, str) else f"{self.value:.6g}"
 
 
 @dataclass(frozen=True)
 class Subject:
-    """What is verified: the design as it flies, and its certificate."""
+    """A design to verify: the design as it is flown, and its certificate."""
 
     design: ControlDesign
     certificate: dict[str, Any]
@@ -71,42 +71,42 @@ class Subject:
         return polytopic_model(self.inputs.model, self.vehicle, self.design.notch)
 
 
-def required(claim: Claim) -> Claim:
-    """Return ``claim`` as one without which a design must not fly."""
-    return replace(claim, required=True)
+def required(check: Check) -> Check:
+    """Return ``check`` as a required one."""
+    return replace(check, required=True)
 
 
-def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Claim:
-    """Claim that every entry of ``value`` is that of ``expected``, within a tolerance named in the table."""
+def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
+    """Return the check that every entry of ``value`` equals that of ``expected``, within a tolerance of the table."""
     value, expected = np.asarray(value, float), np.asarray(expected, float)
     if value.shape != expected.shape:
-        return Claim(name, f"shape {value.shape}", f"shape {expected.shape}", False)
+        return Check(name, f"shape {value.shape}", f"shape {expected.shape}", False)
     allowed = TOLERANCES[tolerance].allowed(expected, size)
     shares = np.abs(value - expected) / allowed
     shares = np.where(np.isnan(shares), np.inf, shares)
     if shares.max(initial=0.0) <= 1.0:
-        return Claim(name, float(shares.max(initial=0.0)), "at most 1 tolerance", True)
+        return Check(name, float(shares.max(initial=0.0)), "at most 1 tolerance", True)
     worst = np.unravel_index(int(np.argmax(shares)), shares.shape)
     where = "" if value.ndim == 0 else f"[{', '.join(str(i) for i in worst)}]"
-    return Claim(f"{name}{where}", float(value[worst]), f"{float(expected[worst])!r}", False)
+    return Check(f"{name}{where}", float(value[worst]), f"{float(expected[worst])!r}", False)
 
 
 def same_parameter(
     subject: Subject, parameter: str, value: Any, expected: Any, name: str = "", index: Any = ...
-) -> Claim:
-    """Claim that every entry of ``value``, a parameter of the design file or its part ``[index]``, is as expected."""
+) -> Check:
+    """Return the check of every entry of ``value``, a parameter of the design file or its part ``[index]``."""
     size = entry_size(parameter, subject.certificate)[index]
     return same(name or parameter, value, expected, PARAMETERS[parameter], size)
 
 
-def at_most(name: str, value: float, limit: float) -> Claim:
-    """Claim that ``value`` is at most ``limit``; not a number is not."""
-    return Claim(name, float(value), f"at most {limit:g}", bool(value <= limit))
+def at_most(name: str, value: float, limit: float) -> Check:
+    """Return the check that ``value`` is at most ``limit``; NaN fails."""
+    return Check(name, float(value), f"at most {limit:g}", bool(value <= limit))
 
 
-def above(name: str, value: float, limit: float) -> Claim:
-    """Claim that ``value`` is above ``limit``; not a number is not."""
-    return Claim(name, float(value), f"above {limit:g}", bool(value > limit))
+def above(name: str, value: float, limit: float) -> Check:
+    """Return the check that ``value`` is above ``limit``; NaN fails."""
+    return Check(name, float(value), f"above {limit:g}", bool(value > limit))
 
 
 def inverse(Q: np.ndarray) -> np.ndarray:
@@ -115,21 +115,21 @@ def inverse(Q: np.ndarray) -> np.ndarray:
     return np.asarray(0.5 * (P + P.T))
 
 
-def gathered(name: str, claims: Callable[[], Iterable[Claim]]) -> list[Claim]:
-    """Return the claims; an error on the way becomes the last claim, which fails under ``name``."""
-    done: list[Claim] = []
+def gathered(name: str, checks: Callable[[], Iterable[Check]]) -> list[Check]:
+    """Return the checks; an error in them becomes the last check, which fails under ``name``."""
+    done: list[Check] = []
     try:
-        done.extend(claims())
+        done.extend(checks())
     # A certificate may hold anything anywhere.
     except (DesignError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         missing = isinstance(error, KeyError)
         value = f"no field {error}" if missing else str(error)
-        done.append(Claim(name, value, "to be recomputable", False, required=True))
+        done.append(Check(name, value, "to be recomputable", False, required=True))
     return done
 
 
-def require(claims: Iterable[Claim]) -> None:
-    """Raise DesignError naming the first claim that fails, if any."""
-    for claim in claims:
-        if not claim.ok:
-            raise DesignError(f"claim fails: {claim}")
+def require(checks: Iterable[Check]) -> None:
+    """Raise DesignError naming the first check that fails, if any."""
+    for check in checks:
+        if not check.ok:
+            raise DesignError(f"check fails: {check}")

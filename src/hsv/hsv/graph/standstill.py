@@ -1,7 +1,7 @@
-"""Slow or hung: whether anything has moved lately, as far as somebody was there to see it.
+"""Detection of hung processes, as opposed to slow ones.
 
-On a busy machine everything may take any time. So nothing in the graph is given up for being late, but for standing
-still: no step, no message, no processor time used.
+On a busy machine everything may take any time. Nothing in the graph is therefore given up for being late, but only for
+standing still: no step, no message, no processor time used.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ HUNG_AFTER = 5.0
 """Seconds without any progress after which a process is called hung."""
 
 _LONGEST_GAP = 1.0
-"""Seconds between two looks that count at most: who did not get to look for longer was kept from it, as all were."""
+"""Largest time in seconds that counts between two looks: after a longer gap this process itself was kept waiting."""
 
 
 class Standstill:
-    """How long something has not changed."""
+    """Time for which something has not changed."""
 
     def __init__(self) -> None:
         self._looked = time.monotonic()

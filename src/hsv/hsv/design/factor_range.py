@@ -1,4 +1,4 @@
-"""What the adjustable factor (paper section 4.3) may be: certified loops, bounds of K', room of the plan.
+"""Permitted range of the tube factor (paper section 4.3): certified loops, bounds of K', margin of the nominal inputs.
 
 Nothing here needs a solver: a node recomputes it before it flies.
 """
@@ -16,19 +16,23 @@ from hsv.design.error_system import ErrorSystem, error_system
 from hsv.design.rounding import BOUND_DIGITS, rounded
 from hsv.design.sets.ellipsoid_set import from_report
 from hsv.design.tightening import TightenedInputs, tighten
-from hsv.design.tube_problem import channel_model, factors, tube_problem
+from hsv.design.tube_problem import bounding_factors, channel_model, tube_problem
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.vehicle import Vehicle
 
 
 def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
-    """Return the closed loops (r, n, n) of error and filter that are to share a Lyapunov function.
+    """Return the closed loops (r, n, n) of error and filter that must share a Lyapunov function.
 
     Vertices x adjustable factors (the least, 1) x elevator effectiveness (1, ``effectiveness``).
     """
     return np.concatenate(
-        [_system(design, vehicle, factor, share).A for factor in factors(design) for share in (1.0, effectiveness)]
+        [
+            _system(design, vehicle, factor, share).A
+            for factor in bounding_factors(design)
+            for share in (1.0, effectiveness)
+        ]
     )
 
 
