@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-long fuzz test-ros test-viewers test-portability lint references bench docs clean
+.PHONY: help setup run test test-long fuzz mutation test-ros test-viewers test-portability coverage ci-local lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -34,6 +34,12 @@ test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damag
 fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m fuzz $(ARGS)
 
+# Works on a copy of the checkout, in .mutation.
+mutation: setup ## set up, then try the unit tests on 300 changed copies of the code (ARGS="--keep-killed" goes on)
+	@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
+	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-mutation.txt --constraint "$$pins"
+	@export NUMBA_DISABLE_JIT=1; $(IN_ENVIRONMENT) python3 tools/mutation.py $(ARGS)
+
 # In a shell with the wheels' ROS too, if the tools of an installation built for it are on PATH.
 test-ros: setup ## set up, then run the tests that need a full ROS 2 installation, sourced before (ARGS="-k launch" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -m full_ros $(ARGS)
@@ -59,6 +65,17 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 	@source ./env.sh || exit; python3 tools/portability.py; missing=$$?; \
 	python3 -m pytest -n 2 -m portability $(ARGS) && exit "$$missing"
 
+# Of the packages that a flight is made of and of those that record it, by the tests that mirror them, in one process each:
+# some minutes. Compiled functions are not traced, and pyproject.toml leaves them out.
+coverage: setup ## set up, then measure how much of the flight's packages their own tests run; fails below the floor
+	@$(IN_ENVIRONMENT) python3 -m pytest -n auto --cov --cov-report=term:skip-covered \
+		-m "not (graph or long or fuzz or full_ros or portability or viewer or reference)" \
+		tests/test_*.py tests/{airframe,control,faults,lpv,recording,simulation,vehicle} $(ARGS)
+
+# Roots for the steps come into .ci-local, made by mmdebstrap; nothing else of the machine changes.
+ci-local: setup ## set up, then run the steps of the hosted CI in fresh systems, as root (ARGS='--only "debian 12"')
+	@$(IN_ENVIRONMENT) python3 tools/ci_local.py $(ARGS)
+
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
 
@@ -78,5 +95,5 @@ docs: setup ## set up, then build the documentation into docs/_build (open docs/
 	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv .portability ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build
+	rm -rf .venv .portability .mutation .ci-local .coverage ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

@@ -82,9 +82,9 @@ def test_aliases_that_multiply_are_refused_and_others_taken():
 @pytest.mark.parametrize(
     ("parse", "text", "why"),
     [
-        (parse_yaml, "period: 0.02\nperiod: 0.03", "the key 'period' stands there twice at line 2, column 1"),
-        (parse_yaml, "{a: {b: 1, c: 2, b: 3}}", "the key 'b' stands there twice"),
-        (parse_json, '[{"a": 1, "b": 2, "a": 1}]', "the key 'a' stands there twice"),
+        (parse_yaml, "period: 0.02\nperiod: 0.03", "the key 'period' occurs twice at line 2, column 1"),
+        (parse_yaml, "{a: {b: 1, c: 2, b: 3}}", "the key 'b' occurs twice"),
+        (parse_json, '[{"a": 1, "b": 2, "a": 1}]', "the key 'a' occurs twice"),
         (parse_toml, "a = 1\na = 2", "Cannot overwrite a value"),
         (parse_yaml, "a: 2026-02-30", "day is out of range for month"),
         (parse_yaml, "a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),

@@ -27,6 +27,8 @@ ON_THE_PATH = (
     "elementary.py",
     "elimination.py",
     "inheritance.py",
+    "lane_types.py",
+    "lanes.py",
     "signals.py",
     "timing.py",
     "links.py",
@@ -44,7 +46,7 @@ ON_THE_PATH = (
     "vehicle/trim.py",
     "vehicle/vehicle.py",
     "lpv/polytope.py",
-    "control/adjustable.py",
+    "control/tube_factor.py",
     "control/controller.py",
     "control/controllers.py",
     "control/estimator.py",
@@ -70,7 +72,9 @@ ON_THE_PATH = (
     "simulation/fields.py",
     "simulation/foreign.py",
     "simulation/governed.py",
+    "simulation/history.py",
     "simulation/scenario.py",
+    "simulation/side_by_side.py",
     "simulation/tables.py",
     "simulation/values.py",
 )
@@ -114,6 +118,7 @@ EXEMPT = {
     "simulation/metrics.py": "what is said of a flight, after it",
     "simulation/fingerprint.py": "a digest",
     "documents.py": "reads files",
+    "threads.py": "runs flights in threads",
     "control/design_file.py": "the same",
     "control/design_parameters.py": "takes arrays from files as they are",
     "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",
@@ -248,7 +253,7 @@ def test_compiled_loop_and_set_up_take_nothing_inexact_from_elsewhere(tmp_path):
     lines = [line.split(": ") for line in listed.stdout.splitlines()]
     functions = {function for function, _ in lines}
     assert {
-        "hsv.simulation.closed_loop._fly",
+        "hsv.simulation.closed_loop.fly_loop",
         "hsv.vehicle.trim.balance",
         "hsv.control.reference_trajectory._trimmed",
         "hsv.control.notch_filter.filter_step",

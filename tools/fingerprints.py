@@ -1,4 +1,4 @@
-"""Write the table of published fingerprints anew: python3 tools/fingerprints.py, after "source env.sh"."""
+"""Recreate the table of published fingerprints: python3 tools/fingerprints.py, after "source env.sh"."""
 
 from __future__ import annotations
 

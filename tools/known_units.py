@@ -28,7 +28,7 @@ UNITS = (
     *(f"{mass}^0.5 {length}{rate}" for mass, length in (("kg", "m"), ("slug", "ft")) for rate in ("", "/s", "/s^2")),
     *("N/kg^0.5", "lbf/slug^0.5"),
 )
-"""In which scenarios, vehicles and designs are written."""
+"""Units used in scenarios, vehicles and designs."""
 
 if __name__ == "__main__":
     rows = {}

@@ -34,13 +34,20 @@ LOCKS: dict[str, tuple[list[str], list[str]]] = {
             "requirements-viewers.txt",
             "requirements-bench.txt",
             "requirements-docs.txt",
+            "requirements-mutation.txt",
         ],
         ["numpy==2.4.*"],
     ),
     # Ubuntu 24.04 builds ROS 2 Jazzy against its numpy 1.26, Jazzy's pytest plugins are written for pytest 7, and
     # its colcon needs a setuptools that still has "develop".
     "constraints-jazzy.txt": (
-        ["requirements.txt", "requirements-viewers.txt", "requirements-bench.txt", "requirements-docs.txt"],
+        [
+            "requirements.txt",
+            "requirements-viewers.txt",
+            "requirements-bench.txt",
+            "requirements-docs.txt",
+            "requirements-mutation.txt",
+        ],
         ["numpy==1.26.4", "pytest<8", "setuptools<80"],
     ),
 }

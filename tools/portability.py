@@ -23,7 +23,7 @@ from hsv_setup.paths import ROOT, fingerprint, read_stamp, write_stamp
 
 CACHE = ROOT / ".portability"
 PACKAGES = ("numba", "numpy", "pint", "pydantic", "pyyaml", "scipy")
-"""What a flight in one process imports."""
+"""Packages that a flight in one process imports."""
 _DEBIAN_MACHINES = {"x86_64": "amd64", "aarch64": "arm64"}
 
 
@@ -185,7 +185,7 @@ def install(folder: Path, version: str, machine: str, constraints: str) -> str:
 
 
 def prepare(name: str) -> Environment:
-    """Return environment ``name``, prepared anew where the pins or this program have changed.
+    """Return environment ``name``, prepared again if the pins or this program have changed.
 
     Raises:
         MissingError: Says what is missing for it.

@@ -1,4 +1,4 @@
-"""Fly the reference bags anew: ``make references``.
+"""Renew the reference bags: ``make references``.
 
 Every scenario ``bags/reference/<name>.toml`` has its bag ``bags/reference/<name>/``. All bags are flown, and replayed,
 in a temporary folder first; only if every one is good do they take the place of the old ones, together.

@@ -25,7 +25,7 @@ class RefusedError(Exception):
 
 
 def real_command() -> str | None:
-    """Return a `ros2` on PATH that is not a stand-in, or None."""
+    """Return a `ros2` on PATH that is not this replacement, or None."""
     for directory in os.get_exec_path():
         path = Path(directory, "ros2")
         if not os.access(path, os.X_OK) or path.is_dir():

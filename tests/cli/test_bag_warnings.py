@@ -61,14 +61,14 @@ def test_a_bag_that_is_cut_off_is_used_and_said_to_be_cut_off(
     ran = hsv(command, str(cut), *RESULTS[command])
     assert ran.code == 0
     assert ran.err.count("\n") == 1
-    assert ran.err.startswith(f"hsv: warning: {cut}: cut off after ") and "hsv recover mends it" in ran.err
+    assert ran.err.startswith(f"hsv: warning: {cut}: truncated after ") and "hsv recover completes it" in ran.err
     assert RESULTS[command] == [] or (tmp_path / RESULTS[command][-1]).is_file()
 
 
 def test_diff_says_which_of_the_two_is_cut_off(hsv: Hsv, bag: Path, cut: Path) -> None:
     ran = hsv("diff", str(bag), str(cut))
     assert ran.code == 1 and "number of messages" in ran.out
-    assert ran.err.startswith(f"hsv: warning: {cut}: cut off after ") and ran.err.count("\n") == 1
+    assert ran.err.startswith(f"hsv: warning: {cut}: truncated after ") and ran.err.count("\n") == 1
 
 
 @pytest.mark.parametrize("command", ["info", "export", "report", "plot"])
@@ -170,8 +170,8 @@ def test_a_recovered_bag_is_replayed_as_far_as_it_is_complete(hsv: Hsv, bag: Pat
     end = max(index.chunk_start_offset + index.chunk_length for index in summary.chunk_indexes)
     (ragged / "metadata.yaml").unlink()
     file.write_bytes(file.read_bytes()[: end + 1])
-    assert hsv("recover", str(ragged), "--out", "mended").code == 0
-    ragged = tmp_path / "mended"
+    assert hsv("recover", str(ragged), "--out", "repaired").code == 0
+    ragged = tmp_path / "repaired"
     ran = hsv("replay", str(ragged))
     assert ran.code == 0 and ran.err == "" and ran.out.count("identical in every byte") == 5
     assert hsv("replay", str(ragged), "--rerun").code == 0
@@ -202,4 +202,4 @@ def test_diff_takes_padding_for_no_difference(hsv: Hsv, bag: Path, tmp_path: Pat
     )
     ran = hsv("diff", str(bag), str(padded), "--json")
     assert ran.code == 0 and ran.json["equal"] and ran.json["identical"]
-    assert "identical in every byte but the padding" in hsv("diff", str(bag), str(padded)).out
+    assert "identical in every byte except the padding" in hsv("diff", str(bag), str(padded)).out

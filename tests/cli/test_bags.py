@@ -51,7 +51,7 @@ def test_replay_names_process_step_and_field(hsv: Hsv, bag: Path, tmp_path: Path
     assert done.code == 1
     (line,) = [line for line in done.out.splitlines() if line.startswith("tube_mpc")]
     assert " differ step " in line and "/hsv/command elevator_deflection: 0.2" in line
-    assert done.error == f"tube_mpc: not what {bag} recorded"
+    assert done.error == f"tube_mpc: differs from the recording in {bag}"
     one = hsv("replay", str(bag), "--node", "notch_filter", "--parameters", str(file))
     assert one.code == 0 and len(one.out.splitlines()) == 1
 
@@ -64,7 +64,7 @@ def test_diff(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     other = flown_bag(tmp_path / "other", fault=8.0)
     done = hsv("diff", str(bag), str(other))
     assert done.code == 1
-    assert done.out.startswith("they part at t = 6.00 s: step 300 /hsv/actuator elevator_deflection")
+    assert done.out.startswith("first difference at t = 6.00 s: step 300 /hsv/actuator elevator_deflection")
     report = hsv("diff", str(bag), str(other), "--json").json
     assert report["first_difference"]["step"] == 300
     assert report["largest_difference"]["/hsv/state"]["pitch_angle"] > 0.0
@@ -87,7 +87,7 @@ def test_export_writes_into_the_folder_of_the_bag(hsv: Hsv, bag: Path) -> None:
     assert hsv("export", str(bag), "--csv", "--npz").code == 2
 
 
-def test_recover_mends_a_cut_bag(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+def test_recover_completes_a_truncated_bag(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut"
     cut.mkdir()
     data = next(bag.glob("*.mcap")).read_bytes()
@@ -97,7 +97,7 @@ def test_recover_mends_a_cut_bag(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
     assert [file.name for file in cut.iterdir()] == ["cut_0.mcap"], "the old bag stays as it is"
     new = tmp_path / "cut_recovered"
     assert (new / FILE_NAME).is_file() and done.json["path"] == str(new)
-    assert "whole already" in hsv("recover", str(new)).out
+    assert "already complete" in hsv("recover", str(new)).out
     again = hsv("recover", str(cut))
     assert again.code == 2 and "exists already" in again.error
     assert hsv("recover", str(cut), "--out", "other").code == 0 and (tmp_path / "other" / "other_0.mcap").is_file()

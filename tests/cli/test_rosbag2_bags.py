@@ -143,7 +143,7 @@ def test_a_fifth_of_the_steps_is_missing(hsv: Hsv, tmp_path: Path) -> None:
         ran = hsv(command, str(path), *words)
         assert ran.code == (command == "diff"), command
         assert said in ran.err, command
-    assert f"they part at t = {min(lost) * 0.02:.2f} s: step {min(lost)} " in ran.out
+    assert f"first difference at t = {min(lost) * 0.02:.2f} s: step {min(lost)} " in ran.out
     assert f"{9 * 1601} messages of the same steps are compared, and they are equal" in ran.out
     ran = hsv("info", str(path))
     out = " ".join(ran.out.split())

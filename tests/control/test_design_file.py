@@ -178,8 +178,8 @@ SHIPPED = find_design("baseline").read_text()
             "    perriod: ",
             "parameter perriod: unknown, expected those of a design (did you mean 'period'?)",
         ),
-        ("    period: 0.02", "    period: 0.02\n    period: 0.03", "the key 'period' stands there twice at line 6"),
-        ("    period: 0.02", "    period: 0.02\n    design.name: b", "parameter design.name stands there twice"),
+        ("    period: 0.02", "    period: 0.02\n    period: 0.03", "the key 'period' occurs twice at line 6"),
+        ("    period: 0.02", "    period: 0.02\n    design.name: b", "parameter design.name occurs twice"),
         (
             "    period: 0.02",
             "    period: 0.02\n    own: &a {own: *a}",

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_are
 
-from hsv.control.estimator import estimate_step, estimator_data, scratch, steady_gain, transition
+from hsv.control.estimator import EstimatorData, estimate_step, estimator_data, scratch, steady_gain, transition
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
 from hsv.errors import ParameterError
 from hsv.faults.laws import fault_memory, fault_rows
@@ -35,6 +35,7 @@ def test_transition_is_the_matrix_exponential():
     assert_allclose(transition(A, B, T), expm(whole * T), rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.compiled
 def test_gain_solves_the_riccati_equation(estimator):
     whole = np.zeros((11, 11))
     whole[:9, :9], whole[:9, 9:] = A, B
@@ -56,6 +57,36 @@ def test_scalar_gain_is_the_textbooks():
     assert gain[0, 0] == pytest.approx(p / (p + r), rel=1e-9)
 
 
+@pytest.mark.parametrize("noise", [[0.5], [0.5, 0.7]])
+def test_gain_of_a_small_system_solves_the_riccati_equation(noise):
+    A, B, period = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.2], [1.0]]), 0.1
+    process = np.array([0.1, 0.2, 0.3])
+    gain, iterations = steady_gain(A, B, period, process, np.array(noise))
+    assert 10 < iterations < 1000
+    whole = np.zeros((3, 3))
+    whole[:2, :2], whole[:2, 2:] = A, B
+    F, H, R = expm(whole * period), np.eye(3)[: len(noise)], np.diag(np.square(noise))
+    M = solve_discrete_are(F.T, H.T, np.diag(process**2), R)
+    assert_allclose(gain, M @ H.T @ np.linalg.inv(H @ M @ H.T + R), rtol=1e-6)
+
+
+def test_a_step_is_a_prediction_corrected_by_the_gain():
+    rng = np.random.default_rng(1)
+    gain, command = 0.1 * rng.normal(size=(11, 5)), START.input + np.array([0.01, -0.02])
+    data = EstimatorData(gain, START.state, VEHICLE, T, 2)
+    state, estimate = np.full(11, np.nan), np.empty(9)
+    predicted, offsets = START.state, np.zeros(2)
+    for k in range(4):
+        measurement = predicted + 0.01 * rng.normal(size=9)
+        estimate_step(data, state, k, measurement, command, scratch(), estimate)
+        correction = gain @ (measurement - predicted)[:5]
+        offsets = offsets + correction[9:]
+        assert_allclose(estimate, predicted + correction[:9], rtol=1e-12)
+        assert_allclose(state[9:], offsets, rtol=1e-12)
+        predicted = estimate.copy()
+        advance(predicted, command + offsets, VEHICLE, T, 2, workspace())
+
+
 def flown(estimator, measured, seconds=20.0, offset=0.0):
     """Return truth and estimate of a flight about the trim, its elevator off by a constant that no one knows."""
     rows = fault_rows([SENSOR], [], T)
@@ -74,23 +105,27 @@ def flown(estimator, measured, seconds=20.0, offset=0.0):
     return np.array(truth), np.array(found), state
 
 
+@pytest.mark.compiled
 def test_of_a_perfect_measurement_the_estimate_is_the_truth(estimator):
     truth, found, _ = flown(estimator, sensor_data({}, T))
     assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.compiled
 def test_noise_falls_to_a_fraction_of_the_sensors(estimator):
     truth, found, _ = flown(estimator, SENSORS, 60.0)
     error = (found - truth)[500:, :5].std(axis=0) / SENSORS.noise[:5]
     assert error.max() < 0.5 and error[2:4].max() < 0.3
 
 
+@pytest.mark.compiled
 def test_an_offset_of_the_elevator_is_found(estimator):
     truth, _, state = flown(estimator, sensor_data({}, T), 4.0, offset=0.01)
     assert np.abs(truth[-1, 2:4]).max() < 0.5
     assert state[10] == pytest.approx(0.01, rel=0.05)
 
 
+@pytest.mark.compiled
 def test_it_is_a_function_of_what_it_is_given(estimator):
     for one, other in zip(flown(estimator, SENSORS, 2.0), flown(estimator, SENSORS, 2.0), strict=True):
         assert_array_equal(one, other)

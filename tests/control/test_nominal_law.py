@@ -30,6 +30,14 @@ def step(design, x):
     return FamilyLaw(nominal_data(design)).step(x)
 
 
+def test_without_gains_nothing_is_planned():
+    none = nominal_data(SMOOTH)._replace(gains=np.zeros((0, 2, 9)), ellipsoids=np.zeros((0, 5, 5)))
+    result = FamilyLaw(none).step(np.ones(9))
+    assert_array_equal(result.input, [0.0, 0.0])
+    assert result.status is NominalStatus.OK
+    assert len(result.gain) == 0
+
+
 @pytest.mark.parametrize("index", range(1, len(SMOOTH.nominal_gains)))
 def test_the_input_is_continuous_where_the_switched_one_jumps(index):
     rng = np.random.default_rng(index)

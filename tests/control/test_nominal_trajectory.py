@@ -5,7 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.kothare_law import KothareLaw
+from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
+from hsv.control.qp_law import QpLaw
 from hsv.errors import ParameterError
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
@@ -24,6 +27,14 @@ def smallest(deviation):
     """Index of the innermost ellipsoid that holds the deviation, 0 if there is none."""
     levels = [deviation[:5] @ P @ deviation[:5] for P in DESIGN.nominal_ellipsoids]
     return max((g for g, level in enumerate(levels) if level <= 1.0 + 1e-6), default=0)
+
+
+def test_the_law_is_the_one_that_is_asked_for():
+    assert [type(nominal(**{"nominal.law": name}).law) for name in ("family", "qp", "kothare_online")] == [
+        FamilyLaw,
+        QpLaw,
+        KothareLaw,
+    ]
 
 
 def test_reference_is_the_trim_of_the_command():
@@ -52,6 +63,7 @@ def test_obeys_the_nominal_system_scheduled_by_the_measured_state():
         assert_array_equal(result.reference, law.reference.final_state)
 
 
+@pytest.mark.compiled
 def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
     law = nominal()
     used = set()
@@ -64,6 +76,7 @@ def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
     assert np.abs(result.deviation[:2]).max() < 1.0
 
 
+@pytest.mark.compiled
 def test_never_leaves_an_ellipsoid_outwards():
     law = nominal()
     indices = [smallest(law.step(START.state).deviation) for _ in range(4000)]

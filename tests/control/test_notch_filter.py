@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.control.notch_filter import MAX_SECTIONS, NOTCH_PARAMETERS, NotchFilter, NotchSection
+from hsv.control.notch_filter import (
+    MAX_SECTIONS,
+    NOTCH_PARAMETERS,
+    NotchFilter,
+    NotchSection,
+    continuous,
+    notch_response,
+    series,
+)
 from hsv.errors import ParameterError
 
 PERIOD = 0.02
@@ -39,6 +47,34 @@ def test_continuous_realisation_is_the_printed_transfer_function(section):
     for omega in (0.1, 5.0, section.zero_frequency, 40.0, 150.0):
         response = C @ np.linalg.solve(1j * omega * np.eye(2) - A, B) + D
         assert_allclose(response, printed(section, omega), rtol=1e-12)
+
+
+def test_the_whole_filter_in_state_space_is_its_sections_one_after_the_other():
+    notch = NotchFilter([SECOND, UNEQUAL, BASELINE], PERIOD)
+    A, B, C, D = series(notch.data)
+    for omega in (0.5, 15.0, 60.0):
+        z = cmath.exp(1j * omega * PERIOD)
+        assert_allclose(C @ np.linalg.solve(z * np.eye(6) - A, B) + D, discrete(notch, omega), rtol=1e-11)
+
+
+def test_continuous_sections_rest_where_the_discrete_ones_do():
+    sections = [SECOND, UNEQUAL]
+    data, sampled = continuous(sections), NotchFilter(sections, PERIOD).data
+    for i, section in enumerate(sections):
+        A, B, C, D = section.state_space()
+        assert_array_equal(data.A[i], A)
+        assert_array_equal(data.B[i], B)
+        assert_array_equal(data.C[i], C)
+        assert data.D[i] == D
+        assert_allclose(A @ data.G[i] + B, 0.0, atol=1e-12)
+        assert_allclose(sampled.A[i] @ sampled.G[i] + sampled.B[i], sampled.G[i], rtol=1e-12, atol=1e-15)
+
+
+def test_response_in_series_is_the_product_of_the_printed_transfer_functions():
+    frequencies = np.array([0.1, 5.0, 15.0, 18.0, 40.0, 150.0])
+    expected = [printed(SECOND, omega) * printed(UNEQUAL, omega) for omega in frequencies]
+    assert_allclose(notch_response([SECOND, UNEQUAL], frequencies), expected, rtol=1e-12)
+    assert_array_equal(notch_response([], frequencies), 1.0)
 
 
 @pytest.mark.parametrize("section", [BASELINE, SECOND, UNEQUAL])

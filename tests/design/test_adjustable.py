@@ -12,15 +12,15 @@ from hsv.control.design import ControlDesign
 from hsv.design.adjustable import design_adjustable
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.error_system import error_system, union
-from hsv.design.factor import certified_loops, relaxed_bound, room_at_one
+from hsv.design.factor_range import certified_loops, relaxed_bound, room_at_one
 from hsv.design.inputs import read_inputs, with_tau
 from hsv.design.region import corners, incomplete_share, region_parameters
 from hsv.design.sets.ellipsoid_set import vertex_residuals
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.design.verification.adjustable import adjustable_claims
-from hsv.design.verification.claims import gathered
-from hsv.design.verification.factor import factor_claims
+from hsv.design.verification.adjustable import adjustable_checks
+from hsv.design.verification.checks import gathered
+from hsv.design.verification.factor_range import factor_checks
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject, verify
 from hsv.errors import DesignError
@@ -39,8 +39,8 @@ def stored(subject):
     return subject.certificate["adjustable"]
 
 
-def failures(claims):
-    return [claim.name for made in claims.values() for claim in made if not claim.ok]
+def failures(checks):
+    return [check.name for made in checks.values() for check in made if not check.ok]
 
 
 def test_every_claim_holds(subject):
@@ -145,7 +145,7 @@ def test_union_keeps_the_first_feedback(subject):
 
 
 @pytest.mark.parametrize(
-    ("path", "factor", "claim"),
+    ("path", "factor", "check"),
     [
         (("lyapunov", "N"), None, "common Lyapunov"),
         (("room_at_one",), 1.01, "room of the nominal plan"),
@@ -155,7 +155,7 @@ def test_union_keeps_the_first_feedback(subject):
         (("full_state", "gain"), 1.01, "rightmost pole"),
     ],
 )
-def test_a_changed_certificate_is_noticed(subject, path, factor, claim):
+def test_a_changed_certificate_is_noticed(subject, path, factor, check):
     certificate = copy.deepcopy(subject.certificate)
     *parents, last = ("adjustable", *path)
     table = certificate
@@ -164,8 +164,8 @@ def test_a_changed_certificate_is_noticed(subject, path, factor, claim):
     value = np.array(table[last])
     table[last] = (np.eye(len(value)) if factor is None else factor * value).tolist()
     altered = dataclasses.replace(subject, certificate=certificate)
-    made = gathered("factor", lambda: factor_claims(altered)) + gathered("rest", lambda: adjustable_claims(altered))
-    assert any(not one.ok for one in made), claim
+    made = gathered("factor", lambda: factor_checks(altered)) + gathered("rest", lambda: adjustable_checks(altered))
+    assert any(not one.ok for one in made), check
 
 
 def test_a_wider_range_than_certified_is_refused(subject):

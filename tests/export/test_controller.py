@@ -55,7 +55,7 @@ def test_flown_in_place_of_the_blocks_it_has_the_published_fingerprint(scenario,
     digested = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "command", "actuator")
     loaded = load_scenario(scenario)
     digest = DESIGNS[loaded.design].to_parameters()["design.hash"]
-    assert as_published(fingerprint(*(flown[name] for name in digested)), loaded, digest) is True
+    assert as_published(fingerprint(np.column_stack([flown[name] for name in digested])), loaded, digest) is True
 
 
 @needs_compiler

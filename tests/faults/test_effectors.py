@@ -97,6 +97,24 @@ def test_lock_freezes_position_and_rate_and_frees_them_where_it_held():
     assert_array_equal(flown([(elevator("lock_at", position=0.1), 20)])[0][20 * SUBSTEPS :], 0.1)
 
 
+@pytest.mark.parametrize(
+    ("kind", "given"),
+    [
+        ("lock_in_place", {}),
+        ("lock_at", {"position": 0.1}),
+        ("hard_over", {"rate": 1.5}),
+        ("solid_oscillation", {"amplitude": 0.03, "frequency": 2.5}),
+    ],
+)
+def test_what_holds_the_surface_holds_the_actuator_what_cuts_it_off_does_not(kind, given):
+    deflection, states = flown([(elevator(kind, **given), 20, 40)], actuator=SECOND_ORDER)
+    stuck = slice(20 * SUBSTEPS, 40 * SUBSTEPS)
+    assert_array_equal(states[stuck, 0], deflection[stuck])
+    assert_array_equal(states[stuck, 1], 0.0)
+    _, floating = flown([(elevator("float"), 20, 40)], actuator=SECOND_ORDER)
+    assert_array_equal(floating, flown([], actuator=SECOND_ORDER)[1])
+
+
 def test_float_has_no_force_or_lies_in_the_flow():
     assert_array_equal(flown([(elevator("float"), 0)])[0], 0.0)
     assert_allclose(flown([(elevator("float", alignment=1.0), 0)])[0], -ALPHA)

@@ -118,6 +118,7 @@ def test_periodic_fault_acts_for_its_share_of_each_period():
     assert_array_equal(result, expected.astype(float))
 
 
+@pytest.mark.compiled
 def test_random_fault_comes_and_goes_as_a_markov_chain():
     fault = elevator("loss_of_effectiveness", effectiveness=0.0, random_on=0.4, random_off=1.2)
     result = flown([(fault, 5)], np.ones(40000))
@@ -148,6 +149,17 @@ def test_a_change_in_flight_leaves_the_memory_of_the_others():
         apply_command_faults(rows, memory, k, 0, np.array([0.4, command]), out)
         result.append(out[1])
     assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
+
+
+def test_of_two_faults_alike_each_keeps_its_own_memory():
+    slow = elevator("delay", steps=4)
+    rows = fault_rows([COMMAND], [(slow, 2, NEVER), (slow, 10, NEVER)], T)
+    memory = fault_memory(rows)
+    memory[0], memory[1] = 1.0, 2.0
+    later = fault_rows([COMMAND], [(slow, 10, 60)], T)
+    assert_array_equal(fault_memory(later, rows, memory)[0], 2.0)
+    other = fault_rows([COMMAND], [(elevator("delay", steps=5), 10, NEVER)], T)
+    assert_array_equal(fault_memory(other, rows, memory), fault_memory(other))
 
 
 def engine(fault, points, start=0):
@@ -186,6 +198,14 @@ def test_inlet_unstarts_outside_an_ellipse_and_restarts_well_inside_and_late_eno
     assert_array_equal(engine(rich, points)[:, 0], [1.0, 1.0, 0.0, 0.0, 1.0])
 
 
+def test_the_ellipse_of_an_inlet_has_its_centre_and_half_axes():
+    centre = {"angle_of_attack": 0.05, "angle_of_attack_reach": 0.02, "mach": 8.0, "mach_reach": 0.5}
+    fault = Fault.of("engine", "inlet_unstart_outside", centre)
+    for alpha, mach in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.5), (0.0, -0.5), (0.0141, 0.3536), (-0.0141, 0.3536)):
+        for share, thrust in ((0.99, 1.0), (1.01, 0.0)):
+            assert engine(fault, [(0.05 + share * alpha, 8.0 + share * mach, 0.3)])[0, 0] == thrust
+
+
 def valid(kind, channel):
     """Return a fault of the kind, every parameter that must be given in the middle of its range."""
     table = [p for p in kind_of(kind).parameters if p.default is None]
@@ -209,6 +229,11 @@ def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
         for parameter in (*kind.parameters, *OCCURRENCE_PARAMETERS):
             described = parameter.of(channel)
             assert described.description and described.minimum <= described.default <= described.maximum
+
+
+def test_both_elastic_modes_have_the_same_travels():
+    for state in ("elastic_coordinate", "elastic_rate"):
+        assert CHANNELS[f"{state}_1"] == CHANNELS[f"{state}_2"]
 
 
 def test_codes_are_in_the_order_of_the_table():
@@ -253,6 +278,7 @@ def test_codes_are_in_the_order_of_the_table():
             {"random_on": 1.0, "random_off": 1.0, "intermittent_period": 2.0},
             "fault.intermittent_period = 2 s: expected 0 s",
         ),
+        (ELEVATOR, "reversal", {"about_start": -0.5}, "fault.about_start = -0.5: expected double from 0 to 1"),
         ("pitch_rate", "sensor_bias", {"offset": 2.0}, "fault.offset = 2.0: expected double from -1 to 1 rad/s"),
         ("pitch", "sensor_freeze", {}, "fault.channel = 'pitch': expected one of altitude, velocity"),
     ],

@@ -210,7 +210,7 @@ def test_who_does_not_answer_is_given_up_by_name(monkeypatch: pytest.MonkeyPatch
             "hsv_ctrl",
             "tube_mpc",
             ["-p", "tube.centre:=[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]"],
-            ["design 'baseline': claim fails: tube.centre["],
+            ["design 'baseline': check fails: tube.centre["],
         ),
         long(
             "hsv_ctrl", "notch_filter", ["-p", "notch.zero_frequency:=[15.0, 20.0]"], ["notch.zero_damping", "1 values"]

@@ -14,7 +14,8 @@ from hsv.control.tube_law import TubeStatusCode
 from hsv.recording.flight import input_columns, state_columns
 from hsv.recording.reader import Bag
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import History, fly
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.history import History
 from hsv.simulation.scenario import load_scenario, scenario_text
 
 pytestmark = pytest.mark.graph
@@ -103,4 +104,4 @@ def test_a_vehicle_outside_the_certified_set_is_told(processes: Processes) -> No
     status = bag.columns("/hsv/tube_status")
     assert set(status["status"]) == {TubeStatusCode.UNCERTIFIED_VEHICLE} and status["inside"].all()
     told = processes.run("hsv", "info", processes.folder / "uncertified").stdout
-    assert "vehicle outside the set" in " ".join(told.split())
+    assert "vehicle that the design is not certified for" in " ".join(told.split())

@@ -15,7 +15,7 @@ from node_processes import Processes, children, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
 from hsv.graph.description import PLANT, RECORDER, graph
-from hsv.graph.progress import HUNG_AFTER
+from hsv.graph.standstill import HUNG_AFTER
 from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
@@ -74,8 +74,8 @@ def test_a_full_disk_loses_the_flight_by_the_recorders_name(processes: Processes
         resource.prlimit(pid, resource.RLIMIT_FSIZE, (full, resource.RLIM_INFINITY))
     output = output_of(run)
     assert run.returncode == 1
-    assert "full_0.mcap: cannot be mended: File too large" in output
-    assert "recorder ended with exit code 2. Its last words:" in output
+    assert "full_0.mcap: cannot be repaired: File too large" in output
+    assert "recorder ended with exit code 2. Last output:" in output
     assert output.count("recorder: error: ") == output.count("cannot be written: File too large") == 1
     assert [file.name for file in bag.iterdir()] == ["full_0.mcap"]
     assert recorded_steps(bag) >= ON_DISK

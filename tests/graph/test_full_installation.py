@@ -181,7 +181,7 @@ def test_another_launch_file_includes_it(processes: Processes) -> None:
 
 
 def start_to_record(processes: Processes, command: str) -> subprocess.Popen[str]:
-    """Start a printed ros2 bag record and return it once it listens."""
+    """Start a printed ros2 bag record and return it once it subscribes."""
     log = processes.folder / "record.log"
     with log.open("w") as output:
         recorder = processes.start("bash", "-c", f"exec {command}", output=output)

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.graph
 
 KILLS = int(os.environ.get("HSV_KILLS", "2"))
 PERIOD = 0.02
-LISTEN = textwrap.dedent(
+SUBSCRIBE = textwrap.dedent(
     """
     import struct, time
     import rclpy
@@ -35,7 +35,7 @@ LISTEN = textwrap.dedent(
     from rclpy.experimental import EventsExecutor
 
     rclpy.init()
-    node = rclpy.create_node("listener")
+    node = rclpy.create_node("subscriber")
 
     def heard(data):
         sec, nanosec = struct.unpack_from("<iI", data, 4)
@@ -56,7 +56,7 @@ def test_bag_opens_and_has_all_but_the_last_moment(processes: Processes, seed: i
     bag = processes.folder / "killed"
     words = processes.folder / "heard.txt"
     with words.open("w") as stream:
-        listener = processes.start(sys.executable, "-c", LISTEN, output=stream)
+        subscriber = processes.start(sys.executable, "-c", SUBSCRIBE, output=stream)
         run = processes.start("hsv", "run", short_scenario(processes.folder, duration=600, fault=3), "--bag", bag)
         last_step = chance.randrange(50, 1500)
 
@@ -68,8 +68,8 @@ def test_bag_opens_and_has_all_but_the_last_moment(processes: Processes, seed: i
         killed = time.monotonic()
         os.kill(children(run.pid)["recorder"], signal.SIGKILL)
         output = output_of(run)
-        listener.kill()
-        listener.wait()
+        subscriber.kill()
+        subscriber.wait()
     assert run.returncode == 1 and "recorder was killed by SIGKILL" in output
     assert _steps(bag) and Bag(bag).complete
     flown = [line.split() for line in words.read_text().splitlines() if len(line.split()) == 2]

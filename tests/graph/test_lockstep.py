@@ -93,7 +93,7 @@ def test_composed_equals_separate_processes_in_every_byte(shared_processes: Proc
     composed = _fly(shared_processes, short_scenario(shared_processes.folder), "composed", "--composed")
     compared = shared_processes.run("hsv", "diff", case1.path, composed.path)
     assert compared.returncode == 0, compared.stdout
-    # No "but the padding": of that, too, every byte is the same.
+    # No "except the padding": of that, too, every byte is the same.
     assert f"{251 * len(TOPICS)} messages: identical\n" in compared.stdout
 
 

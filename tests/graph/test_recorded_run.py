@@ -95,7 +95,7 @@ def test_type_hashes_are_those_of_the_running_ros(shared_processes: Processes, b
     assert running == {name: topic.type_hash for name, topic in Bag(bag).topics.items()}
 
 
-LISTEN = textwrap.dedent(
+SUBSCRIBE = textwrap.dedent(
     """
     import sys
     import rclpy
@@ -107,7 +107,7 @@ LISTEN = textwrap.dedent(
     from std_srvs.srv import Trigger
 
     rclpy.init()
-    node = rclpy.create_node("listener")
+    node = rclpy.create_node("subscriber")
     recorded = Bag(sys.argv[1])
     topics = sys.argv[2].split(",")
     heard = {topic: [] for topic in topics}
@@ -149,7 +149,7 @@ def test_player_steps_and_plays_the_recorded_bytes(shared_processes: Processes, 
     topics = ["/hsv/state", "/hsv/command"]
     words = ["--rate", "20", "--paused", "--topics", *topics]
     player = shared_processes.start("ros2", "run", "hsv_bringup", "player", bag, *words)
-    done = shared_processes.run(sys.executable, "-c", LISTEN, bag, ",".join([*topics, "/clock"]))
+    done = shared_processes.run(sys.executable, "-c", SUBSCRIBE, bag, ",".join([*topics, "/clock"]))
     assert done.returncode == 0, done.stdout
     assert "paused, played up to t = 0.040 s" in done.stdout and f"all {3 * STEPS}" in done.stdout
     assert exit_code_of(player) == 0

@@ -17,7 +17,9 @@ def test_a_line_is_read_as_it_was_written(snapshot: Snapshot) -> None:
     assert Snapshot.read(snapshot.line) == snapshot
 
 
-@pytest.mark.parametrize("line", ["step 50 of 10000", "flight diverged at t = 3.00 s", "", "[INFO] records to bags/x"])
+@pytest.mark.parametrize(
+    "line", ["step 50 of 10000", "flight diverged at t = 3.00 s", "", "[INFO] recording to bags/x"]
+)
 def test_other_lines_are_not_taken_for_one(line: str) -> None:
     assert Snapshot.read(line) is None
 

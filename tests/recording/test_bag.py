@@ -131,7 +131,7 @@ def test_the_file_itself_holds_the_metadata_for_reindexing(written: Written) -> 
 
 
 def test_custom_data_of_rosbag2_are_read(kit: SimpleNamespace, tmp_path: Path) -> None:
-    told = {"custom_data": {"pilot": "nobody"}, "ros_distro": "kilted"}
+    told = {"custom_data": {"operator": "nobody"}, "ros_distro": "kilted"}
     path = tmp_path / "bag"
     path.mkdir()
     with (path / "bag_0.mcap").open("wb") as stream:
@@ -146,7 +146,7 @@ def test_custom_data_of_rosbag2_are_read(kit: SimpleNamespace, tmp_path: Path) -
     bag = Bag(path)
     assert (bag.custom_data, bag.distro) == (told["custom_data"], "kilted")
     made = yaml.safe_load((recover(path).path / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
-    assert made["ros_distro"] == "kilted" and made["custom_data"] == {"pilot": "nobody", "recovered": "true"}
+    assert made["ros_distro"] == "kilted" and made["custom_data"] == {"operator": "nobody", "recovered": "true"}
 
 
 @pytest.mark.parametrize("encoding", ["ros2msg", "ros2idl"])
@@ -271,9 +271,9 @@ def _cut(length: int) -> Callable[[Path, SimpleNamespace], Path]:
         (_foreign, "no topic below /hsv/"),
         (_file(b""), "is empty"),
         (_file(b"SQLite format 3\0"), "not an MCAP"),
-        (_cut(8), "cut off"),
-        (_cut(20), "cut off"),
-        (_cut(60), "cut off"),
+        (_cut(8), "truncated"),
+        (_cut(20), "truncated"),
+        (_cut(60), "truncated"),
     ],
     ids=["empty directory", "missing", "foreign", "empty file", "other format", "magic only", "header", "first chunk"],
 )

@@ -170,7 +170,7 @@ def test_a_full_disk_leaves_the_bag_as_it_was(killed: tuple[Path, int]) -> None:
     path, _ = killed
     file = path / "killed_0.mcap"
     data = file.read_bytes()
-    problem = r"killed_0\.mcap: cannot be mended: File too large"
+    problem = r"killed_0\.mcap: cannot be repaired: File too large"
     with pytest.raises(RecordingError, match=problem), files_no_larger_than(len(data) // 2):
         finalise(path)
     assert list(path.iterdir()) == [file] and file.read_bytes() == data

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from bag_readers import NPM
+from waiting import wait_until
 
 AXE = NPM / "node_modules" / "axe-core" / "axe.min.js"
 """What checks pages for barriers."""
@@ -62,11 +63,11 @@ class Browser:
 
     def settle(self) -> None:
         """Wait until nothing is left to draw."""
-        for _ in range(600):
-            if self.run(SETTLED):
-                return
-            time.sleep(0.05)
-        raise AssertionError(f"the plots were not drawn: {self.console()}")
+        self.wait(SETTLED)
+
+    def wait(self, script: str) -> None:
+        """Wait until JavaScript returns something true, as long as the browser works on it."""
+        wait_until(lambda: self.run(script), [self.driver.service.process.pid], pause=lambda _: time.sleep(0.05))
 
     def run(self, script: str, *arguments: Any) -> Any:
         """Run JavaScript in the page and return its result."""

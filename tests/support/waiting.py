@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
-from hsv.graph.progress import Standstill, processor_time
+from hsv.graph.standstill import Standstill, processor_time
 
 QUIET = 60.0
 """Seconds without progress after which a test gives up."""

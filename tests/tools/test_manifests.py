@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ast
+import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from catkin_pkg.changelog import get_changelog_from_path
 from catkin_pkg.package import parse_package
 
@@ -64,15 +66,18 @@ def test_modules_without_a_key_are_named_in_the_documentation() -> None:
     assert all(f"`{module.replace('_', '-')}`" in page for module in WITHOUT_KEY)
 
 
-def test_all_packages_have_one_version_which_the_library_and_the_command_say() -> None:
+def test_all_packages_have_one_version_which_the_library_and_the_citation_say() -> None:
     versions = {parse_package(str(manifest)).version for manifest in MANIFESTS}
-    written = {
-        keyword.value.value
-        for manifest in MANIFESTS
-        for setup in manifest.parent.glob("setup.py")
-        for call in ast.walk(ast.parse(setup.read_text(encoding="utf-8")))
-        if isinstance(call, ast.Call)
-        for keyword in call.keywords
-        if keyword.arg == "version" and isinstance(keyword.value, ast.Constant)
-    }
-    assert written == versions == {hsv.__version__}
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert versions == {hsv.__version__} == {citation["version"]}
+
+
+@pytest.mark.parametrize(
+    "setup", [path for m in MANIFESTS for path in m.parent.glob("setup.py")], ids=lambda p: p.parent.name
+)
+def test_setup_takes_the_version_from_the_manifest(setup: Path, tmp_path: Path) -> None:
+    manifest = setup.with_name("package.xml").read_text(encoding="utf-8")
+    (tmp_path / "package.xml").write_text(manifest.replace(f"<version>{hsv.__version__}<", "<version>7.8.9<"))
+    (tmp_path / "setup.py").write_bytes(setup.read_bytes())
+    asked = [sys.executable, "setup.py", "--quiet", "--version"]
+    assert subprocess.run(asked, cwd=tmp_path, capture_output=True, text=True).stdout == "7.8.9\n"

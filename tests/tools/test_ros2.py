@@ -1,4 +1,4 @@
-"""The ros2 stand-in against a small installation made on the spot."""
+"""The ros2 replacement against a small installation made by the test."""
 
 import os
 import signal

@@ -9,8 +9,13 @@ from scipy.integrate import quad
 from scipy.signal import welch
 
 from hsv.errors import ParameterError
+from hsv.noise import STREAMS, normals
 from hsv.vehicle.atmosphere import (
     ATMOSPHERE_PARAMETERS,
+    DENSITY,
+    Z1,
+    Z2,
+    U,
     atmosphere_data,
     atmosphere_state,
     atmosphere_step,
@@ -60,6 +65,7 @@ def test_cross_filter_has_drydens_autocorrelation_exactly(r):
         assert C @ np.linalg.matrix_power(F, lag) @ C == pytest.approx(math.exp(-x) * (1.0 - 0.5 * x), abs=1e-12)
 
 
+@pytest.mark.compiled
 def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     r = SPEED * T / LENGTH
     for axis, law in enumerate((lambda x: math.exp(-x), lambda x: math.exp(-x) * (1.0 - 0.5 * x))):
@@ -70,6 +76,7 @@ def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     assert abs(np.mean(turbulence[0] * turbulence[1])) < 0.025
 
 
+@pytest.mark.compiled
 def test_turbulence_has_drydens_spectrum(turbulence):
     tau = LENGTH / SPEED
     laws = (
@@ -85,10 +92,53 @@ def test_turbulence_has_drydens_spectrum(turbulence):
         assert np.mean(density[inside] / expected) == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.compiled
 def test_turbulence_is_stationary_from_the_first_step():
     values = {"turbulence.sigma_forward": 1.0, "turbulence.sigma_up": 1.0}
     first = np.array([flown(values, 2, seed) for seed in range(1500)])[:, :, :2]
     assert_allclose(first.std(axis=0), 1.0, atol=0.08)
+
+
+def test_over_no_distance_turbulence_stays_what_it_is():
+    assert dryden_cross_map(0.0) == (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def states(values, steps, seed=3):
+    """Return the states of the atmosphere after every step."""
+    data = atmosphere_data(values, T)
+    state, air, found = atmosphere_state(data), np.empty(3), []
+    for k in range(steps):
+        atmosphere_step(data, state, k, seed, ALTITUDE, SPEED, air)
+        found.append((state.copy(), air.copy()))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("sigma", "length", "place", "stream", "factor"),
+    [
+        ("turbulence.sigma_forward", "turbulence.length_forward", U, "turbulence_longitudinal", 0),
+        ("density.sigma", "density.length", DENSITY, "density", 2),
+    ],
+)
+def test_a_gauss_markov_process_forgets_as_it_is_driven(sigma, length, place, stream, factor):
+    decay = math.exp(-SPEED * T / 1000.0)
+    x = normals(3, 0, STREAMS[stream])[0]
+    for k, (state, air) in enumerate(states({sigma: 0.2, length: 1000.0}, 5)):
+        if k:
+            x = decay * x + math.sqrt(1.0 - decay**2) * normals(3, k, STREAMS[stream])[0]
+        assert state[place] == pytest.approx(x, rel=1e-12)
+        assert air[factor] == pytest.approx(0.2 * x + (factor == 2), rel=1e-12)
+
+
+def test_turbulence_across_the_path_is_driven_by_two_numbers_a_step():
+    f = dryden_cross_map(SPEED * T / 400.0)
+    F, factor = np.reshape(f[:4], (2, 2)), np.array([[f[4], 0.0], [f[5], f[6]]])
+    z = np.array(normals(3, 0, STREAMS["turbulence_vertical"]))
+    for k, (state, air) in enumerate(states({"turbulence.sigma_up": 2.0, "turbulence.length_up": 400.0}, 5)):
+        if k:
+            z = F @ z + factor @ normals(3, k, STREAMS["turbulence_vertical"])
+        assert_allclose(state[[Z1, Z2]], z, rtol=1e-12)
+        assert air[1] == pytest.approx(z[0] + math.sqrt(3.0) * z[1], rel=1e-12)
 
 
 def test_turbulence_is_a_function_of_seed_and_step():
@@ -127,6 +177,7 @@ def test_wind_is_steady_and_shears_with_altitude():
     assert_allclose(flown(values, 1), [[25.0, -1.0, 1.0]])
 
 
+@pytest.mark.compiled
 def test_density_is_off_by_a_constant_and_a_gauss_markov_process():
     assert_allclose(flown({"density.offset": -0.05}, 1)[0, 2], 0.95)
     values = {"density.offset": 0.02, "density.sigma": 0.03, "density.length": 2000.0}

@@ -3,7 +3,7 @@ import published_model as published
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.vehicle.dynamics import air_relative, derivative, forces, jacobian
+from hsv.vehicle.dynamics import air_relative, derivative, forces, forces_in, jacobian
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -186,6 +186,15 @@ def test_density_acts_on_all_forces_of_the_air_but_not_on_thrust():
     conditions[2] = 1.1
     for x, u in random_points():
         assert_allclose(rates_in(conditions, x, u, p), rates(x, u, denser), rtol=1e-8, atol=1e-8)
+
+
+def test_dynamic_pressure_and_angle_of_attack_are_those_of_the_air():
+    p = load_vehicle().coupled()
+    for x, u in random_points():
+        *_, pressure, alpha = forces_in(np.array([0.1 * x[1], 0.0, 1.1, 1.0, 1.0, 1.0, 0.0]), x, u, p)
+        speed, turn, *_ = air_relative(x[1], x[3] - x[2], 0.1 * x[1], 0.0)
+        assert pressure == pytest.approx(1.1 * forces(x, u, p)[4] * (speed / x[1]) ** 2, rel=1e-12)
+        assert alpha == x[2] - turn
 
 
 def test_factors_of_the_engine_scale_their_forces():

@@ -1,9 +1,13 @@
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.errors import ParameterError, TrimError
-from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant
+from hsv.faults.schedule import ActiveFault
+from hsv.faults.table import Fault
+from hsv.vehicle.atmosphere import speed_of_sound
+from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.plant import PLANT_PARAMETERS, FlightStatus, Plant, PlantFaults
 
 DEFAULTS = {p.name: p.default for p in PLANT_PARAMETERS}
 
@@ -50,6 +54,77 @@ def test_tells_when_the_model_means_nothing_any_more():
 
 def test_input_that_is_no_number_ends_the_flight():
     assert plant().step(np.array([np.nan, 0.2])).status is FlightStatus.DIVERGED
+
+
+def test_a_change_of_faults_in_flight_leaves_the_memories_of_the_others():
+    stuck = Fault.of("elevator_deflection", "lock_in_place", {}), 0, 2**62
+    frozen = Fault.of("altitude", "sensor_freeze", {}), 0, 2**62
+    unstart = Fault.of("engine", "inlet_unstart_outside", {}), 0, 2**62
+    before = PlantFaults.of([stuck, frozen, unstart], 0.02)
+    for number, memory in enumerate((before.effector_memory, before.engine_memory, before.sensor_memory), 1):
+        assert len(memory) == 1
+        memory[:] = number
+    added = [(Fault.of(channel, kind, given), 5, 2**62) for channel, kind, given in ADDED]
+    after = PlantFaults.of([*added, stuck, frozen, unstart], 0.02, before)
+    for number, memory in enumerate((after.effector_memory, after.engine_memory, after.sensor_memory), 1):
+        assert len(memory) == 2
+        assert np.count_nonzero(np.all(memory == number, axis=1)) == 1
+
+
+ADDED = [
+    ("elevator_deflection", "bias", {"offset": 0.1}),
+    ("engine", "thrust_loss", {"share": 0.5}),
+    ("velocity", "sensor_freeze", {}),
+]
+
+
+def test_statuses_are_those_of_the_message():
+    assert [FlightStatus.RUNNING, FlightStatus.FINISHED, FlightStatus.DIVERGED] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("equipment", [{}, {"sensors__set": "ghv"}])
+def test_sensors_do_not_move_the_vehicle(equipment):
+    bench = plant(**equipment)
+    x, work = bench.initial.state.copy(), workspace()
+    for share in (1.0, 1.02, 0.97):
+        held = share * bench.initial.input
+        advance(x, held, bench.vehicle, 0.02, 2, work)
+        assert_array_equal(bench.step(held).state, x)
+
+
+def test_the_vehicle_flies_in_the_wind_and_density_of_its_atmosphere():
+    bench = plant(wind__forward=20.0, wind__up=-3.0, density__offset=0.05)
+    x, held = bench.initial.state.copy(), bench.initial.input
+    for _ in range(3):
+        advance(x, held, bench.vehicle, 0.02, 2, workspace(), np.array([20.0, -3.0, 1.05, 1.0, 1.0, 1.0, 0.0]))
+        result = bench.step(held)
+        assert_allclose(result.state, x, rtol=1e-14)
+        assert_allclose(result.air, [20.0, -3.0, 1.05])
+
+
+@pytest.mark.parametrize(("wind", "speed"), [({}, 0.0), ({"wind__up": 40.0}, 0.0), ({"wind__forward": 100.0}, 100.0)])
+def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(wind, speed):
+    bench = plant(**wind)
+    state = bench.initial.state
+    velocity = state[1] - speed
+    alpha, mach = state[2] + wind.get("wind__up", 0.0) / velocity, velocity / speed_of_sound(state[0])
+    for off_alpha, off_mach, started in ((0.0, 0.0, True), (2e-3, 0.0, False), (0.0, 0.02, False)):
+        region = {"angle_of_attack": alpha + off_alpha, "angle_of_attack_reach": 1e-3}
+        region |= {"mach": mach + off_mach, "mach_reach": 0.01}
+        fault = Fault.of("engine", "inlet_unstart_outside", region)
+        bench.reset()
+        result = bench.step(bench.initial.input, (ActiveFault(fault, 0),))
+        assert (result.forces[2] > 0.0) == started
+
+
+def test_with_actuators_too_a_flight_begins_at_rest():
+    bench = plant(actuator__elevator_deflection__set="elevator_50")
+    held = bench.initial.input
+    for _ in range(2):
+        assert_allclose(bench.step(held).state, bench.initial.state, rtol=1e-9, atol=1e-9)
+        assert_array_equal(bench.step(held).effector, held)
+        bench.step(0.9 * held)
+        bench.reset()
 
 
 def test_result_is_a_copy():

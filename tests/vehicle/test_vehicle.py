@@ -223,7 +223,8 @@ def test_a_package_registers_its_files_and_is_not_imported(tmp_path, monkeypatch
     (package / "glider.toml").write_text('extends = "stiffened"\n[rigid_body]\nmass = { value = "4000 kg" }\n')
     (info / "METADATA").write_text("Name: my_vehicles\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(
-        "[hsv.vehicles]\nglider = my_vehicles:glider.toml\ngone = nowhere_at_all:gone.toml\n"
+        "[hsv.vehicles]\nzeppelin = nowhere_at_all:zeppelin.toml\n"
+        "glider = my_vehicles:glider.toml\ngone = nowhere_at_all:gone.toml\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     assert {"glider", "gone"} < set(vehicle_names())

@@ -1,4 +1,4 @@
-"""What the machine has to bring; everything that is missing is named at once."""
+"""Requirements on the machine; everything that is missing is named at once."""
 
 from __future__ import annotations
 

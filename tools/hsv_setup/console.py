@@ -1,4 +1,4 @@
-"""What a person sees: one line a stage with its time; everything else goes to a log file."""
+"""Output for the user: one line per stage with its duration; everything else goes to a log file."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def _numpy_include(env: Mapping[str, str]) -> str:
 
 
 def _install_ros2_command() -> None:
-    """Put the `ros2` stand-in on the environment's PATH.
+    """Put the `ros2` replacement on the environment's PATH.
 
     It is started through a shell script because a #! line allows no spaces in a path, and without site-packages (-S)
     because it needs none and starts twice as fast.

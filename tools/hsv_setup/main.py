@@ -31,7 +31,7 @@ def main(arguments: Sequence[str]) -> int:
         print(f"\nmake setup: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("\nmake setup: interrupted; run it again and it goes on from the last finished stage", file=sys.stderr)
+        print("\nmake setup: interrupted; run it again to continue from the last finished stage", file=sys.stderr)
         return _INTERRUPTED
     return 0
 

@@ -1,4 +1,4 @@
-"""Where things are in the checkout, and how contents are fingerprinted."""
+"""Paths in the checkout, and digests of their contents."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ VENV = ROOT / ".venv"
 WORKSPACE = ROOT / "ros_ws"
 BUILD, INSTALL, LOG = WORKSPACE / "build", WORKSPACE / "install", WORKSPACE / "log"
 STAMPS = VENV / "hsv-setup"
-"""What each stage was last completed for; env.sh reads "environment" here."""
+"""Digests for which each stage was last completed; env.sh reads "environment" here."""
 
 
 def fingerprint(*parts: str | bytes) -> str:

@@ -13,7 +13,7 @@ _BUILDER = r"/opt/python/cp3\d+-cp3\d+"
 
 
 def relocate(prefix: Path, python_include: str, numpy_include: str) -> int:
-    """Rewrite all files below an installation prefix; doing it again changes nothing.
+    """Rewrite all files below an installation prefix; repeating it changes nothing.
 
     Args:
         prefix: The virtual environment, which is the ament prefix.

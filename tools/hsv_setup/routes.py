@@ -36,7 +36,7 @@ _NEVER_INHERITED = (
 
 @dataclass(frozen=True)
 class Route:
-    """How ROS gets onto the machine, and what the set-up has to do for it."""
+    """Source of ROS on the machine, and what the set-up has to do for it."""
 
     name: str
     requirements: tuple[str, ...]

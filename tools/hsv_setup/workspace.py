@@ -25,7 +25,7 @@ _COPIED = ("package.xml", "setup.py", "setup.cfg")
 # Generated code is compiled against these.
 _BINARY_INTERFACE = ("ros-", "numpy=")
 _JOBS_AT_MOST = 8
-_MADE = ("__pycache__", ".egg-info")
+_MADE = ("__pycache__", ".egg-info", "build")
 _COLCON = "import sys; from colcon_core.command import main; sys.argv[0] = 'colcon'; sys.exit(main())"
 
 

@@ -136,6 +136,6 @@ def pad(rigid):
 
 def problem_at(design, model, altitude, velocity):
     S = np.empty(N_STATES * (N_STATES + 2))
-    schedule(design.polytope.data(), altitude, velocity, S)
+    schedule(design.polytope.data(), altitude, velocity, np.empty(len(design.polytope.A)), S)
     A, B = np.split(S.reshape(N_STATES, -1), [N_STATES], axis=1)
     return error_system(A[None], B[None], design.feedback_gain, model.notch, model.columns)

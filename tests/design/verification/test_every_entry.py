@@ -38,7 +38,7 @@ ARRAYS = {
     "input.minimum": (lambda design: design.input_minimum, "inputs"),
     "input.maximum": (lambda design: design.input_maximum, "inputs"),
 }
-"""Every array of a design, and the part of the claims that has to notice a change of it."""
+"""Every array of a design, and the part of the checks that has to notice a change of it."""
 
 NUMBERS = ("period", "notch.zero_frequency", "notch.zero_damping", "notch.pole_frequency", "notch.pole_damping")
 
@@ -54,7 +54,7 @@ def shipped(request):
 def missed(subject, name, sample=None):
     """Return the entries of an array whose change by ten times their tolerance is not noticed, one after the other."""
     values, part = ARRAYS[name]
-    array, claims = values(subject.design), (QUICK | RECOMPUTED)[part]
+    array, checks = values(subject.design), (QUICK | RECOMPUTED)[part]
     size = np.broadcast_to(entry_size(name, subject.certificate), array.shape)
     step = 10.0 * TOLERANCES[PARAMETERS[name]].allowed(array, size)
     draw = np.random.default_rng(SEED)
@@ -67,8 +67,8 @@ def missed(subject, name, sample=None):
         original = array[entry]
         array[entry] += step[entry]
         try:
-            # Claims are recomputed one by one, up to the first that fails.
-            if all(claim.ok for claim in claims(subject)):
+            # Checks are recomputed one by one, up to the first that fails.
+            if all(check.ok for check in checks(subject)):
                 found.append(tuple(map(int, entry)))
         except DesignError:
             pass  # a recomputation that breaks down is a refusal too
@@ -88,7 +88,7 @@ def test_the_walk_and_the_table_know_every_number(shipped):
 
 def test_ten_times_the_tolerance_of_an_entry_is_noticed(shipped):
     for part in (QUICK | RECOMPUTED).values():
-        assert [claim.name for claim in part(shipped) if not claim.ok] == []
+        assert [check.name for check in part(shipped) if not check.ok] == []
     assert {name: entries for name in carried(shipped) if (entries := missed(shipped, name, SAMPLE))} == {}
 
 
@@ -104,7 +104,7 @@ def test_period_and_notch_are_held_to_their_tolerance(shipped, name):
     values = shipped.design.to_parameters()
     changed = np.array(values[name]) + 10.0 * TOLERANCES[PARAMETERS[name]].allowed(np.array(values[name]))
     design = ControlDesign.from_parameters(values | {name: changed.tolist()})
-    assert not all(claim.ok for claim in QUICK["inputs"](dataclasses.replace(shipped, design=design)))
+    assert not all(check.ok for check in QUICK["inputs"](dataclasses.replace(shipped, design=design)))
 
 
 def test_the_least_entries_are_held_to_the_size_of_their_coordinates(shipped):
@@ -112,5 +112,5 @@ def test_the_least_entries_are_held_to_the_size_of_their_coordinates(shipped):
     A = shipped.design.polytope.A
     original = A[2, 4, 5]
     A[2, 4, 5] = 1.5e-17
-    assert all(claim.ok for claim in RECOMPUTED["polytopic model"](shipped))
+    assert all(check.ok for check in RECOMPUTED["polytopic model"](shipped))
     A[2, 4, 5] = original

@@ -38,7 +38,7 @@ def test_a_design_that_was_tuned_a_little_flies_with_a_warning(shipped):
 
 
 @pytest.mark.parametrize(
-    ("name", "index", "factor", "claim"),
+    ("name", "index", "factor", "check"),
     [
         # Stable at every vertex still, but no longer with the certified Lyapunov function.
         ("feedback.gain", 13, 0.7, r"\(24\)"),
@@ -48,8 +48,8 @@ def test_a_design_that_was_tuned_a_little_flies_with_a_warning(shipped):
         ("tube.half_width", 2, 0.99, r"tube\.half_width from Q\[2\]"),
     ],
 )
-def test_a_design_without_its_stability_or_its_set_is_refused(shipped, name, index, factor, claim):
-    with pytest.raises(DesignError, match=rf"design 'baseline': claim fails: .*{claim}"):
+def test_a_design_without_its_stability_or_its_set_is_refused(shipped, name, index, factor, check):
+    with pytest.raises(DesignError, match=rf"design 'baseline': check fails: .*{check}"):
         preflight(with_entry(shipped, name, index, factor))
 
 
@@ -64,7 +64,7 @@ def test_a_set_that_is_not_invariant_is_refused(shipped, tmp_path):
         "tube.shape": (np.array(shipped["tube.shape"]) / 0.9).tolist(),
         "tube.half_width": described["half_width"],
     }
-    with pytest.raises(DesignError, match="claim fails: invariance, smallest eigenvalue over the vertices"):
+    with pytest.raises(DesignError, match="check fails: invariance, smallest eigenvalue over the vertices"):
         preflight(ControlDesign.from_parameters(values), str(tmp_path / "small.json"))
 
 

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hsv.design.verification.claims import same
+from hsv.design.verification.checks import same
 from hsv.design.verification.tolerances import TOLERANCES, page
 
 PAGE = Path(__file__).parents[3] / "docs" / "tolerances.md"
@@ -24,8 +24,8 @@ def test_a_difference_is_held_to_the_larger_of_two_bounds():
     for entry in range(3):
         outside = expected.copy()
         outside[entry] += 1.01 * allowed[entry]
-        claim = same("x", outside, expected, "model.a", size)
-        assert not claim.ok and claim.name == f"x[{entry}]"
+        check = same("x", outside, expected, "model.a", size)
+        assert not check.ok and check.name == f"x[{entry}]"
 
 
 def test_what_is_no_number_or_of_another_shape_fails():

@@ -6,13 +6,13 @@ import pytest
 
 from hsv.control.design import ControlDesign
 from hsv.design.certificate import read_certificate, write_certificate
-from hsv.design.verification.claims import require
+from hsv.design.verification.checks import require
 from hsv.design.verification.verifier import verify
 from hsv.errors import DesignError
 
 
-def failures(claims):
-    return [claim.name for made in claims.values() for claim in made if not claim.ok]
+def failures(checks):
+    return [check.name for made in checks.values() for check in made if not check.ok]
 
 
 def changed(values, name, index):
@@ -24,7 +24,7 @@ def test_the_shipped_design_passes_quickly(subject):
 
 
 @pytest.mark.parametrize(
-    ("path", "claim"),
+    ("path", "check"),
     [
         (("feedback", "M"), "feedback.gain = M N^-1"),
         (("feedback", "N"), "feedback.gain = M N^-1"),
@@ -34,7 +34,7 @@ def test_the_shipped_design_passes_quickly(subject):
         (("tube", "tightening", "upper"), "tightened bounds, upper"),
     ],
 )
-def test_a_changed_certificate_is_caught(subject, path, claim):
+def test_a_changed_certificate_is_caught(subject, path, check):
     certificate = copy.deepcopy(subject.certificate)
     place = certificate
     for key in path:
@@ -44,22 +44,22 @@ def test_a_changed_certificate_is_caught(subject, path, claim):
     else:
         place[1] *= 1.01
     names = failures(verify(dataclasses.replace(subject, certificate=certificate), quick=True))
-    assert any(name.startswith(claim) for name in names)
+    assert any(name.startswith(check) for name in names)
 
 
 def test_the_first_failing_claim_is_named(subject):
     values = subject.design.to_parameters()
     design = ControlDesign.from_parameters(changed(values, "feedback.gain", 2))
-    claims = verify(dataclasses.replace(subject, design=design), quick=True)
-    with pytest.raises(DesignError, match=r"claim fails: feedback\.gain = M N\^-1\[0, 2\]"):
-        require(claim for made in claims.values() for claim in made)
+    checks = verify(dataclasses.replace(subject, design=design), quick=True)
+    with pytest.raises(DesignError, match=r"check fails: feedback\.gain = M N\^-1\[0, 2\]"):
+        require(check for made in checks.values() for check in made)
 
 
 def test_a_certificate_without_a_field_says_which(subject):
     certificate = copy.deepcopy(subject.certificate)
     del certificate["tube"]["invariant_set"]["Q"]
-    claims = verify(dataclasses.replace(subject, certificate=certificate), quick=True)
-    assert [claim.value for claim in claims["invariant set"] if not claim.ok] == ["no field 'Q'"]
+    checks = verify(dataclasses.replace(subject, certificate=certificate), quick=True)
+    assert [check.value for check in checks["invariant set"] if not check.ok] == ["no field 'Q'"]
 
 
 def test_certificates_are_reproducible_bytes(subject, tmp_path):

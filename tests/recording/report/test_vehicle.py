@@ -1,7 +1,6 @@
 """The side view of the report as a browser shows it: the recorded state, with the shape and signs of the vehicle."""
 
 import math
-import time
 
 import numpy as np
 import pytest
@@ -26,17 +25,8 @@ def page(quiet, tmp_path_factory):
 def opened(browser, page):
     browser.open(page)
     browser.run("document.getElementById('vehicle').scrollIntoView()")
-    wait(browser, "report.player.views")
+    browser.wait("return Boolean(report.player.views)")
     return browser
-
-
-def wait(browser, script):
-    """Wait until a script is true, for as long as a busy machine takes to paint."""
-    for _ in range(600):
-        if browser.run(f"return Boolean({script})"):
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"never true: {script}")
 
 
 def shown(browser, at, exaggeration=40):
@@ -147,12 +137,12 @@ def test_faults_are_marked_on_the_time_line_and_told_while_they_act(opened):
 def test_it_plays_at_the_speed_chosen_and_stops_at_the_end(opened):
     shown(opened, 0.0)
     opened.run("document.querySelector('[name=speed]').value = '20'; document.querySelector('[name=play]').click()")
-    wait(opened, "report.player.time > 5")
+    opened.wait("return report.player.time > 5")
     opened.run("document.querySelector('[name=play]').click()")
     paused = opened.run("return report.player.time")
     assert opened.run("return [report.player.playing, report.player.time]") == [False, paused]
     opened.run("document.querySelector('[name=play]').click()")
-    wait(opened, "!report.player.playing")
+    opened.wait("return !report.player.playing")
     assert opened.run("return report.player.time") == 20.0
     assert opened.console() == []
 
@@ -163,7 +153,7 @@ def test_keys_move_the_time_and_play(opened):
     slider.send_keys("\ue014")  # arrow to the right
     assert opened.run("return report.player.time") == pytest.approx(4.02)
     slider.send_keys(" ")
-    wait(opened, "report.player.playing && report.player.time > 4.1")
+    opened.wait("return report.player.playing && report.player.time > 4.1")
     slider.send_keys(" ")
     assert not opened.run("return report.player.playing")
 
@@ -176,7 +166,7 @@ def test_who_wants_little_motion_gets_two_pictures_a_second(opened):
         report.player.draw = function () { window.drawn++; draw.call(this); };
     """
     opened.run(f"{count} report.player.show(0); document.querySelector('[name=play]').click()")
-    wait(opened, "report.player.time > 2")
+    opened.wait("return report.player.time > 2")
     drawn, at = opened.run("return [window.drawn, report.player.time]")
     opened.media(features=[])
     assert drawn <= 2 * at + 3

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from hsv.graph import progress
-from hsv.graph.progress import Standstill, processor_time, processor_time_of
+from hsv.graph import standstill as module
+from hsv.graph.standstill import Standstill, processor_time, processor_time_of
 
 
 def test_time_counts_while_nothing_changes_and_a_gap_between_looks_little(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
-    monkeypatch.setattr(progress.time, "monotonic", lambda: now)
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
     standstill = Standstill()
     assert standstill.look("a") == 0.0
     for expected in (0.5, 1.0, 1.5):

@@ -1,0 +1,136 @@
+"""Controllers of one's own, in Python and compiled: their answers are checked and limited, their states are theirs."""
+
+import ctypes
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from hsv.control.controller import (
+    CONTROLLER_INPUTS,
+    STEP_FUNCTION,
+    ControllerInput,
+    ElsewhereController,
+    ForeignController,
+    StepKernel,
+    flat_input,
+)
+from hsv.errors import ControllerError, ParameterError
+from hsv.vehicle.vehicle import load_vehicle
+
+VEHICLE = load_vehicle().decoupled
+LOW, HIGH = VEHICLE.input_minimum, VEHICLE.input_maximum
+NUMBERS = np.arange(34.0)
+INPUTS = ControllerInput(
+    7, *(part[0] if len(part) == 1 else part for part in np.split(NUMBERS, [9, 10, 19, 21, 30, 32]))
+)
+
+
+class Counting:
+    """Answers how often it was stepped since its reset, and something else."""
+
+    def __init__(self, elevator):
+        self.elevator = elevator
+        self.count = 0
+
+    def reset(self):
+        self.count = 0
+
+    def step(self, inputs):
+        self.count += 1
+        return 0.1 * self.count, self.elevator
+
+
+@STEP_FUNCTION
+def counting(k, given, out, state, parameters):
+    """The same compiled: the elevator is the parameter times the last of the inputs."""
+    count, answer = (ctypes.cast(a, ctypes.POINTER(ctypes.c_double)) for a in (state, out))
+    if k < 0:
+        return 3
+    count[0] += 1.0
+    answer[0] = 0.1 * count[0]
+    answer[1] = (
+        ctypes.cast(parameters, ctypes.POINTER(ctypes.c_double))[0]
+        * ctypes.cast(given, ctypes.POINTER(ctypes.c_double))[33]
+    )
+    return 0
+
+
+class Compiled:
+    kernel = StepKernel(ctypes.cast(counting, ctypes.c_void_p).value, np.zeros(1), np.array([0.002]))
+
+
+@pytest.mark.parametrize(("own", "elevator"), [(Counting(0.066), 0.066), (Compiled(), 0.066)])
+def test_it_is_stepped_copied_and_reset(own, elevator):
+    controller = ForeignController("own", own, VEHICLE)
+    first = controller.step(INPUTS)
+    np.testing.assert_allclose(first.input, [0.1, elevator], rtol=1e-15)
+    other = controller.copied()
+    assert [controller.step(INPUTS).input[0] for _ in range(3)] == pytest.approx([0.2, 0.3, 0.4])
+    assert other.step(INPUTS).input[0] == pytest.approx(0.2)
+    controller.reset()
+    assert controller.step(INPUTS).input[0] == pytest.approx(0.1)
+    assert other.step(INPUTS).input[0] == pytest.approx(0.3)
+
+
+def test_what_it_wants_is_limited():
+    for wanted in (-5.0, 5.0):
+        result = ForeignController("own", Counting(wanted), VEHICLE).step(INPUTS)
+        assert result.input[1] == (HIGH[1] if wanted > 0.0 else LOW[1])
+        assert_array_equal(result.u_unsaturated, [0.1, wanted])
+        assert_array_equal(result.saturated, [False, True])
+
+
+class Answering:
+    def __init__(self, answer):
+        self.answer = answer
+
+    def reset(self):
+        self.step(None)
+
+    def step(self, inputs):
+        if isinstance(self.answer, BaseException):
+            raise self.answer
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        ((0.1, float("nan")), r"^own, step 7: .*answered \[0\.1, nan\]"),
+        ((float("inf"), 0.1), r"^own, step 7: .*answered \[inf, 0\.1\]"),
+        ((0.1,), r"^own, step 7: .*answered \(0\.1,\)"),
+        ((0.1, 0.2, 0.3), r"^own, step 7: .*answered \(0\.1, 0\.2, 0\.3\)"),
+        (None, r"^own, step 7: .*answered None"),
+        (("a", "b"), r"^own, step 7: .*answered \('a', 'b'\)"),
+        (ValueError("two\nlines"), r"^own, step 7: ValueError: two lines$"),
+        (SystemExit("bye"), r"^own, step 7: SystemExit: bye$"),
+    ],
+)
+def test_what_is_no_answer_is_an_error_with_its_step(answer, message):
+    controller = ForeignController("own", Answering(answer), VEHICLE)
+    with pytest.raises(ControllerError, match=message):
+        controller.step(INPUTS)
+    if isinstance(answer, BaseException):
+        with pytest.raises(ControllerError, match=r"^own, reset: "):
+            controller.reset()
+
+
+def test_a_compiled_controller_that_returns_another_code_ends_the_flight():
+    controller = ForeignController("own", Compiled(), VEHICLE)
+    with pytest.raises(ControllerError, match=r"^own, step -1: RunError: returned 3$"):
+        controller.step(INPUTS._replace(step=-1))
+
+
+def test_inputs_are_in_the_order_in_which_they_are_declared():
+    flat = flat_input(INPUTS)
+    assert_array_equal(flat, NUMBERS)
+    assert [signal.size for signal in CONTROLLER_INPUTS[:-1]] == [9, 1, 9, 2, 9, 2]
+
+
+def test_a_node_of_its_own_is_not_stepped_here():
+    controller = ElsewhereController("node")
+    controller.reset()
+    for use in (lambda: controller.step(INPUTS), lambda: controller.kernel):
+        with pytest.raises(ParameterError, match="controller = 'node': a node of its own, expected hsv run to fly it"):
+            use()
