@@ -6,9 +6,9 @@ from numpy.testing import assert_allclose
 
 from hsv.control import governor
 from hsv.control.design_file import find_design, read_design
-from hsv.control.governor import KEPT_FREE, Governor, InputBounds, Leg, legs_of
-from hsv.control.nominal_trajectory import nominal_data
-from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.control.governor import AT_REST, KEPT_FREE, Beginning, CommandGovernor, Governor, InputBounds, Leg, legs_of
+from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
+from hsv.control.reference_trajectory import Corner, ReferenceTrajectory
 from hsv.errors import GovernorError
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
@@ -44,9 +44,14 @@ def short_step():
 
 def problem(length, minimum=NARROW["minimum"], maximum=NARROW["maximum"], rate=(np.inf, np.inf), target=NEAR):
     """What is wrong with a ramp to a point near the start, of so many periods."""
-    half = round(SHORT_BLEND / PERIOD)
     governor = Governor(nominal_data(DESIGN), VEHICLE, PERIOD, InputBounds(minimum, maximum, np.array(rate)))
-    return governor._problem([(half, *START), (half + length, *target)], half)
+    corners = (SHORT_BLEND, *START), (SHORT_BLEND + length * PERIOD, *target)
+    return governor._problem([Corner(*corner, SHORT_BLEND) for corner in corners], AT_REST)
+
+
+def column(found, name):
+    """Of all corners of a reference, the time, altitude, velocity or blend."""
+    return tuple(getattr(corner, name) for corner in found.corners)
 
 
 def test_legs_are_what_the_commands_ask_for():
@@ -74,8 +79,8 @@ def test_what_is_wrong_with_a_plan_is_told():
 
 @pytest.mark.compiled
 def test_a_step_becomes_the_shortest_ramp_whose_plan_is_inside_the_tightened_inputs(step):
-    assert step.times[0] == step.blend == BLEND
-    assert (step.altitudes, step.velocities) == tuple(zip(START, TARGET, strict=True))
+    assert column(step, "time")[0] == step.blend == BLEND
+    assert (column(step, "altitude"), column(step, "velocity")) == tuple(zip(START, TARGET, strict=True))
     room = np.minimum(step.plan.min(axis=0) - LOW, HIGH - step.plan.max(axis=0)) / (HIGH - LOW)
     # Nothing but the share that is kept free, and what a period's length changes.
     assert KEPT_FREE <= room.min() < KEPT_FREE + 5e-4
@@ -88,10 +93,11 @@ def test_less_room_makes_it_slower_and_more_faster(step):
 
 
 def test_the_shortest_ramp_is_found_to_the_period(short_step):
-    assert short_step.times[0] == short_step.blend == SHORT_BLEND
-    assert (short_step.altitudes, short_step.velocities) == tuple(zip(START, NEAR, strict=True))
-    assert short_step.end == short_step.times[-1] + SHORT_BLEND
-    periods = round((short_step.times[-1] - short_step.times[0]) / PERIOD)
+    assert column(short_step, "time")[0] == short_step.blend == SHORT_BLEND
+    assert (column(short_step, "altitude"), column(short_step, "velocity")) == tuple(zip(START, NEAR, strict=True))
+    assert short_step.end == column(short_step, "time")[-1] + SHORT_BLEND
+    first, last = column(short_step, "time")
+    periods = round((last - first) / PERIOD)
     assert periods > 10
     assert problem(periods) == ""
     assert problem(periods - 1).startswith("the plan needs elevator_deflection from ")
@@ -100,10 +106,10 @@ def test_the_shortest_ramp_is_found_to_the_period(short_step):
 def test_legs_that_fit_begin_when_they_are_asked_for_or_when_the_one_before_is_done():
     legs = (Leg(0.5, 1.5, *NEAR), Leg(0.6, 1.5, *START), Leg(4.0, 1.5, *NEAR))
     found = govern(*legs, blend=SHORT_BLEND, **NARROW)
-    assert found.times == (0.2, 0.7, 2.2, 3.7, 4.2, 5.7)
+    assert column(found, "time") == (0.2, 0.7, 2.2, 3.7, 4.2, 5.7)
     assert found.end == pytest.approx(5.9)
-    assert found.altitudes == (START[0], START[0], NEAR[0], START[0], START[0], NEAR[0])
-    assert found.velocities == (START[1], START[1], NEAR[1], START[1], START[1], NEAR[1])
+    assert column(found, "altitude") == (START[0], START[0], NEAR[0], START[0], START[0], NEAR[0])
+    assert column(found, "velocity") == (START[1], START[1], NEAR[1], START[1], START[1], NEAR[1])
 
 
 def test_a_leg_for_which_nothing_fits_is_refused(monkeypatch):
@@ -125,7 +131,8 @@ def test_the_plan_is_that_of_the_reference_it_returns(step):
 
 
 def check_plan(step):
-    reference = ReferenceTrajectory(step.times, step.altitudes, step.velocities, PERIOD, VEHICLE, blend=step.blend).data
+    times, altitudes, velocities, blends = zip(*step.corners, strict=True)
+    reference = ReferenceTrajectory(times, altitudes, velocities, PERIOD, VEHICLE, blend=blends).data
     rows = np.clip(np.arange(len(step.plan)) - reference.first, 0, len(reference.state) - 1)
     assert np.all(step.deviation[0] == 0.0)
     # Step by step, because without its feedback the vehicle is unstable.
@@ -138,19 +145,20 @@ def check_plan(step):
 @pytest.mark.compiled
 def test_a_ramp_is_never_faster_than_it_was_asked_for(step):
     slow = govern(Leg(20.0, 60.0, *TARGET))
-    assert slow.times == (BLEND, 20.0 + BLEND, 80.0 + BLEND)
+    assert column(slow, "time") == (BLEND, 20.0 + BLEND, 80.0 + BLEND)
     fast = govern(Leg(20.0, 5.0, *TARGET))
-    assert fast.times[-1] - fast.times[-2] == pytest.approx(step.times[-1] - step.times[-2], abs=2 * PERIOD)
+    *_, begin, end = column(fast, "time")
+    assert end - begin == pytest.approx(np.ptp(column(step, "time")), abs=2 * PERIOD)
 
 
 @pytest.mark.compiled
 def test_a_leg_begins_when_it_is_asked_for_or_when_the_one_before_is_done(step):
     soon = govern(Leg(0.0, 0.0, *TARGET), Leg(10.0, 0.0, *START))
     late = govern(Leg(0.0, 0.0, *TARGET), Leg(100.0, 0.0, *START))
-    assert soon.times[:2] == late.times[:2] == step.times
-    assert len(soon.times) == 3
-    assert late.times[2] == 100.0 + BLEND
-    assert late.altitudes == (START[0], TARGET[0], TARGET[0], START[0])
+    assert column(soon, "time")[:2] == column(late, "time")[:2] == column(step, "time")
+    assert len(column(soon, "time")) == 3
+    assert column(late, "time")[2] == 100.0 + BLEND
+    assert column(late, "altitude") == (START[0], TARGET[0], TARGET[0], START[0])
 
 
 @pytest.mark.compiled
@@ -179,3 +187,80 @@ def test_no_command_and_no_blend_are_refused():
         govern()
     with pytest.raises(GovernorError, match="blend = 0 s: expected above 0"):
         govern(Leg(0.0, 0.0, *TARGET), blend=0.0)
+
+
+IN_FLIGHT = 100
+"""Step at which a command comes."""
+SHARP = [Corner(0.0, *START, 0.0), Corner(1.0, *START, 0.0), Corner(1.0, *NEAR, 0.0), Corner(4.0, *START, 0.0)]
+"""A step, and an unblended ramp that is not yet flown."""
+
+
+def test_what_is_flown_stays_as_it_is_when_a_leg_is_added():
+    governor = Governor(nominal_data(DESIGN), VEHICLE, PERIOD, InputBounds(*NARROW.values(), np.full(2, np.inf)))
+    deviation = np.array([0.5, 0.01, *np.zeros(7)])
+    for known in ([Corner(0.0, *START, 0.0)], SHARP):
+        found, first = governor.continued(known, Leg(0.0, 1.5, *NEAR), SHORT_BLEND, Beginning(IN_FLIGHT, deviation))
+        # It turns with the step that is flown next, or where the last corner before it is over.
+        assert first == (IN_FLIGHT if len(known) == 1 else 200 + 1 - 10)
+        assert list(found.corners[: len(known)]) == known
+        assert found.end == pytest.approx((first + 10) * PERIOD + 1.5 + SHORT_BLEND)
+        assert found.corners[-1][1:] == (*NEAR, SHORT_BLEND)
+        assert np.array_equal(found.deviation[0], deviation)
+        before, after = (governor.trajectory(corners) for corners in (known, found.corners))
+        rows = [trajectory.rows(500) for trajectory in (before, after)]
+        for one, other in zip(before.data[1:], after.data[1:], strict=True):
+            assert np.array_equal(one[rows[0]][:first], other[rows[1]][:first])
+            assert not np.array_equal(one[rows[0]][first : first + 2], other[rows[1]][first : first + 2])
+
+
+def flying(values=None, design=DESIGN, steps=IN_FLIGHT):
+    """A nominal trajectory in level flight at the start after so many steps, and the governor of its commands."""
+    reference = ReferenceTrajectory([0.0], *([value] for value in START), PERIOD, VEHICLE)
+    trajectory = NominalTrajectory(design, reference)
+    for _ in range(steps):
+        trajectory.step(reference.final_state)
+    return trajectory, CommandGovernor.from_parameters(values or {}, design, trajectory)
+
+
+def test_a_command_in_flight_is_flown_and_forgotten_with_the_run():
+    trajectory, governor = flying()
+    planned = trajectory.reference
+    first, end = governor.command(*NEAR, duration=1.5, blend=SHORT_BLEND)
+    assert (first, end) == (IN_FLIGHT, pytest.approx((IN_FLIGHT + 10) * PERIOD + 1.5 + SHORT_BLEND))
+    flown = [trajectory.step(planned.final_state).reference[:2] for _ in range(120)]
+    assert np.array_equal(flown[0], START) and np.array_equal(flown[-1], NEAR)
+    next_first, _ = governor.command(*START, duration=1.5, blend=SHORT_BLEND)
+    assert next_first == IN_FLIGHT + 120
+    trajectory.reset()
+    assert trajectory.reference is planned and trajectory.next_step == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        ((60960.0, 2450.0), r"altitude = 60960 m: expected 25908 to 26365\.2 m"),
+        ((26100.0, np.nan), r"velocity = nan m/s: expected 2346\.96 to 2529\.84 m/s"),
+        ((26100.0, 2450.0, -1.0), r"duration = -1 s: expected 0 to 600 s"),
+        ((26100.0, 2450.0, 0.0, np.inf), r"blend = inf s: expected 0 to 600 s"),
+        (START, r"altitude = 26060\.4 m, velocity = 2407\.92 m/s: expected another point than the command before"),
+    ],
+)
+def test_a_wrong_command_changes_nothing(words, why):
+    trajectory, governor = flying(steps=1)
+    planned = trajectory.reference
+    with pytest.raises(GovernorError, match=why):
+        governor.command(*words)
+    assert trajectory.reference is planned
+
+
+def test_only_a_certified_plan_in_flight_can_be_commanded():
+    trajectory, governor = flying(steps=0)
+    with pytest.raises(GovernorError, match=r"no step is flown yet: expected a command in flight"):
+        governor.command(*NEAR)
+    for values, design, why in (
+        ({}, None, r"design = 'none': expected one that has tightened inputs"),
+        ({"nominal.law": "qp"}, DESIGN, r"nominal\.law = 'qp': expected 'family'"),
+        ({"reference.trim": "static"}, DESIGN, r"reference\.trim = 'static': expected 'climbing'"),
+    ):
+        with pytest.raises(GovernorError, match=why):
+            CommandGovernor.from_parameters(values, design, trajectory)

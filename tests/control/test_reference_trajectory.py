@@ -167,6 +167,20 @@ def test_a_blended_ramp_is_limited_in_jerk_and_comes_to_rest_exactly():
     assert np.abs(defect[:, 3]).max() < 0.5 * np.abs(jumps[:, 3]).max()
 
 
+def test_corners_may_have_blends_of_their_own():
+    times, altitudes, velocities = (1.5, 3.5, 5.0, 8.0), *(np.array(column)[[0, 1, 1, 0]] for column in RAMP[1:3])
+    rest = RAMP[3:]
+    sharp, mixed, blended = (
+        along(ReferenceTrajectory(times, altitudes, velocities, *rest, blend=blend), 500)[0]
+        for blend in (0.0, (0.0, 0.0, 1.0, 1.0), 1.0)
+    )
+    turn = round(4.0 / PERIOD)
+    assert np.array_equal(mixed[:turn], sharp[:turn])
+    assert np.array_equal(mixed[round(4.5 / PERIOD) :], blended[round(4.5 / PERIOD) :])
+    with pytest.raises(ParameterError, match=r"reference\.blends: 2 values, expected as many as reference\.times, 4"):
+        ReferenceTrajectory(times, altitudes, velocities, *rest, blend=(0.0, 1.0))
+
+
 def test_a_blended_corner_is_a_steady_pull_up():
     state, inputs, _ = along(ReferenceTrajectory((1.5, 3.5), *RAMP[1:], blend=1.0), 260)
     rates = np.empty(9)
@@ -186,7 +200,7 @@ def test_a_blended_corner_is_a_steady_pull_up():
 @pytest.mark.parametrize(
     ("times", "message"),
     [
-        ((1.0, 30.0), r"reference\.blend = 2: expected at most the time of the first command, 1 s"),
+        ((1.0, 30.0), r"reference\.blend = 2: expected at most the time of the command, 1 s"),
         ((5.0, 5.0), r"reference\.blend = 2: expected 0 with a step, as at 5 s, or a ramp in its place"),
     ],
 )

@@ -68,6 +68,7 @@ IN_FLIGHT = {
     "hsv fault inject elevator_deflection loss_of_effectiveness 0.8",
     "hsv fault list",
     "hsv fault clear elevator_deflection",
+    'hsv command "86050 ft" "8140 ft/s"',
     "hsv set tau 0.9",
     "hsv topic",
 }

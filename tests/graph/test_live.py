@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live_clients import FoxgloveClient, PageClient, addresses, assert_without_gap
+from live_clients import FoxgloveClient, PageClient, addresses, assert_as_recorded, assert_without_gap
 from node_processes import Processes, children, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
@@ -64,7 +64,8 @@ def test_five_viewers_one_of_whom_never_reads_change_no_bit(processes: Processes
     assert flight_fingerprint(bag) == fly(assemble_flight(load_scenario(str(scenario)))).fingerprint
     for reader in readers:
         reader.wait()
-        assert_without_gap(reader, bag)
+        # At ten times real time nobody promises that a busy machine leaves them time for every message.
+        assert_as_recorded(reader, bag)
     # Whoever comes late sees the flight from its start to its end, and how it ended.
     times = late.times(len(columns()))
     assert times[0] < 10.0 and times[-1] == pytest.approx(20.0) and np.all(np.diff(times) > 0)
@@ -118,7 +119,7 @@ def test_at_real_time_pace_nothing_is_missed(processes: Processes, tmp_path: Pat
     client = FoxgloveClient(watched.port)
     watched.land()
     client.wait()
-    assert re.search(r"flown 20 s in \d+(\.\d+)? s: 1 x real time|0\.\d+ x real time", watched.text)
+    assert re.search(r" in [\d.]+ s, (1|0\.\d+) x real time", watched.text)
     assert_without_gap(client, Bag(tmp_path / "bag"))
 
 

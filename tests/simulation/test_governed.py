@@ -43,7 +43,7 @@ def test_the_plan_is_inside_the_tightened_inputs_and_the_governor_takes_it_as_it
     assert np.all((plan > bounds.input_minimum) & (plan < bounds.input_maximum))
     again = governed("case1_governed", load_scenario("case1_governed").reference.blend).reference
     times = load_scenario("case1_governed").commands.times
-    assert again.times[-1] - again.times[-2] == pytest.approx(times[-1] - times[-2])
+    assert again.corners[-1].time - again.corners[-2].time == pytest.approx(times[-1] - times[-2])
 
 
 def test_the_design_measures_its_disturbances_along_this_reference():

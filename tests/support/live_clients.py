@@ -140,6 +140,16 @@ def addresses(text: str) -> tuple[str, int]:
     return page[1], int(data[1])
 
 
+def assert_as_recorded(client: FoxgloveClient, bag: Bag) -> None:
+    """Every step topic has messages of the bag, byte by byte and in its order; a client that is slow may miss some."""
+    for topic in TOPICS:
+        received = client.messages[resolved(topic)]
+        recorded = dict(bag.messages(topic))
+        stamps = [stamp for stamp, _ in received]
+        assert received and stamps == sorted(set(stamps)), topic
+        assert all(recorded[stamp] == data for stamp, data in received), topic
+
+
 def assert_without_gap(client: FoxgloveClient, bag: Bag) -> None:
     """Every step topic has what the bag has, byte by byte, from the time on at which the client was there."""
     for topic in TOPICS:

@@ -28,6 +28,7 @@ setup(
             "live = hsv_bringup.live:main",
             "fault = hsv_bringup.fault:main",
             "player = hsv_bringup.player:main",
+            "set_command = hsv_bringup.set_command:main",
             "set_parameter = hsv_bringup.set_parameter:main",
             "topic = hsv_bringup.topic:main",
             "watch = hsv_bringup.watch:main",

@@ -4,32 +4,41 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hsv_msgs.msg import Run
+from hsv_msgs.msg import Reference, Run
+from hsv_msgs.srv import SetCommand
 
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.graph.description import NOMINAL_TRAJECTORY
+from hsv.errors import HsvError
+from hsv.graph.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
+from hsv.graph.exchange import stamp_of
 from hsv.simulation.blocks import Signals
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare_vehicle
+from hsv_node.qos import LATCHED
 
 
 class NominalTrajectoryNode(BlockNode):
-    """Turns the measurement into reference and nominal state."""
+    """Turns the measurement into reference and nominal state, and takes commands in flight."""
 
     def __init__(self) -> None:
         super().__init__(NOMINAL_TRAJECTORY, "trajectory")
         declare_vehicle(self)
-        self.component = NominalTrajectory.from_parameters(*declare_design(self, NominalTrajectory.PARAMETERS))
+        self._values, self._design = declare_design(self, NominalTrajectory.PARAMETERS)
+        self._period = self._values["period"]
+        self.component = self._trajectory = NominalTrajectory.from_parameters(self._values, self._design)
         self._times, self._failed = StepTimes(), False
+        self._references = self.create_publisher(Reference, REFERENCE, LATCHED)
+        self.create_service(SetCommand, SET_COMMAND, self._command)
 
     def start_run(self, run: Run) -> None:
         """Start a new nominal trajectory."""
         super().start_run(run)
         self._times, self._failed = StepTimes(), False
+        self._publish_reference(0)
 
     def advance(self, signals: Signals) -> None:
         """Step the trajectory and note how long it takes: some laws solve a problem in flight."""
@@ -50,6 +59,32 @@ class NominalTrajectoryNode(BlockNode):
                 gain_index=signals.gain_index,
                 step_time_p99_ms=self._times,
             )
+
+    def _command(self, request: SetCommand.Request, response: SetCommand.Response) -> SetCommand.Response:
+        # Not at the top: only who is commanded in flight needs it, and every start would load it.
+        from hsv.control.governor import CommandGovernor
+
+        try:
+            governor = CommandGovernor.from_parameters(self._values, self._design, self._trajectory)
+            response.step, response.end = governor.command(
+                request.altitude, request.velocity, request.duration, request.blend
+            )
+        except HsvError as error:
+            response.accepted, response.message = False, str(error)
+            return response
+        response.accepted = True
+        response.message = (
+            f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {response.step} on, at rest at "
+            f"{response.end:.2f} s"
+        )
+        self.get_logger().info(response.message)
+        self._publish_reference(response.step)
+        return response
+
+    def _publish_reference(self, step: int) -> None:
+        message = Reference(step=step, **self._trajectory.reference.columns)
+        message.header.stamp.sec, message.header.stamp.nanosec = stamp_of(step, self._period)
+        self._references.publish(message)
 
 
 def main(args: Sequence[str] | None = None) -> int:

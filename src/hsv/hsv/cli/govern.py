@@ -44,7 +44,6 @@ def govern(
         with writing(out, "out"):
             out.write_text(found.text, encoding="utf-8")
     reference, plan = found.reference, found.reference.plan
-    rows = zip(reference.times, reference.altitudes, reference.velocities, strict=True)
     rates = abs(plan[1:] - plan[:-1]).max(axis=0)
     inputs = {
         name: (plan[:, i].min(), plan[:, i].max(), found.bounds.minimum[i], found.bounds.maximum[i], rates[i])
@@ -53,7 +52,7 @@ def govern(
     if json:
         print_json(
             {
-                "corners": [{"time_s": t, "altitude_m": h, "velocity_m_s": v} for t, h, v in rows],
+                "corners": [{"time_s": t, "altitude_m": h, "velocity_m_s": v} for t, h, v, _ in reference.corners],
                 "blend_s": reference.blend,
                 "end_s": reference.end,
                 "plan": {
@@ -66,7 +65,7 @@ def govern(
         )
         return
     corners = new_table("corner", "altitude", "velocity", right=("altitude", "velocity"))
-    for t, h, v in rows:
+    for t, h, v, _ in reference.corners:
         corners.add_row(f"{t:g} s", in_words(h, "m", units), in_words(v, "m/s", units))
     console.print(corners)
     console.print(f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on")

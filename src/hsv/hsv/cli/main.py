@@ -15,6 +15,7 @@ from hsv.cli.bench import bench
 from hsv.cli.certify import certify
 from hsv.cli.check import check
 from hsv.cli.claims import claims
+from hsv.cli.command import command
 from hsv.cli.conclude import conclude
 from hsv.cli.design import design
 from hsv.cli.diff import diff
@@ -89,7 +90,7 @@ def options(
     """Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."""
 
 
-for command in (
+for function in (
     trim,
     linearise,
     design,
@@ -122,10 +123,11 @@ for command in (
     study,
     resilience,
     set,
+    command,
     topic,
     watch,
 ):
-    app.command()(command)
+    app.command()(function)
 app.add_typer(montecarlo, name="montecarlo")
 app.add_typer(fault, name="fault")
 

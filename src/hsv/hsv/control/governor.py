@@ -10,25 +10,32 @@ and no input changes faster than its actuator can.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
 
+from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NominalData, nominal_input
-from hsv.control.nominal_trajectory import nominal_advance
-from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.control.nominal_trajectory import LAWS, NominalTrajectory, nominal_advance
+from hsv.control.plan_bounds import PlanBounds
+from hsv.control.reference_trajectory import TRIMS, Corner, ReferenceTrajectory
 from hsv.errors import GovernorError, TrimError
+from hsv.vehicle.actuators import ActuatorData, actuator_data
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
 from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import Vehicle
 
 LONGEST = 600.0
 """Length of a leg (s) that is given up: a slower one leaves no more room to speak of."""
 
 AFTERWARDS = 10.0
 """Time (s) for which a plan is watched after its last corner; x_n has died out then."""
+
+USUAL_BLEND = 2.0
+"""Half the time (s) in which the rate changes at a corner, where nothing else is asked for."""
 
 KEPT_FREE = 1e-3
 """Share of U minus F Z that is kept free on every side: in flight the plan is scheduled by what is measured."""
@@ -52,24 +59,42 @@ class InputBounds:
     rate: np.ndarray
 
 
+def input_bounds(plan: PlanBounds, actuators: ActuatorData) -> InputBounds:
+    """Return the bounds that a design has certified for its ``plan``, with the rates of the ``actuators`` flown."""
+    return InputBounds(plan.input_minimum, plan.input_maximum, actuators.rate_limit)
+
+
 @dataclass(frozen=True)
 class GovernedReference:
-    """Corners of the reference, ``times`` (s), ``altitudes`` (m), ``velocities`` (m/s), and their ``blend`` (s).
+    """The ``corners`` of a reference, and its plan from the step at which planning began.
 
     ``plan`` (k, 2): u_r + u_n of every step; ``deviation`` (k, 9): x_n.
     """
 
-    times: tuple[float, ...]
-    altitudes: tuple[float, ...]
-    velocities: tuple[float, ...]
-    blend: float
+    corners: tuple[Corner, ...]
     plan: np.ndarray
     deviation: np.ndarray
 
     @property
+    def blend(self) -> float:
+        """Half the time in which the rate changes at the last corner, s."""
+        return self.corners[-1].blend
+
+    @property
     def end(self) -> float:
         """Time at which the reference has come to rest, s."""
-        return self.times[-1] + self.blend
+        return self.corners[-1].time + self.blend
+
+
+class Beginning(NamedTuple):
+    """Where a plan begins: the ``step`` that is flown next, and x_n (9) in it."""
+
+    step: int
+    deviation: np.ndarray
+
+
+AT_REST = Beginning(0, np.zeros(N_STATES))
+"""The beginning of a flight in trim."""
 
 
 def legs_of(
@@ -108,32 +133,68 @@ class Governor:
         Raises:
             GovernorError: A leg for which nothing fits; it says why.
         """
-        half = math.ceil(blend / self._period - 1e-9)
-        if not (legs and half > 0):
-            raise GovernorError("command: none, expected one" if half > 0 else f"blend = {blend:g} s: expected above 0")
-        corners = [(half, *start)]
+        half = self._half(blend)
+        if not legs:
+            raise GovernorError("command: none, expected one")
+        corners = [Corner(self._seconds(half), *start, self._seconds(half))]
         for number, leg in enumerate(legs, start=1):
-            first = max(math.ceil(leg.start / self._period - 1e-9) + half, corners[-1][0])
-            if first > corners[-1][0]:
-                corners.append((first, *corners[-1][1:]))
-            corners.append(self._corner(corners, leg, half, f"command {number}"))
-        plan, deviation, _ = self._planned(corners, half)
-        steps, altitudes, velocities = zip(*corners, strict=True)
-        times = tuple(self._seconds(step) for step in steps)
-        return GovernedReference(times, altitudes, velocities, self._seconds(half), plan, deviation)
+            first = max(self._steps(leg.start) + half, self._steps(corners[-1].time))
+            if first > self._steps(corners[-1].time):
+                corners.append(corners[-1]._replace(time=self._seconds(first)))
+            corners.append(self._corner(corners, leg, half, f"command {number}", AT_REST))
+        return self._reference(corners, AT_REST)
 
-    def _corner(
-        self, corners: list[tuple[int, float, float]], leg: Leg, half: int, name: str
-    ) -> tuple[int, float, float]:
+    def continued(
+        self, corners: Sequence[Corner], leg: Leg, blend: float, beginning: Beginning
+    ) -> tuple[GovernedReference, int]:
+        """Return the fastest reference that goes on from ``corners`` over one more leg, and its first step that is new.
+
+        All steps before are those of ``corners`` in every bit. The leg begins when requested, but not before the last
+        of the corners, nor so early that a step before ``beginning`` would change.
+
+        Raises:
+            GovernorError: Nothing fits; it says why.
+        """
+        half = self._half(blend)
+        last = corners[-1]
+        first = max(self._steps(leg.start), beginning.step, self._steps(last.time) + 1 - half)
+        turn = Corner(self._seconds(first + half), last.altitude, last.velocity, self._seconds(half))
+        known = [*corners, turn]
+        return self._reference([*known, self._corner(known, leg, half, "command", beginning)], beginning), first
+
+    def trajectory(self, corners: Sequence[Corner]) -> ReferenceTrajectory:
+        """Return the trims along ``corners``.
+
+        Raises:
+            TrimError: A point without an equilibrium.
+        """
+        times, altitudes, velocities, blends = zip(*corners, strict=True)
+        return ReferenceTrajectory(times, altitudes, velocities, self._period, self._rigid, blend=blends)
+
+    def _reference(self, corners: Sequence[Corner], beginning: Beginning) -> GovernedReference:
+        plan, deviation, _ = self._planned(corners, beginning)
+        return GovernedReference(tuple(corners), plan, deviation)
+
+    def _half(self, blend: float) -> int:
+        """Return a blend in steps."""
+        half = self._steps(blend)
+        if half <= 0:
+            raise GovernorError(f"blend = {blend:g} s: expected above 0")
+        return half
+
+    def _corner(self, corners: Sequence[Corner], leg: Leg, half: int, name: str, beginning: Beginning) -> Corner:
         """Return the earliest corner at the end of ``leg`` whose plan fits."""
-        begin = corners[-1][0]
+        begin = self._steps(corners[-1].time)
+
+        def end(length: int) -> Corner:
+            return Corner(self._seconds(begin + length), leg.altitude, leg.velocity, self._seconds(half))
 
         def problem(length: int) -> str:
-            return self._problem([*corners, (begin + length, leg.altitude, leg.velocity)], half)
+            return self._problem([*corners, end(length)], beginning)
 
-        least, most = max(1, math.ceil(leg.duration / self._period - 1e-9)), math.ceil(LONGEST / self._period)
+        least, most = max(1, self._steps(leg.duration)), self._steps(LONGEST)
         if not problem(least):
-            return begin + least, leg.altitude, leg.velocity
+            return end(least)
         longer = 2 * least
         while longer < most and problem(longer):
             least, longer = longer, 2 * longer
@@ -149,12 +210,12 @@ class Governor:
                 least = middle
             else:
                 fits = middle
-        return begin + fits, leg.altitude, leg.velocity
+        return end(fits)
 
-    def _problem(self, corners: list[tuple[int, float, float]], half: int) -> str:
+    def _problem(self, corners: Sequence[Corner], beginning: Beginning) -> str:
         """Return why the plan of a reference does not fit, nothing where it does."""
         try:
-            plan, _, held = self._planned(corners, half)
+            plan, _, held = self._planned(corners, beginning)
         except TrimError as error:
             return str(error)
         if not held:
@@ -174,35 +235,114 @@ class Governor:
                 )
         return ""
 
-    def _planned(self, corners: list[tuple[int, float, float]], half: int) -> tuple[np.ndarray, np.ndarray, bool]:
+    def _planned(self, corners: Sequence[Corner], beginning: Beginning) -> tuple[np.ndarray, np.ndarray, bool]:
         """Return u_r + u_n (k, 2), x_n (k, 9), and whether x_n stayed in the family.
 
         Raises:
             TrimError: A point of the reference without an equilibrium.
         """
-        steps, altitudes, velocities = zip(*corners, strict=True)
-        times = [self._seconds(step) for step in steps]
-        blend = self._seconds(half)
-        reference = ReferenceTrajectory(times, altitudes, velocities, self._period, self._rigid, blend=blend)
-        rows = steps[-1] + half + math.ceil(AFTERWARDS / self._period)
+        rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
-        held = _plan(self._nominal, reference.data, plan, deviation)
+        reference = self.trajectory(corners).data
+        held = _plan(self._nominal, reference, beginning.step, beginning.deviation, plan, deviation)
         return plan, deviation, bool(held)
+
+    def _steps(self, time: float) -> int:
+        """Return the first step at or after ``time`` (s)."""
+        return math.ceil(time / self._period - 1e-9)
 
     def _seconds(self, step: int) -> float:
         return round(step * self._period, 9)
 
 
+class CommandGovernor:
+    """Turns the commands that come in flight into references that go on from the one that is flown."""
+
+    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle, period: float) -> None:
+        """Govern the commands of ``trajectory``, which flies the ``vehicle`` with ``period`` (s)."""
+        self._governor, self._trajectory, self._vehicle, self._period = governor, trajectory, vehicle, period
+
+    @classmethod
+    def from_parameters(
+        cls, values: Mapping[str, object], design: ControlDesign | None, trajectory: NominalTrajectory
+    ) -> Self:
+        """Build from the flat parameters ``values`` that ``design`` and ``trajectory`` are made from.
+
+        Raises:
+            GovernorError: There is no certified plan to govern.
+        """
+        if design is None or design.plan_bounds is None:
+            name = design.name if design else "none"
+            raise GovernorError(f"design = {name!r}: expected one that has tightened inputs")
+        law = values.get("nominal.law", LAWS[0])
+        if law != LAWS[0]:
+            raise GovernorError(f"nominal.law = {law!r}: expected {LAWS[0]!r}")
+        trim = values.get("reference.trim", TRIMS[0])
+        if trim != TRIMS[0]:
+            raise GovernorError(f"reference.trim = {trim!r}: expected {TRIMS[0]!r}")
+        vehicle = Vehicle.from_parameters(values)
+        actuators = actuator_data(values, vehicle.decoupled, design.period)
+        bounds = input_bounds(design.plan_bounds, actuators)
+        return cls(
+            Governor(trajectory.data, vehicle.decoupled, design.period, bounds), trajectory, vehicle, design.period
+        )
+
+    def command(self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0) -> tuple[int, float]:
+        """Fly to a point as fast as the tightened inputs permit, once the commands given before are flown.
+
+        Args:
+            altitude: Of the point, m.
+            velocity: Of the point, m/s.
+            duration: Least length of the ramp, s.
+            blend: Half the time in which the rate changes at a corner, s; 0: :data:`USUAL_BLEND`.
+
+        Returns:
+            The first step that differs, and the time (s) at which the reference comes to rest.
+
+        Raises:
+            GovernorError: A number out of its range, or nothing fits; it says why. The reference stays as it was.
+        """
+        ranges = {
+            "altitude": (altitude, "m", self._vehicle.altitude_range),
+            "velocity": (velocity, "m/s", self._vehicle.velocity_range),
+            "duration": (duration, "s", (0.0, LONGEST)),
+            "blend": (blend, "s", (0.0, LONGEST)),
+        }
+        for name, (value, unit, (least, largest)) in ranges.items():
+            if not least <= value <= largest:
+                raise GovernorError(f"{name} = {value:.6g} {unit}: expected {least:.6g} to {largest:.6g} {unit}")
+        trajectory = self._trajectory
+        if trajectory.next_step == 0:
+            raise GovernorError("no step is flown yet: expected a command in flight")
+        corners = trajectory.reference.corners
+        if corners[-1][1:3] == (altitude, velocity):
+            raise GovernorError(
+                f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s: expected another point than the command "
+                "before"
+            )
+        found, first = self._governor.continued(
+            corners,
+            Leg(0.0, duration, altitude, velocity),
+            blend or USUAL_BLEND,
+            Beginning(trajectory.next_step, trajectory.deviation),
+        )
+        trajectory.change_reference(self._governor.trajectory(found.corners))
+        return first, found.end
+
+
 @njit(cache=True)
-def _plan(nominal: Any, reference: Any, plan: np.ndarray, deviation: np.ndarray) -> bool:
-    """Write u_r + u_n (k, 2) and x_n (k, 9), 0 at first, scheduled by x_r + x_n; tell whether the family held it."""
+def _plan(nominal: Any, reference: Any, first: int, start: np.ndarray, plan: np.ndarray, deviation: np.ndarray) -> bool:
+    """Write u_r + u_n (k, 2) and x_n (k, 9) from step ``first`` on, where x_n is ``start`` (9), scheduled by x_r + x_n.
+
+    Returns whether x_n stayed in the family.
+    """
     n, m = deviation.shape[1], plan.shape[1]
-    x_n, u_n, defect = np.zeros(n), np.empty(m), np.empty(n)
+    x_n, u_n, defect = start.copy(), np.empty(m), np.empty(n)
     weights, S, new = np.empty(len(nominal.polytope.S)), np.empty(n * (n + m)), np.empty(n)
     last = len(reference.state) - 1
     held = True
     for k in range(len(plan)):
-        row = min(max(k - reference.first, 0), last)
+        row = min(max(first + k - reference.first, 0), last)
         for i in range(n):
             deviation[k, i] = x_n[i]
             defect[i] = reference.defect[row, i]

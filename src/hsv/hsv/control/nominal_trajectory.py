@@ -16,6 +16,7 @@ from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTraj
 from hsv.errors import ParameterError
 from hsv.lpv.polytope import AxisWeights, PolytopeData, schedule
 from hsv.parameters import Parameter, check_all
+from hsv.vehicle.actuators import ACTUATOR_PARAMETERS
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
 
@@ -80,7 +81,8 @@ class NominalResult:
 class NominalTrajectory:
     """Starts at x_n(0) = x(0) - x_r(0) and runs the nominal system, scheduled by the measured state, to rest."""
 
-    PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS)
+    PARAMETERS = (*NOMINAL_PARAMETERS, *VEHICLE_PARAMETERS, *ACTUATOR_PARAMETERS)
+    """The actuators limit what can be commanded in flight (:class:`hsv.control.governor.CommandGovernor`)."""
 
     def __init__(
         self, design: ControlDesign | None, reference: ReferenceTrajectory, law: NominalLaw | None = None
@@ -93,6 +95,7 @@ class NominalTrajectory:
         self._deviation = np.zeros(n)
         self._scratch = np.empty(len(self.data.polytope.S)), np.empty(n * (n + m)), np.empty(n)
         self._step = 0
+        self._planned = reference
         # Compile now: a cold cache must not stall a flight.
         rest = FamilyLaw(self.data).step(self._deviation).input
         weights, S, new = self._scratch
@@ -119,8 +122,24 @@ class NominalTrajectory:
         reference = ReferenceTrajectory.from_parameters(values, design.period)
         return cls(design, reference, _law(v, design, reference))
 
+    @property
+    def next_step(self) -> int:
+        """The step that is flown next."""
+        return self._step
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """x_n (9) of the next step, 0 before the first."""
+        return self._deviation.copy()
+
+    def change_reference(self, reference: ReferenceTrajectory) -> None:
+        """Fly ``reference`` from the next step on, until :meth:`reset`; up to there it is that flown so far."""
+        self.reference = reference
+
     def reset(self) -> None:
         """Forget the past: the next step is the first of a new nominal trajectory."""
+        self.reference = self._planned
+        self._deviation[:] = 0.0
         self._step = 0
         self.law.reset()
 

@@ -43,6 +43,7 @@ REFERENCE_PARAMETERS = (
     Parameter("reference.altitudes", [26243.28], "commanded altitudes at these times, linear in between", "m"),
     Parameter("reference.velocities", [2484.12], "commanded velocities at these times, linear in between", "m/s"),
     Parameter("reference.blend", 0.0, "half the time in which the rate changes at a corner; 0: at once", "s", 0.0, 1e3),
+    Parameter("reference.blends", [], "the same for each of the times; empty: as reference.blend", "s", 0.0, 1e3),
     Parameter(
         "reference.trim",
         "climbing",
@@ -51,8 +52,20 @@ REFERENCE_PARAMETERS = (
     ),
 )
 
+COLUMNS = ("times", "altitudes", "velocities", "blends")
+"""Names of what a corner has, in the plural: of parameters, after ``reference.``, and of the fields of a message."""
+
 SUBSTEPS = 2
 """Runge-Kutta steps per period in phi_T, as many as the plant takes unless it is told otherwise."""
+
+
+class Corner(NamedTuple):
+    """A point of the commands: time (s), altitude (m), velocity (m/s), half the time in which the rate changes (s)."""
+
+    time: float
+    altitude: float
+    velocity: float
+    blend: float
 
 
 class ReferenceData(NamedTuple):
@@ -121,7 +134,7 @@ class ReferenceTrajectory:
         period: float,
         rigid: VehicleParameters,
         trim: str = "climbing",
-        blend: float = 0.0,
+        blend: float | Sequence[float] = 0.0,
     ) -> None:
         """Trim the nominal decoupled vehicle at all points of the commands.
 
@@ -132,7 +145,7 @@ class ReferenceTrajectory:
             period: Control period, s.
             rigid: Parameters of the nominal decoupled vehicle.
             trim: One of :data:`TRIMS`; ``"static"`` takes climb rate and acceleration of a ramp for zero.
-            blend: Half the time in which the rate changes at a corner, s.
+            blend: Half the time in which the rate changes at a corner, s; one for all corners or one each (b).
 
         Raises:
             ParameterError: Arrays of different lengths, times that decrease, or commands that cannot be blended.
@@ -140,13 +153,13 @@ class ReferenceTrajectory:
         """
         commands = _commands(times, altitudes, velocities)
         instants = _in_steps(np.asarray(times, float), period)
-        _check_blend(times, blend)
-        half = blend / period if len(times) > 1 else 0.0
-        first = max(0, math.ceil(instants[0] - half) - 2)
-        steps = np.arange(first, max(first, math.ceil(instants[-1] + half)) + 1)
+        blends = _blends(times, blend)
+        half = blends / period
+        first = max(0, math.ceil(instants[0] - half[0]) - 2)
+        steps = np.arange(first, max(first, math.ceil(instants[-1] + half[-1])) + 1)
         command, slope = _evaluate(instants, commands, steps)
         bend = np.zeros(len(steps))
-        if half > 0.0:
+        if np.any(half):
             _blend(instants, commands, steps, half, command, slope, bend)
         # What a static trim does not know of.
         rate, bend = (slope / period, bend / (period * period)) if trim == "climbing" else (0.0 * slope, 0.0 * bend)
@@ -155,6 +168,8 @@ class ReferenceTrajectory:
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
         self._along = ReferenceData(0, *(column[:0] for column in self.data[1:]))
+        self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
+        """The commands, one corner after the other."""
         size = np.full(rows, np.inf)
         _, state, inputs, defect = self.data
         _trimmed(rigid, command, rate, bend, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
@@ -175,7 +190,14 @@ class ReferenceTrajectory:
         vehicle = Vehicle.from_parameters(values)
         vehicle.check_envelope(REFERENCE_PARAMETERS, v)
         times, altitudes, velocities = (v[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
-        return cls(times, altitudes, velocities, period, vehicle.decoupled, v["reference.trim"], v["reference.blend"])
+        blend = v["reference.blends"] or v["reference.blend"]
+        return cls(times, altitudes, velocities, period, vehicle.decoupled, v["reference.trim"], blend)
+
+    @property
+    def columns(self) -> dict[str, list[float]]:
+        """Times (s), altitudes (m), velocities (m/s) and blends (s) of the corners, as :data:`REFERENCE_PARAMETERS`."""
+        columns = zip(*self.corners, strict=True)
+        return {name: list(column) for name, column in zip(COLUMNS, columns, strict=True)}
 
     def row(self, step: int) -> int:
         """Return the row of :attr:`data` that holds ``step``."""
@@ -213,43 +235,56 @@ def _commands(times: Sequence[float], altitudes: Sequence[float], velocities: Se
     return np.column_stack((np.asarray(altitudes, float), np.asarray(velocities, float)))
 
 
-def _check_blend(times: Sequence[float], blend: float) -> None:
-    """Refuse a blend of a step, or one that would begin before the flight."""
-    if blend == 0.0 or len(times) < 2:
-        return
-    where = f"parameter reference.blend = {blend:g}"
-    if times[0] < blend:
-        raise ParameterError(f"{where}: expected at most the time of the first command, {times[0]:g} s")
-    for before, after in itertools.pairwise(times):
-        if before == after:
-            raise ParameterError(f"{where}: expected 0 with a step, as at {before:g} s, or a ramp in its place")
+def _blends(times: Sequence[float], blend: float | Sequence[float]) -> np.ndarray:
+    """Return the blend of each corner (b), s.
+
+    Raises:
+        ParameterError: Blends of another length, of a step, or one that would begin before the flight.
+    """
+    if isinstance(blend, Sequence) and len(blend) != len(times):
+        raise ParameterError(
+            f"parameter reference.blends: {len(blend)} values, expected as many as reference.times, {len(times)}"
+        )
+    blends = np.zeros(len(times))
+    if len(times) > 1:
+        blends[:] = blend
+    for index, (time, half) in enumerate(zip(times, blends.tolist(), strict=True)):
+        name = f"reference.blends[{index}]" if isinstance(blend, Sequence) else "reference.blend"
+        where = f"parameter {name} = {half:g}"
+        if half > time:
+            raise ParameterError(f"{where}: expected at most the time of the command, {time:g} s")
+        if half > 0.0 and time in (*times[:index][-1:], *times[index + 1 :][:1]):
+            raise ParameterError(f"{where}: expected 0 with a step, as at {time:g} s, or a ramp in its place")
+    return blends
 
 
 def _blend(
     instants: np.ndarray,
     commands: np.ndarray,
     steps: np.ndarray,
-    half: float,
+    half: np.ndarray,
     command: np.ndarray,
     slope: np.ndarray,
     bend: np.ndarray,
 ) -> None:
-    """Average ``command`` (r, 2) and ``slope`` (r, 2) about every corner; ``half`` the width of the triangle, steps.
+    """Average ``command`` (r, 2) and ``slope`` (r, 2) about every corner; ``half`` (b) its triangle's width, steps.
 
     To ``bend`` (r), add the change of the first slope per step.
     """
     before = np.zeros(commands.shape[1])
     for index in range(len(instants)):
         after = np.zeros_like(before)
-        if index + 1 < len(instants):
+        if index + 1 < len(instants) and instants[index + 1] > instants[index]:
             after = (commands[index + 1] - commands[index]) / (instants[index + 1] - instants[index])
-        change = after - before
+        change, width = after - before, half[index]
         before = after
+        if width == 0.0:
+            continue
         gone = steps - instants[index]
-        left = np.maximum(half - np.abs(gone), 0.0)[:, None]
-        command += change * (left * left * left / (6.0 * half * half))
-        slope += np.where(gone[:, None] < 0.0, change, -change) * (left * left / (2.0 * half * half))
-        bend += change[0] * (left[:, 0] / (half * half))
+        left = np.maximum(width - np.abs(gone), 0.0)[:, None]
+        command += change * (left * left * left / (6.0 * width * width))
+        slope += np.where(gone[:, None] < 0.0, change, -change) * (left * left / (2.0 * width * width))
+        bend += change[0] * (left[:, 0] / (width * width))
 
 
 def _in_steps(times: np.ndarray, period: float) -> np.ndarray:

@@ -29,6 +29,7 @@ COMMAND = "hsv/command"
 TUBE_STATUS = "hsv/tube_status"
 ACTUATOR = "hsv/actuator"
 RUN = "hsv/run"
+REFERENCE = "hsv/reference"
 READY = "hsv/ready"
 RECORDER_PROGRESS = "hsv/recorder_progress"
 DIAGNOSTICS = "diagnostics"
@@ -40,6 +41,7 @@ WIRE_ALIGNMENT = 4
 """Messages sent over DDS are padded with zeros to a multiple of this number of bytes."""
 INJECT_FAULT = "hsv/inject_fault"
 CLEAR_FAULT = "hsv/clear_fault"
+SET_COMMAND = "hsv/set_command"
 
 TOPICS = {
     CLOCK: "rosgraph_msgs/msg/Clock",
@@ -73,7 +75,11 @@ CARRIED = {
 }
 """The signals of the loop that the messages of a topic carry, passed on or from the block that publishes them."""
 
-LATCHED_TOPICS = {RUN: "hsv_msgs/msg/Run", READY: "hsv_msgs/msg/Ready"}
+LATCHED_TOPICS = {
+    RUN: "hsv_msgs/msg/Run",
+    READY: "hsv_msgs/msg/Ready",
+    REFERENCE: "hsv_msgs/msg/Reference",
+}
 """Announcements that late joiners receive."""
 
 OTHER_TOPICS = {
@@ -172,7 +178,7 @@ ESTIMATOR = _stepping(blocks.NOTCH_FILTER, "hsv_ctrl", FILTERED_STATE)
 """The node of the notch filter where an estimator flies, which is told the commands."""
 
 NOTCH_FILTER = replace(ESTIMATOR, subscribes=_carrying(blocks.NOTCH_FILTER.inputs), delayed=())
-NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL)
+NOMINAL_TRAJECTORY = _stepping(blocks.NOMINAL_TRAJECTORY, "hsv_ctrl", NOMINAL, announces=(REFERENCE,))
 FAULT_INJECTOR = _stepping(blocks.FAULT_INJECTOR, "hsv_plant", ACTUATOR)
 
 _TUBE = _stepping(blocks.CONTROLLER, "hsv_ctrl", COMMAND)
@@ -200,8 +206,9 @@ PLAYER = NodeDescription("player", "hsv_bringup", "player", (), ())
 LIVE = NodeDescription("live", "hsv_bringup", "live", (), ())
 """Process outside the graph that shows a running flight. No node waits for it, and it ends with the others."""
 
-FAULT, SET_PARAMETER, TOPIC, WATCH = (
-    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ()) for name in ("fault", "set_parameter", "topic", "watch")
+FAULT, SET_COMMAND_CLIENT, SET_PARAMETER, TOPIC, WATCH = (
+    NodeDescription(f"hsv_{name}", "hsv_bringup", name, (), ())
+    for name in ("fault", "set_command", "set_parameter", "topic", "watch")
 )
 """Processes outside the graph: commands that act on a running one."""
 

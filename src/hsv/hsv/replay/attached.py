@@ -13,6 +13,7 @@ from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.reference_trajectory import COLUMNS
 from hsv.control.tube_factor import TAU, change_parameters, rigid_factors, scheduled_changes
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.errors import DesignError, ParameterError, RecordingError
@@ -22,8 +23,10 @@ from hsv.graph.description import (
     COMMAND,
     FAULT_INJECTOR,
     NOMINAL,
+    NOMINAL_TRAJECTORY,
     NOTCH_FILTER,
     PLANT,
+    REFERENCE,
     STATE,
     TOPICS,
     TUBE_MPC,
@@ -85,7 +88,7 @@ def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
 
 
 def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
-    """Return the parameters of the nodes in a recorded run, with what was changed in flight, faults and tau.
+    """Return the parameters of the nodes in a recorded run, with what was changed in flight: faults, tau, commands.
 
     Args:
         bag: A bag of our recorder, or one that :func:`supply` gave what it lacks.
@@ -109,6 +112,7 @@ def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
             changed = {
                 FAULT_INJECTOR.name: _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)),
                 TUBE_MPC.name: _tau_as_flown(bag, values),
+                NOMINAL_TRAJECTORY.name: _commands_as_flown(bag),
             }
         except (DesignError, ParameterError) as error:
             raise RecordingError(f"{bag.path}: attached {error}") from error
@@ -191,6 +195,14 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
                     injector.inject(fault)
         injector.step(status.step, command)
     return injector.parameters() if changed else {}
+
+
+def _commands_as_flown(bag: Bag) -> dict[str, Any]:
+    """Return the parameters of the reference that was flown, none where nothing was commanded in flight."""
+    published = [message for _, message in bag.decode(REFERENCE)] if REFERENCE in bag.roles else []
+    if not published or published[-1].step == 0:
+        return {}
+    return {f"reference.{name}": np.asarray(getattr(published[-1], name)).tolist() for name in COLUMNS}
 
 
 def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:

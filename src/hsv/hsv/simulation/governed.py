@@ -8,7 +8,7 @@ from typing import Any
 
 import tomli_w
 
-from hsv.control.governor import GovernedReference, Governor, InputBounds, legs_of
+from hsv.control.governor import GovernedReference, Governor, InputBounds, input_bounds, legs_of
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.tube_law import TubeLaw
 from hsv.errors import GovernorError
@@ -44,8 +44,7 @@ def governed(name: str, blend: float) -> GovernedScenario:
     if not isinstance(law, FamilyLaw):
         raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {scenario.nominal.law!r}: expected 'family'")
     design, allowed = controller.design, controller.design.plan_bounds
-    rates = components.plant.data.actuators.rate_limit
-    bounds = InputBounds(allowed.input_minimum, allowed.input_maximum, rates)
+    bounds = input_bounds(allowed, components.plant.data.actuators)
     governor = Governor(law.data, scenario.vehicle.described.decoupled, design.period, bounds)
     start = rounded(scenario.initial.altitude), rounded(scenario.initial.velocity)
     reference = governor.govern(start, legs_of(start, *scenario.commands), blend)
@@ -55,8 +54,7 @@ def governed(name: str, blend: float) -> GovernedScenario:
 def _table(name: str, reference: GovernedReference) -> dict[str, Any]:
     table = scenario_table(scenario_text(name), name)
     commands = []
-    points = [*zip(reference.times, reference.altitudes, reference.velocities, strict=True)]
-    for (start, *before), (end, *after) in pairwise(points):
+    for (start, *before, _), (end, *after, _) in pairwise(reference.corners):
         climbed, gained = (round(b - a, 9) for a, b in zip(before, after, strict=True))
         if climbed or gained:
             changes = {"altitude_change": written(climbed, "m"), "velocity_change": written(gained, "m/s")}
