@@ -65,6 +65,7 @@ def test_metres_serve_as_well_as_feet():
         ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of name, definition, model"),
         ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
         ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
+        ('title = "', 'controller = ["tube_mpc"]\ntitle = "', "controller = ['tube_mpc']: expected a name or a path"),
         (
             "effectiveness = 0.9",
             "effectiveness = 0.9\nwhen = 3",

@@ -222,12 +222,14 @@ def scenario_table(text: str, name: str) -> dict[str, Any]:
     """Return the table of a scenario's ``text``, its vehicle a table in it.
 
     Raises:
-        ScenarioError: It is no TOML, or the vehicle is none.
+        ScenarioError: It is no TOML, or the vehicle is none, or the controller no name.
     """
     try:
         table = parse_toml(text)
     except DocumentError as error:
         raise _refused(name, error) from error
+    if not isinstance(controller := table.get("controller", ""), str):
+        raise _refused(name, f"controller = {controller!r}: expected a name or a path")
     return _with_named_vehicle(table, name)
 
 
