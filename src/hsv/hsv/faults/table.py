@@ -136,20 +136,20 @@ class FaultKind:
 
 _P = FaultParameter
 _EFFECTIVENESS = _P("effectiveness", "share of the command that remains", "", 0.0, 1.0)
-_WIDTH = _P("width", "whole width", "{}", 0.0, 1.0)
+_WIDTH = _P("width", "total width", "{}", 0.0, 1.0)
 _AMPLITUDE = _P("amplitude", "amplitude", "{}", 0.0, 1.0)
 _FREQUENCY = _P("frequency", "frequency", "Hz", 1e-3, 100.0)
 _PHASE = _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0)
 _GROWING_OFFSET = (
-    _P("rate", "of the offset, with its sign", "{}/s", -10.0, 10.0),
+    _P("rate", "rate of the offset; its sign is that of the offset", "{}/s", -10.0, 10.0),
     _P("limit", "largest offset", "{}", 0.0, 1.0),
 )
 _UNSTART = (
     _P("thrust_factor", "thrust that remains", "", 0.0, 1.0, 0.0),
-    _P("lift_factor", "lift for that of the started inlet", "", 0.0, 2.0, 0.8),
-    _P("drag_factor", "drag for that of the started inlet", "", 0.0, 5.0, 1.2),
+    _P("lift_factor", "lift, relative to the started inlet", "", 0.0, 2.0, 0.8),
+    _P("drag_factor", "drag, relative to the started inlet", "", 0.0, 5.0, 1.2),
     _P("moment_zero", "increment of the pitching moment coefficient", "", -0.5, 0.5, 0.045),
-    _P("moment_alpha", "the same, per angle of attack", "1/rad", -5.0, 5.0, 0.0),
+    _P("moment_alpha", "increment of that coefficient per angle of attack", "1/rad", -5.0, 5.0, 0.0),
 )
 _OUTSIDE = (
     _P("angle_of_attack", "centre of the region where the inlet stays started", "rad", -0.5, 0.5, 0.0),
@@ -158,7 +158,7 @@ _OUTSIDE = (
     _P("mach_reach", "half axis of that region", "", 1e-2, 100.0, 100.0),
     _P("fuel_limit", "fuel equivalence ratio above which the inlet unstarts", "", 0.0, 10.0, 10.0),
     _P("hysteresis", "share of region and limit that must be regained for a restart", "", 0.0, 0.9, 0.1),
-    _P("restart_time", "time unstarted at least", "s", 0.0, 1e4, 0.0),
+    _P("restart_time", "least time for which the inlet stays unstarted", "s", 0.0, 1e4, 0.0),
 )
 
 FAULT_KINDS = {
@@ -166,79 +166,98 @@ FAULT_KINDS = {
         LOSS,
         COMMAND,
         INPUT_NAMES,
-        "the actuator moves by effectiveness times the command (paper eq. 15), which is reached over a ramp",
-        (_EFFECTIVENESS, _P("ramp_time", "time in which it is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
+        "the actuator receives effectiveness times the command (paper eq. 15); effectiveness may be lost over a ramp",
+        (_EFFECTIVENESS, _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
     ),
     "reversal": FaultKind(
         REVERSAL,
         COMMAND,
         INPUT_NAMES,
-        "the command changes its sign",
-        (_P("about_start", "0: of the whole command, 1: of its change since the start", "", 0.0, 1.0, 0.0),),
+        "the command is multiplied by -1",
+        (
+            _P(
+                "about_start",
+                "0: the whole command is reversed, 1: only its change since the start of the fault",
+                "",
+                0.0,
+                1.0,
+                0.0,
+            ),
+        ),
     ),
     "delay": FaultKind(
         DELAY,
         COMMAND,
         INPUT_NAMES,
-        "the actuator hears the command late, at first the one at the start of the fault",
-        (_P("steps", "control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
+        "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
+        (_P("steps", "delay in control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
     ),
     "dead_zone": FaultKind(
         DEAD_ZONE,
         COMMAND,
         INPUT_NAMES,
-        "commands near the one at the start of the fault have no effect",
+        "commands within a dead zone about the one at the start of the fault have no effect",
         (_WIDTH,),
     ),
     "backlash": FaultKind(
-        BACKLASH, COMMAND, INPUT_NAMES, "the actuator follows with play, at first in its middle", (_WIDTH,)
+        BACKLASH,
+        COMMAND,
+        INPUT_NAMES,
+        "there is play between command and actuator, centred at the start of the fault",
+        (_WIDTH,),
     ),
     "bandwidth": FaultKind(
         BANDWIDTH,
         DYNAMICS,
         INPUT_NAMES,
-        "the natural frequency falls to this one; an ideal actuator becomes a lag of first order",
-        (_P("natural_frequency", "at most", "rad/s", 0.1, 1e3),),
+        "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
+        (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
     ),
     "rate_limit": FaultKind(
-        RATE_LIMIT, DYNAMICS, INPUT_NAMES, "the actuator moves no faster", (_P("rate", "at most", "{}/s", 1e-4, 100.0),)
+        RATE_LIMIT,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the rate of the actuator is limited",
+        (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
     ),
     "stop_limit": FaultKind(
         STOP_LIMIT,
         DYNAMICS,
         INPUT_NAMES,
-        "the actuator moves no further; beyond it, it returns as fast as it can",
+        "the travel of the actuator is limited; from a position beyond the limits it returns at its largest rate",
         (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
     ),
     "effector_scale": FaultKind(
         SCALE,
         EFFECTOR,
         INPUT_NAMES,
-        "the effector does this multiple of the actuator's position",
+        "the position of the effector is a multiple of that of the actuator",
         (_P("factor", "multiple", "", -1.0, 2.0),),
     ),
     "bias": FaultKind(
         BIAS,
         EFFECTOR,
         INPUT_NAMES,
-        "the effector is off by a constant",
-        (_P("offset", "added to the position", "{}", -1.0, 1.0),),
+        "a constant offset is added to the position of the effector",
+        (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
     ),
     "drift": FaultKind(
         DRIFT,
         EFFECTOR,
         INPUT_NAMES,
-        "the effector is off by more and more",
+        "an offset that grows at a constant rate up to a limit is added to the position of the effector",
         _GROWING_OFFSET,
     ),
     "oscillation": FaultKind(
         OSCILLATION,
         EFFECTOR,
         INPUT_NAMES,
-        "an oscillation is added to the position (liquid failure)",
+        "an oscillation is added to the position of the effector (liquid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
     ),
-    "lock_in_place": FaultKind(LOCK, EFFECTOR, INPUT_NAMES, "the effector stays where it is"),
+    "lock_in_place": FaultKind(
+        LOCK, EFFECTOR, INPUT_NAMES, "the effector stays at its position at the start of the fault"
+    ),
     "lock_at": FaultKind(
         LOCK_AT,
         EFFECTOR,
@@ -257,18 +276,22 @@ FAULT_KINDS = {
         HARD_OVER,
         EFFECTOR,
         INPUT_NAMES,
-        "the effector runs to its stop and stays there",
-        (_P("rate", "its sign says to which stop", "{}/s", -100.0, 100.0),),
+        "the effector moves to a stop and stays there",
+        (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
     ),
     "solid_oscillation": FaultKind(
         SOLID_OSCILLATION,
         EFFECTOR,
         INPUT_NAMES,
-        "the effector oscillates about where it was, whatever the command (solid failure)",
+        "the effector oscillates about its position at the start of the fault, whatever the command (solid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
     ),
     "thrust_loss": FaultKind(
-        THRUST_LOSS, ENGINE_SIDE, (ENGINE,), "a share of the thrust remains", (_P("share", "share", "", 0.0, 1.0),)
+        THRUST_LOSS,
+        ENGINE_SIDE,
+        (ENGINE,),
+        "only a share of the thrust remains",
+        (_P("share", "share that remains", "", 0.0, 1.0),),
     ),
     "inlet_unstart": FaultKind(
         UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
@@ -281,45 +304,51 @@ FAULT_KINDS = {
         (*_UNSTART, *_OUTSIDE),
     ),
     "sensor_scale": FaultKind(
-        SENSOR_SCALE, SENSOR, STATE_NAMES, "the sensor shows this multiple", (_P("factor", "multiple", "", -1.0, 2.0),)
+        SENSOR_SCALE,
+        SENSOR,
+        STATE_NAMES,
+        "the output of the sensor is multiplied by a factor",
+        (_P("factor", "factor", "", -1.0, 2.0),),
     ),
     "sensor_noise": FaultKind(
         SENSOR_NOISE,
         SENSOR,
         STATE_NAMES,
-        "white noise is added",
-        (_P("standard_deviation", "of the noise", "{}", 0.0, 1.0),),
+        "white noise is added to the output of the sensor",
+        (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
     ),
     "sensor_bias": FaultKind(
         SENSOR_BIAS,
         SENSOR,
         STATE_NAMES,
-        "the sensor is off by a constant",
-        (_P("offset", "added to the measurement", "{}", -1.0, 1.0),),
+        "a constant offset is added to the output of the sensor",
+        (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
     ),
     "sensor_runaway": FaultKind(
         SENSOR_RUNAWAY,
         SENSOR,
         STATE_NAMES,
-        "the sensor is off by more and more",
+        "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
         _GROWING_OFFSET,
     ),
     "sensor_drop_out": FaultKind(
         SENSOR_DROP_OUT,
         SENSOR,
         STATE_NAMES,
-        "samples are lost at random, the last one is held",
-        (_P("probability", "that a sample is lost", "", 0.0, 1.0),),
+        "samples are lost at random; the last one is held",
+        (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
     ),
-    "sensor_freeze": FaultKind(SENSOR_FREEZE, SENSOR, STATE_NAMES, "the sensor shows what it showed"),
+    "sensor_freeze": FaultKind(
+        SENSOR_FREEZE, SENSOR, STATE_NAMES, "the output of the sensor stays at its value at the start of the fault"
+    ),
 }
 """The vocabulary, in the order in which faults that act at once are composed."""
 
 OCCURRENCE_PARAMETERS = (
     _P("intermittent_period", "the fault comes and goes with this period; 0: it stays", "s", 0.0, 1e4, 0.0),
-    _P("intermittent_duty", "share of the period during which it acts", "", 0.0, 1.0, 0.5),
-    _P("random_on", "mean time for which it acts, random; 0: it stays", "s", 0.0, 1e4, 0.0),
-    _P("random_off", "mean time between", "s", 0.0, 1e4, 0.0),
+    _P("intermittent_duty", "share of the period during which the fault acts", "", 0.0, 1.0, 0.5),
+    _P("random_on", "mean of the random time for which the fault acts; 0: it stays", "s", 0.0, 1e4, 0.0),
+    _P("random_off", "mean of the random time between", "s", 0.0, 1e4, 0.0),
 )
 """Parameters of faults of all types: permanent between start and stop, periodic, or as a two-state Markov chain."""
 
