@@ -164,6 +164,10 @@ def test_input_limits_are_those_of_the_vehicle(folder):
         ("[vehicle]\ndefinition = 3", "vehicle.definition = 3: expected the tables of a vehicle file"),
         ("[vehicle]\ndefinition = { wings = 2 }", "vehicle 'parker': wings: unknown field, expected one of title"),
         ("[vehicle]\ncoupling = { uniform = [-1, 1] }", "vehicle.coupling = -1.0: expected one of paper_like, derived"),
+        (
+            f"[vehicle]\ncoupling = 1{400 * '0'}",
+            f"vehicle.coupling = 1{400 * '0'}: expected one of paper_like, derived, or",
+        ),
         ("[vehicle]\ncoupling = -1", "vehicle.coupling = -1: expected one of paper_like, derived, or a multiple of"),
     ],
 )

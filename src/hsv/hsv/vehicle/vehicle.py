@@ -124,7 +124,7 @@ class Vehicle:
             return coupling
         try:
             scale = float(coupling) if isinstance(coupling, str | float | int) else math.nan
-        except ValueError:
+        except (ValueError, OverflowError):
             scale = math.nan
         if isinstance(coupling, bool) or not 0.0 <= scale <= MOST_COUPLING:
             raise QuantityError(
