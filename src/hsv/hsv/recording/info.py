@@ -96,10 +96,10 @@ def ending(bag: Bag) -> str:
     Raises:
         RecordingError: A topic is missing or does not fit its definition.
     """
-    status, constants = bag.columns(STATE)["status"], bag.constants(STATE)
+    status = bag.columns(STATE)["status"]
     if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
         return "broken off"  # the last state may be there, but not what was made of it
-    endings = {constants["FINISHED"]: "finished", constants["DIVERGED"]: "diverged"}
+    endings = {bag.constant(STATE, "FINISHED"): "finished", bag.constant(STATE, "DIVERGED"): "diverged"}
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
 
 
@@ -179,7 +179,7 @@ def _saturation(bag: Bag) -> dict[str, Any]:
 
 def _tube(bag: Bag) -> dict[str, Any]:
     columns, constants = bag.columns(TUBE_STATUS), bag.constants(TUBE_STATUS)
-    checked = columns["status"] != constants["NO_SET"]
+    checked = columns["status"] != bag.constant(TUBE_STATUS, "NO_SET")
     outside = checked & ~columns["inside"]
     levels = columns["level"][checked & np.isfinite(columns["level"])]
     return {

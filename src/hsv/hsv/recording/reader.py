@@ -225,6 +225,17 @@ class Bag:
         """Return the constants that the type of a topic defines, as recorded in the bag."""
         return {name: value for name, _, value in self.types.fielddefs[self._of(topic).schema.name][0]}
 
+    def constant(self, topic: str, name: str) -> ConstValue:
+        """Return a constant that the type of a topic defines.
+
+        Raises:
+            RecordingError: It defines none of this name.
+        """
+        found = self.constants(topic)
+        if name not in found:
+            raise RecordingError(f"{self.path}: definition of {self._of(topic).schema.name}: no constant {name}")
+        return found[name]
+
     @cached_property
     def types(self) -> Typestore:
         """The message types as the bag's own definitions state them."""

@@ -27,19 +27,26 @@ def message_types(
     """
     store = get_typestore(Stores.EMPTY)
     for name, text in definitions:
-        try:
-            store.register(get_types_from_msg(text, name))
-        except TypesysError as error:
-            raise RecordingError(f"{source}: definition of {name}: {str(error).splitlines()[0]}") from None
+        _register(store, name, text, f"{source}: definition of {name}")
     for name, _ in definitions:
         _check(store, name, (), f"{source}: definition of {name}")
     for name, text in optional:
-        with suppress(TypesysError, RecordingError):
+        with suppress(RecordingError, TypesysError):
             alone = get_typestore(Stores.EMPTY)
-            alone.register(get_types_from_msg(text, name))
+            _register(alone, name, text, source)
             _check(alone, name, (), source)
             store.register(alone.fielddefs)
     return store
+
+
+def _register(store: Typestore, name: str, text: str, where: str) -> None:
+    try:
+        store.register(get_types_from_msg(text, name))
+    except TypesysError as error:
+        raise RecordingError(f"{where}: {str(error).splitlines()[0]}") from None
+    except Exception as error:
+        # The library parses more than it can compile: a list as a constant, or one that is infinite.
+        raise RecordingError(f"{where}: cannot be used ({type(error).__name__})") from None
 
 
 def _check(store: Typestore, name: str, within: tuple[str, ...], where: str) -> None:
