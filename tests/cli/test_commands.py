@@ -16,7 +16,7 @@ from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import scenario_names, scenario_text
 
 COMMANDS = sorted(command.callback.__name__.replace("_", "-") for command in app.registered_commands)
-PRINT_NO_NUMBERS = {"include", "play"}
+PRINT_NO_NUMBERS = {"cluster", "include", "play"}
 PUBLISHED_POINT = ("--altitude", "85000 ft", "--velocity", "7702.0808 ft/s")
 
 

@@ -19,6 +19,7 @@ WHOLE = {
     "docs/export.md": "tests/export/test_controller.py",
     "docs/explanation/notch.md": "tests/docs/test_code_blocks.py",
     "docs/hardware.md": "tests/docs/test_code_blocks.py",
+    "docs/hosts.md": "tests/graph/test_hosts.py",
     "docs/vehicle.md": "tests/docs/test_code_blocks.py",
     "examples/node/README.md": "tests/graph/test_own_controllers.py",
 }
@@ -93,7 +94,10 @@ NOT_RUN = {
     ("docs/mutation.md", "make mutation"): "takes an hour; tests/tools/test_mutation.py runs a part",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
     ("src/hsv/hsv/recording/report/plotly/README.md", NPM): "how a file of the repository was fetched",
-    ("docs/montecarlo.md", "pip install asyncssh"): "needs other machines",
+    (
+        "docs/montecarlo.md",
+        "hsv cluster worker-1 me@worker-2*8",
+    ): "needs other machines; tests/campaign/test_cluster.py",
     ("docs/montecarlo.md", ".venv/bin/dask scheduler"): "needs other machines",
     ("docs/montecarlo.md", HELM): "needs Kubernetes",
 }

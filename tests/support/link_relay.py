@@ -1,7 +1,7 @@
 """The network between emulated hosts: carries IP packets between namespaces with a delay and losses.
 
-Run as a process, ``python link_relay.py DELAY LOSS SEED NAMESPACE=ADDRESS...``; on its standard input, ``cut NAMESPACE``
-and ``join NAMESPACE`` disconnect a host and connect it again. Used where the kernel has no network emulation of its own.
+Run as a process, ``python link_relay.py DELAY LOSS SEED NAMESPACE=ADDRESS...``; on its standard input, ``cut
+NAMESPACE`` and ``join NAMESPACE`` disconnect a host and connect it again. Not every kernel emulates networks itself.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import struct
 import sys
 import time
 from itertools import count
+from pathlib import Path
 
 DEVICE = "hsv0"
 """Name of the network device in every namespace."""
@@ -29,7 +30,7 @@ _LARGEST = 65536
 def open_device(namespace: str) -> int:
     """Return the descriptor of a new TUN device in a network namespace; packets to and from it are read and written."""
     setns = ctypes.CDLL(None, use_errno=True).setns
-    with open("/proc/self/ns/net") as home, open(f"/var/run/netns/{namespace}") as there:
+    with Path("/proc/self/ns/net").open() as home, Path("/var/run/netns", namespace).open() as there:
         if setns(there.fileno(), _NEW_NETWORK):
             raise OSError(ctypes.get_errno(), f"setns {namespace}")
         try:

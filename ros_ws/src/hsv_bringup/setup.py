@@ -12,6 +12,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv_bringup"]),
         ("share/hsv_bringup", ["package.xml"]),
+        ("share/hsv_bringup/config", ["config/lossy_network.xml"]),
         ("share/hsv_bringup/launch", ["launch/sil.launch.py"]),
         ("share/hsv_bringup/urdf", ["urdf/airframe.urdf"]),
     ],

@@ -15,6 +15,7 @@ from hsv.cli.bench import bench
 from hsv.cli.certify import certify
 from hsv.cli.check import check
 from hsv.cli.claims import claims
+from hsv.cli.cluster import cluster
 from hsv.cli.command import command
 from hsv.cli.conclude import conclude
 from hsv.cli.design import design
@@ -122,6 +123,7 @@ for function in (
     claims,
     study,
     resilience,
+    cluster,
     set,
     command,
     topic,
