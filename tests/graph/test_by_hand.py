@@ -68,7 +68,7 @@ def test_a_flight_by_hand_is_told_and_can_be_repeated(processes: Processes) -> N
     assert exit_code_of(nodes["recorder"]) == 1
     processes.stop()
     said = {name: popen.communicate()[0] for name, popen in nodes.items()}
-    refused = said["recorder"].partition("a new run was announced: expected a recorder of its own")[2]
+    refused = said["recorder"].partition("a new run was announced: expected one recorder per run")[2]
     assert "closed the bag" in refused and "waiting for" not in refused, said["recorder"]
     run_id = re.search(r"starts run (\w{8}): 601 steps, 12 s", said["plant"])[1]
     for name in nodes.keys() - {"plant"}:
