@@ -40,7 +40,7 @@ COMMANDS = [
 SLOW = [
     ("certify", str(DESIGNS / "baseline.yaml")),
     ("certify", str(DESIGNS / "realistic.yaml"), "--density", "1 %", "--units", "paper"),
-    ("check", "lqr"),
+    ("check", "tube_mpc"),
     ("bench", "--only", "mcap", "--scale", "0.01"),
 ]
 
