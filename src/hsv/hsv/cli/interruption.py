@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import signal
+import sys
 from types import FrameType
+from typing import Any
 
 _LATER = 0.02
-"""Seconds after which an import is looked at once more."""
+"""Seconds after which it is tried once more where nothing could be raised, or what was raised was swallowed."""
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -32,3 +34,12 @@ def take_interrupts() -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
         signal.signal(number, interrupt)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
+    sys.unraisablehook = _interrupt_again
+
+
+def _interrupt_again(unraisable: Any) -> None:
+    """Raise ``KeyboardInterrupt`` once more where a finaliser, or what a compiled library has called, swallowed it."""
+    if issubclass(unraisable.exc_type, KeyboardInterrupt) and not sys.is_finalizing():
+        signal.setitimer(signal.ITIMER_REAL, _LATER)
+    else:
+        sys.__unraisablehook__(unraisable)
