@@ -54,7 +54,7 @@ def test_stability_without_the_notch_hangs_on_a_hundredth_of_the_coupling(findin
     finding = findings["stable without the notch"]
     assert finding.verdict is Verdict.CONDITIONS
     assert finding.readings[0].holds
-    assert values(finding)["critical coupling over the paper-like one"] == pytest.approx(1.0095, abs=1e-3)
+    assert values(finding)["critical coupling relative to the paper-like one"] == pytest.approx(1.0095, abs=1e-3)
     assert "0.2524" in finding.why
 
 
@@ -63,7 +63,7 @@ def test_a_slow_elevator_does_what_the_notch_is_for(findings):
     growth = {
         reading.actuators: reading.value
         for reading in findings["stable without the notch"].readings
-        if reading.what == "growth of the loop, nominal, paper-like coupling"
+        if reading.what == "largest real part of the poles, nominal vehicle, paper-like coupling"
     }
     assert growth["ideal"] == pytest.approx(-0.004, abs=5e-4)
     assert growth["elevator_150"] == pytest.approx(0.005, abs=5e-4)

@@ -98,7 +98,7 @@ def _print_claims(judged: dict[str, list[Judged]], verbose: bool, units: UnitSys
             table.add_row(entry.claim.name, _shorter(entry.claim.location), _verdict(entry))
         console.print(table)
     if verbose:
-        console.print("* the statement itself; the others ask for the same under other conditions")
+        console.print("* the statement itself; the other readings repeat it under other conditions")
     console.print(f"{tally(judged)}\n", style="bold")
 
 
@@ -130,7 +130,7 @@ def _print_ranking(ranks: dict[str, dict[str, Rank]], units: UnitSystem) -> None
         what, unit = METRICS[metric]
         said = f"{what}, {unit_in(units, unit)}".removesuffix(", 1")
         table.add_row(said, "nominal\nworst", *(Text("\n").join(_ranked(rank, unit, units)) for rank in row.values()))
-    table.add_row("mean place", "nominal\nworst", *("\n".join(f"{p:.1f}" for p in pair) for pair in places.values()))
+    table.add_row("mean rank", "nominal\nworst", *("\n".join(f"{p:.1f}" for p in pair) for pair in places.values()))
     console.print(table)
 
 

@@ -16,7 +16,7 @@ DESIGN = "adjustable"
 
 
 def relaxed(evidence: Evidence) -> dict[str, Any]:
-    """Return the bounds of the nominal inputs over the baseline's."""
+    """Return the bounds of the nominal inputs relative to the baseline's."""
     adjustable, baseline = evidence.design(DESIGN).flown, evidence.design("baseline").flown
     ratio = adjustable.nominal_input_bound / baseline.nominal_input_bound
     return {"fuel": ratio[0], "elevator": ratio[1]}

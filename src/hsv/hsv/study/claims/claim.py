@@ -1,4 +1,4 @@
-"""A statement of the paper, turned into numbers with thresholds as ``claims.toml`` says."""
+"""A statement of the paper and the numbers and thresholds that judge it, as specified in ``claims.toml``."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Row(BaseModel, frozen=True, extra="forbid"):
 
 
 class Claim(BaseModel, frozen=True, extra="forbid"):
-    """A statement, word for word, its place in the paper, and how it is measured: a claim of ``claims.toml``."""
+    """A claim of ``claims.toml``: quote, location in the paper, and how it is measured."""
 
     name: str
     quote: str
@@ -57,7 +57,7 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
     actuators: tuple[Actuators, ...] = ()
 
     def measure(self, evidence: Evidence) -> Finding:
-        """Return the readings, those that lead first, and the reasons with their numbers."""
+        """Return the readings, those of the statement itself first, and the explanation with its numbers."""
         measured = self._measured(evidence)
         words = measured.numbers | {name: measured.fact(row) for name, row in self.facts.items()} | vars(thresholds)
         behind = {
@@ -92,7 +92,7 @@ class Claim(BaseModel, frozen=True, extra="forbid"):
 
 @dataclass(frozen=True)
 class _Measured:
-    """The numbers of a claim's function by name, and what its rows read beside them."""
+    """The numbers of a claim's function by name, and the evidence from which its rows are measured."""
 
     evidence: Evidence
     numbers: dict[str, Any]
@@ -110,7 +110,7 @@ class _Measured:
         ]
 
     def fact(self, row: Row) -> _Fact:
-        """Return the measured quantity of a row, for the text."""
+        """Return the measured quantity of a row, for the explanation."""
         return _Fact(self.value(row, row.vehicle or "nominal"), row.unit)
 
     def named(self, limit: float | str) -> float:
@@ -143,7 +143,7 @@ class _Measured:
 
 @dataclass(frozen=True)
 class _Fact:
-    """A number (SI) in words: in the paper's unit, or as the format says."""
+    """A number (SI) for a text: in the paper's unit, or formatted as its format specifies."""
 
     value: float
     unit: str

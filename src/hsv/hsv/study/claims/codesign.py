@@ -26,17 +26,17 @@ from hsv.vehicle.envelope import FOOT
 DESIGN = "adjustable"
 
 RIGID = 10.0
-"""rad/s: below it is the rigid body, above it are the elastic modes."""
+"""rad/s: frequency between the rigid body and the elastic modes."""
 
 
 def vertices(evidence: Evidence) -> dict[str, Any]:
-    """Return the vertices of the co-designed model, and how many the baseline's has at which tolerance."""
+    """Return the vertices of the co-designed model, and number and tolerance of those of the baseline."""
     other = modelling.vertices(evidence)
     return modelling.vertices(evidence, DESIGN) | {"baseline": f"{other['count']:.0f}", "finer": other["tolerance"]}
 
 
 def conforms(evidence: Evidence) -> dict[str, Any]:
-    """Return by how much the co-designed model is off the ECM, and where most."""
+    """Return the differences between the co-designed model and the ECM, and where they are largest."""
     decibel, degree = _apart(evidence, "paper_like")
     low = FREQUENCIES < RIGID
     return {
@@ -54,7 +54,7 @@ def conforms(evidence: Evidence) -> dict[str, Any]:
 
 
 def _apart(evidence: Evidence, coupling: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return by how much (f) in dB and deg the co-designed model is off the ECM, elevator to filtered pitch rate."""
+    """Return the differences (f), dB and deg, between co-designed model and ECM, elevator to filtered pitch rate."""
     inputs = inputs_from_report(evidence.design(DESIGN).certificate["inputs"])
     point, period = (POINT[0] * FOOT, POINT[1] * FOOT), inputs.model.period
     model, ecm = (
@@ -65,7 +65,7 @@ def _apart(evidence: Evidence, coupling: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stabilises(evidence: Evidence) -> dict[str, Any]:
-    """Return what every gain of the family leaves to the unit circle at every vertex."""
+    """Return the smallest distance of the closed-loop spectral radius from 1 over gains and vertices."""
     flown = evidence.design(DESIGN).flown
     A, B = flown.polytope.A, flown.polytope.B
     radius = max(float(spectral_radii(A + B @ gain).max()) for gain in flown.nominal_gains)
@@ -73,7 +73,7 @@ def stabilises(evidence: Evidence) -> dict[str, Any]:
 
 
 def sets(evidence: Evidence) -> dict[str, Any]:
-    """Return half-widths (7) over those of Z: of the flown Z', and of the sets under F' for W' and for W / 2."""
+    """Return half-widths (7) relative to those of Z: of Z' as flown, and of the sets under F' for W' and W / 2."""
     flown = evidence.design(DESIGN).flown
     assert flown.tube is not None
     whole, measured, halved = _half_widths(evidence)

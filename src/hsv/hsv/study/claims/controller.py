@@ -15,9 +15,9 @@ from hsv.vehicle.dynamics import N_RIGID
 
 
 def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndarray) -> float:
-    """Return the largest factor on x' P x in a step under u = K x, at worst vertex and state: below 1 it decreases.
+    """Return the largest factor per step on x' P x under u = K x over vertices and states; below 1 it decreases.
 
-    What holds at the vertices holds in the whole polytope, x' P x being convex.
+    The factor applies to the whole polytope, because x' P x is convex.
 
     Args:
         A: (r, n, n) vertices.
@@ -30,7 +30,7 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 
 
 def box(evidence: Evidence) -> dict[str, Any]:
-    """Return the spectral radius that decides whether the paper's box exists."""
+    """Return the spectral radius that must be below 1 for the paper's box to exist."""
     flown = evidence.design("baseline").flown
     closed = np.abs(flown.polytope.A + flown.polytope.B @ flown.feedback_gain)
     return {"radius": float(spectral_radii(closed.max(axis=0)[None]).max())}
@@ -42,7 +42,7 @@ def certified_attitude(evidence: Evidence) -> dict[str, Any]:
 
 
 def input_set(evidence: Evidence) -> dict[str, Any]:
-    """Return the widths of U - FZ and the room of the nominal plan in it."""
+    """Return the widths of U ⊖ FZ and the margins of the nominal trajectory in it."""
     tightening = evidence.design("baseline").certificate["tube"]["tightening"]
     widths = np.array(tightening["upper"]) - np.array(tightening["lower"])
     rooms = np.minimum(tightening["plan"]["margin_to_lower"], tightening["plan"]["margin_to_upper"])
@@ -77,13 +77,13 @@ def used_inputs(evidence: Evidence, scenario: str, design: str) -> float:
 
 
 def nominal_inputs(evidence: Evidence) -> dict[str, Any]:
-    """Return the share used of the nominal inputs' bounds, and how far (ft/s) a single K misses the velocity."""
+    """Return the share used of the nominal inputs' bounds, and the velocity error (ft/s) with a single K."""
     single = abs(evidence.changed("case1_single_k")["velocity_end_error"])
     return {"used": used_inputs(evidence, "case1", "baseline"), "single": to_paper(single, "m/s")[0]}
 
 
 def symmetric(evidence: Evidence) -> dict[str, Any]:
-    """Return how far off zero the centres of W and Z are, over their half-widths."""
+    """Return the distances of the centres of W and Z from zero, relative to their half-widths."""
     tube = evidence.design("baseline").flown.tube
     assert tube is not None
     channels = evidence.design("baseline").certificate["tube"]["disturbance"]["channels"]

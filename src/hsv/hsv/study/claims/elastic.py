@@ -12,17 +12,17 @@ from hsv.vehicle.vehicle import load_vehicle
 
 
 def rejected_paper_like(evidence: Evidence) -> dict[str, Any]:
-    """Return in words up to which coupling the loop without filter is stable, and how many loops are not."""
+    """Return in words the coupling at which the loop without filter becomes unstable, and how many loops are."""
     limit, scale = critical(evidence), load_vehicle().coupling_scale("paper_like")
     return {
-        "limit": "no share" if limit is None else f"{limit:.4f}",
+        "limit": "no coupling studied" if limit is None else f"{limit:.4f} times the derived coupling",
         "margin": "" if limit is None else f", {100 * (limit / scale - 1.0):.1f} % above the paper-like one",
         "unstable": int(np.count_nonzero(evidence.growth("paper_like", ()) > 0.0)),
     }
 
 
 def rejected_derived(evidence: Evidence) -> dict[str, Any]:
-    """Return what becomes of the flight without filter and of the loops with the other one, derived coupling."""
+    """Return the results with the derived coupling: flight without filter, and loops with the baseline's filter."""
     without = evidence.changed("case1_derived_no_notch")
     section, other = (evidence.design(name).flown.notch[0] for name in ("baseline_derived", "baseline"))
     return {

@@ -30,7 +30,7 @@ ELEVATORS = {IDEAL: ()} | {name: (FUEL, ACTUATOR_SETS[name]) for name in ("eleva
 
 
 class Evidence:
-    """Measured once, when first asked for."""
+    """Measurements for the claims; each is computed once, when it is first requested."""
 
     def __init__(
         self,
@@ -44,10 +44,10 @@ class Evidence:
 
         Args:
             folder: Folder of tables and flights.
-            progress: Told of what is measured.
-            over: The vehicles, the nominal one first, all corners unless given.
+            progress: Called with what is measured.
+            over: Vehicles that are flown, the nominal one first; by default all corners.
             actuators: Actuators in loops and flights, from :data:`ELEVATORS`.
-            loops: The vehicles of loops, those of flights unless given.
+            loops: Vehicles of the linear loops; by default those that are flown.
         """
         self._folder = folder
         self._progress = progress
@@ -68,30 +68,30 @@ class Evidence:
 
     @property
     def vehicles(self) -> int:
-        """Number of vehicles that a table has: the nominal one and those at corners."""
+        """Number of vehicles in a table: the nominal one and those at corners."""
         return len(self.over)
 
     @cached_property
     def half_width(self) -> np.ndarray:
-        """Half-widths (5) of the baseline's set, by which errors of different states are compared."""
+        """Half-widths (5) of the baseline's set, the scales by which errors of different states are compared."""
         tube = self.design("baseline").flown.tube
         assert tube is not None
         return tube.half_width[:5]
 
     def _behind(self, actuators: str) -> Evidence:
-        """Return the evidence behind these actuators: itself if they are ideal, else flights of at most 32 corners."""
+        """Return the evidence with these actuators: this one if they are ideal, else flights of at most 32 corners."""
         if actuators == IDEAL:
             return self
         over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
         return Evidence(self._folder, self._progress, over, actuators, self._loops)
 
     def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
-        """Return what was measured on a scenario with the nominal vehicle (first) and at all corners."""
+        """Return the measurements of a scenario with the nominal vehicle (first) and at all corners."""
         changes = (*self._equipment, *changes)
         return corner_table(scenario, self.over, self._folder, self.half_width, self._progress, changes)
 
     def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
-        """Return what was measured on the nominal flight of a scenario with other parameters."""
+        """Return the measurements of the nominal flight of a scenario with other parameters."""
         values = {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
         return self._flown(values)
 
@@ -129,7 +129,7 @@ class Evidence:
     ) -> np.ndarray:
         """Return the largest real part, 1/s, of the sampled loop's poles, by vehicle, the nominal one first.
 
-        The worst of both ends of the step, before and after the fault; ``factor``: on the feedback, such as tau.
+        It is the largest of both ends of the step, before and after the fault. ``factor`` multiplies the feedback.
         """
         flown, found = self.design(design).flown, []
         what = f"poles, {coupling} coupling, {'with' if notch else 'without'} notch"
@@ -143,7 +143,7 @@ class Evidence:
 
 
 def nominal(table: Table, measure: str) -> float:
-    """Return the measurements on the nominal vehicle."""
+    """Return a measure of the nominal vehicle."""
     return float(table[measure][0])
 
 

@@ -1,4 +1,4 @@
-"""Numbers with thresholds, and the verdict that follows from them."""
+"""Readings, which are numbers with thresholds, and the verdict that follows from them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Verdict(StrEnum):
 
 
 def shown(value: float, unit: str, units: UnitSystem = UnitSystem.paper) -> str:
-    """Return a number (SI) with its unit, as the page the paper's; a time that is infinite lies beyond the flight."""
+    """Return a number (SI) with its unit, by default the paper's; an infinite time is beyond the end of the flight."""
     if not math.isfinite(value):
         return "not defined" if math.isnan(value) else "not by the end" if unit == "s" else "unbounded"
     number, name = in_system(value, unit, units)
@@ -35,7 +35,7 @@ class Reading:
     at_most: float | None = None
     at_least: float | None = None
     actuators: str = ""
-    """Actuators between command and vehicle, by name; empty if the claim names none: the paper's."""
+    """Name of the actuators between command and vehicle; empty for the paper's, if the claim names none."""
 
     def measured(self, units: UnitSystem = UnitSystem.paper) -> str:
         """Return the number with its unit."""
@@ -60,8 +60,8 @@ class Reading:
 class Finding:
     """The readings of a claim, and the reasons for their results.
 
-    The first ``leading`` readings are the statement itself under the paper's own conditions, one a number it speaks of;
-    the others ask the same under further conditions.
+    The first ``leading`` readings are the statement itself under the paper's own conditions, one for each number in it;
+    the others repeat it under further conditions.
     """
 
     readings: tuple[Reading, ...]
@@ -70,7 +70,7 @@ class Finding:
 
     @property
     def verdict(self) -> Verdict:
-        """Holds everywhere; as stated but not under all further conditions; not as stated, whatever else holds."""
+        """Whether the claim holds in all readings, only in those of the statement itself, or not in these."""
         kept = [reading.holds for reading in self.readings]
         if not all(kept[: self.leading]):
             return Verdict.FAILS

@@ -12,16 +12,19 @@ from hsv.vehicle.vehicle import load_vehicle
 def case1(evidence: Evidence, scenario: str = "case1") -> dict[str, Any]:
     """Return in words the ranges of the inputs over all flights of a scenario, and the permitted ranges."""
     table, limits, words = evidence.corners(scenario), load_vehicle().decoupled, []
-    for name, unit, said in (("fuel_equivalence_ratio", "1", "fuel ratio"), ("elevator_deflection", "rad", "elevator")):
+    for name, unit, said in (
+        ("fuel_equivalence_ratio", "1", "the fuel ratio ranges"),
+        ("elevator_deflection", "rad", "the elevator"),
+    ):
         low, high = float(table[f"{name}_minimum"].min()), float(table[f"{name}_maximum"].max())
-        words.append(f"{said} {shown(low, unit)} to {shown(high, unit)}")
+        words.append(f"{said} from {shown(low, unit)} to {shown(high, unit)}")
     fuel, elevator = (
         f"{shown(float(limits.input_minimum[i]), unit)} to {shown(float(limits.input_maximum[i]), unit)}"
         for i, unit in ((0, "1"), (1, "rad"))
     )
     return {
-        "ranges": f"{', '.join(words)} over {evidence.vehicles} flights",
-        "limits": f"Allowed are {fuel} and {elevator}.",
+        "ranges": f"{' and '.join(words)} over {evidence.vehicles} flights",
+        "limits": f"The permitted ranges are {fuel} and {elevator}.",
     }
 
 

@@ -17,7 +17,7 @@ from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
 SLOWEST_ELASTIC = 8.0
-"""rad/s: half the lower structural frequency; slower modes are the rigid body's."""
+"""rad/s: half the lower structural frequency; slower modes belong to the rigid body."""
 
 
 def open_loop_modes(coupling: str | float) -> list[Mode]:
@@ -35,13 +35,13 @@ def shift(coupling: str | float) -> float:
 
 
 def rise(coupling: str | float) -> np.ndarray:
-    """Return by how many dB coupling raises the pitch rate's answer to the elevator, over the modes' frequencies."""
+    """Return the increase (dB) by coupling of the pitch-rate response to the elevator, at the modes' frequencies."""
     coupled, alone = (pitch_rate_response(load_vehicle().coupled(name), FREQUENCIES) for name in (coupling, 0.0))
     return bode(coupled)[0] - bode(alone)[0]
 
 
 def vertices(evidence: Evidence, design: str = "baseline") -> dict[str, Any]:
-    """Return how many vertices a design's model has, and at which relative tolerance of the singular values."""
+    """Return the number of vertices of a design's model, and the relative tolerance of the singular values."""
     model = evidence.design(design).certificate
     rows, columns = model["model"]["vertices"]
     tolerance = model["inputs"]["model"]["tensor_product"]["tolerance"]
@@ -49,9 +49,9 @@ def vertices(evidence: Evidence, design: str = "baseline") -> dict[str, Any]:
 
 
 def coupling(evidence: Evidence) -> dict[str, Any]:
-    """Return what coupling does to the modes and to the pitch rate.
+    """Return the effect of coupling on the modes and on the pitch-rate response.
 
-    ``almost``: the relative shift of a mode up to which it counts as unmoved, a tenth of what parts the two modes.
+    ``almost``: the largest relative shift of a mode that counts as none, a tenth of the distance of the two modes.
     """
     vehicle = load_vehicle().decoupled
     return {
@@ -63,7 +63,7 @@ def coupling(evidence: Evidence) -> dict[str, Any]:
 
 
 def disturbance(evidence: Evidence) -> dict[str, Any]:
-    """Return on how many flights W was measured, and how many leave it."""
+    """Return the number of flights on which W was measured, and the number of those that leave it."""
     certificate, other = (evidence.design(name).certificate for name in ("baseline", "baseline_derived"))
     tube, flights = certificate["tube"], other["tube"]["flights"]
     return {
@@ -78,7 +78,7 @@ def disturbance(evidence: Evidence) -> dict[str, Any]:
 
 
 def seven_modes(evidence: Evidence) -> dict[str, Any]:
-    """Return how many modes of the coupled model are elastic, the rigid body's, and how many poles those are."""
+    """Return the numbers of elastic and rigid-body modes of the coupled model, and of the rigid body's poles."""
     found = open_loop_modes("paper_like")
     rigid = [mode for mode in found if mode.natural_frequency < SLOWEST_ELASTIC]
     poles = sum(1 + (mode.pole.imag > 0.0) for mode in rigid)

@@ -1,4 +1,4 @@
-"""The loop and its flights with the notch filter and without: stability, margins, the disturbance."""
+"""The loop and its flights with and without the notch filter: stability, margins, disturbances."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ WITH, WITHOUT = "case1", "case1_no_notch"
 
 
 def critical(evidence: Evidence) -> float | None:
-    """Return the share of the derived coupling at which the baseline's loop without notch stops being stable."""
+    """Return the share of the derived coupling at which the baseline's loop without notch becomes unstable."""
     flown = evidence.design("baseline").flown
     return critical_coupling(flown.feedback_gain, (), flown.period, hardware=evidence.hardware)
 
 
 def without_notch(evidence: Evidence) -> dict[str, Any]:
-    """Return the growth (1/s) of the loops without the notch, and by how much coupling they are stable."""
+    """Return the growth (1/s) of the loops without the notch, and the coupling up to which they are stable."""
     growth, flown = evidence.growth("paper_like", ()), evidence.design("baseline").flown
     share, limit = load_vehicle().coupling_scale("paper_like"), critical(evidence)
     margin = float("inf") if limit is None else limit / share
@@ -71,7 +71,7 @@ def margins(
     Those of a loop that is not stable are negative. ``vehicle``: paper-like and nominal unless given.
     """
     flown = evidence.design(design).flown
-    # Fine about the modes, where the gain just touches one.
+    # The grid is fine near the modes, where the gain barely reaches 1.
     top = 0.95 * np.pi / flown.period
     frequencies = np.unique(np.concatenate((np.geomspace(0.1, top, 3000), np.linspace(12.0, 22.0, 5001))))
     loop = sampled_loop(
@@ -124,7 +124,7 @@ def less_uncertainty(evidence: Evidence) -> dict[str, Any]:
 
 
 def closer(evidence: Evidence) -> dict[str, Any]:
-    """Return by how many per cent errors from the nominal trajectory are smaller with the notch, nominal vehicle."""
+    """Return the reduction (%) by the notch of errors from the nominal trajectory, nominal vehicle."""
     whole, rate = (
         nominal(evidence.corners(WITH), measure) / nominal(evidence.corners(WITHOUT), measure)
         for measure in ("rigid_error", "pitch_rate_error")

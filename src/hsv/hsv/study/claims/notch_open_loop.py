@@ -1,4 +1,4 @@
-"""The notch filter alone and on the open loop: what it does to peaks, to other frequencies, and where its zeros are."""
+"""The notch filter alone and in the open loop: effect on peaks and on other frequencies, location of its zeros."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _falls(sections: Sequence[NotchSection], coupling: str = "paper_like") -> di
 
 
 def coupling_in_pitch_rate(evidence: Evidence) -> dict[str, Any]:
-    """Return the shares of the pitch rate in what coupling changes."""
+    """Return the shares of the pitch rate in the effects of coupling."""
     sizes = evidence.design("baseline").certificate["inputs"]["model"]["tensor_product"]["state_scale"]
     scale = np.array(list(sizes.values()))
     (A, B), (A_alone, B_alone) = (_linearised(load_vehicle().coupled(name)) for name in ("paper_like", 0.0))
@@ -55,7 +55,7 @@ def _linearised(vehicle: VehicleParameters) -> tuple[np.ndarray, np.ndarray]:
 
 
 def peaks(evidence: Evidence) -> dict[str, Any]:
-    """Return the falls (dB) of both peaks, with the design's filter and with one centred at each mode."""
+    """Return the reductions (dB) of both peaks, with the design's filter and with one centred at each mode."""
     section = _section(evidence)
     fall = peak_falls([section])
     at, left = fall["first"].natural_frequency, fall["first"].after
@@ -67,12 +67,12 @@ def peaks(evidence: Evidence) -> dict[str, Any]:
         "second_centred": other["second"],
         "centre": section.zero_frequency,
         "mode": at,
-        "remains": "" if left is None else f" {left.magnitude:.1f} dB are left at {left.frequency:.2f} rad/s.",
+        "remains": "" if left is None else f" A peak of {left.magnitude:.1f} dB remains at {left.frequency:.2f} rad/s.",
     }
 
 
 def falls(evidence: Evidence) -> dict[str, Any]:
-    """Return the falls (dB) of both peaks with each coupling's filter, and the least over the poles of Figure 3."""
+    """Return the reductions (dB) of both peaks with each coupling's filter, and the smallest with Figure 3's poles."""
     section = _section(evidence)
     changed = [replace(section, pole_frequency=w) for w in POLE_FREQUENCIES]
     changed += [replace(section, pole_damping=damping) for damping in POLE_DAMPINGS]
@@ -111,7 +111,7 @@ def passed(evidence: Evidence) -> dict[str, Any]:
 
 
 def unit_circle(evidence: Evidence) -> dict[str, Any]:
-    """Return how far the zeros of the discrete filter are from the unit circle, and what deeper ones would gain."""
+    """Return the distance of the discrete filter's zeros from the unit circle, and the gain of a deeper notch."""
     ours, period = _section(evidence), evidence.design("baseline").flown.period
     ideal = replace(ours, zero_damping=0.0)
 

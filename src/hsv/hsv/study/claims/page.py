@@ -19,7 +19,7 @@ _CORNERS = 2 ** len(load_vehicle().uncertainty)
 
 
 def _elevator(name: str) -> str:
-    """Return what is said of the actuators of a reading."""
+    """Return the name of actuators for the page: the bandwidth of the elevator, or ideal or none."""
     actuators = ELEVATORS.get(name)
     return f"{actuators[1].natural_frequency:g} rad/s" if actuators else name
 
@@ -27,16 +27,17 @@ def _elevator(name: str) -> str:
 _BANDWIDTHS = ", ".join(_elevator(name) for name, actuators in ELEVATORS.items() if actuators)
 
 _HEADER = f"""# The paper's claims
-Made by `hsv claims --out docs/claims.md`; every number is measured. Each claim is quoted word for word and read in one
-or more ways; each reading is a number with a threshold (±0.5° and the limits of the inputs are the paper's; the paper
-gives no others, the rest are ours and have a reason). Readings in bold are the statement itself, under the paper's own
-conditions; the others ask the same under other conditions: other couplings, corners where the paper does not mention
-them, stricter readings. A claim **holds** if all readings do, **holds under conditions** if those in bold do but
-another does not, and **does not hold** if one in bold does not, regardless of the others.
+Made by `hsv claims --out docs/claims.md`; every number is measured. Each claim is quoted word for word and has one or
+more readings. A reading is a number with a threshold. The paper gives only two thresholds, ±0.5° and the limits of the
+inputs; the others are ours, with their reasons. Readings in bold are the statement itself under the paper's own
+conditions. The others repeat it under further conditions: another coupling, corners that the paper does not mention, or
+a stricter interpretation. A claim **holds** if all its readings hold, **holds under conditions** if those in bold hold
+but another does not, and **does not hold** if one in bold does not, regardless of the others. In the names of readings,
+*relative to* denotes a ratio.
 
-*Uncertain parameters*: the paper flies one perturbation and gives only its bounds; ours is half of each bound
-(`case1_uncertain`, `case2_uncertain`). *Corners*: all {_CORNERS} combinations of the bounds, each flown, and
-the nominal vehicle; the *worst corner* is the vehicle least favourable to the claim. The *paper-like* coupling is used
+*Uncertain parameters*: the paper flies one perturbation but gives only its bounds; ours is half of each bound
+(`case1_uncertain`, `case2_uncertain`). *Corners*: all {_CORNERS} combinations of the bounds are flown, in addition to
+the nominal vehicle; the *worst corner* is the vehicle least favourable to the claim. The coupling is *paper-like*
 unless another is named ([assumptions](assumptions.md)). With that coupling, the paper's statements on flights without
 the notch filter depend on a narrow margin ([modes rejected](#modes-rejected-paper-like-coupling)).
 
@@ -44,9 +45,9 @@ the notch filter depend on a narrow margin ([modes rejected](#modes-rejected-pap
 without the filter, a slow elevator stabilises the elastic modes. Readings of claims on the filter therefore name their
 actuators: none (the reading concerns only the filter or the vehicle), ideal, or a second-order elevator with this
 bandwidth ({_BANDWIDTHS})
-together with a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary says with which of them all readings hold
-(*yes*) and with which not. In flights with an elevator, the *worst corner* is that of {len(_SCREENED) - 1}; for loops,
-that of all.
+together with a fuel delivery of {FUEL.natural_frequency:g} rad/s. The summary lists the actuators with which all
+readings hold (*yes*) and those with which at least one does not (*not*). If the elevator is not ideal, flights cover
+only {len(_SCREENED) - 1} of the corners, and the *worst corner* is the worst of these; linear loops cover all corners.
 
 {REASONS}"""
 
@@ -61,9 +62,10 @@ def page(judged: dict[str, list[Judged]], ranks: dict[str, dict[str, Rank]]) -> 
 
 
 def tally(judged: dict[str, list[Judged]]) -> str:
-    """Return how many claims came to which verdict, in a sentence."""
+    """Return a sentence with the number of claims for each verdict."""
     counts = Counter(entry.finding.verdict for group in judged.values() for entry in group)
-    return f"Of {counts.total()} claims {', '.join(f'{counts[verdict]} {_PLURAL[verdict]}' for verdict in Verdict)}."
+    *first, last = (f"{counts[verdict]} {_PLURAL[verdict]}" for verdict in Verdict)
+    return f"Of {counts.total()} claims, {', '.join(first)}, and {last}."
 
 
 _PLURAL = {Verdict.HOLDS: "hold", Verdict.CONDITIONS: "hold under conditions", Verdict.FAILS: "do not hold"}
@@ -80,7 +82,7 @@ def _summary(judged: dict[str, list[Judged]]) -> str:
 
 
 def _conditions(readings: Sequence[Reading]) -> str:
-    """Return behind which actuators all readings of a claim hold and behind which not, empty where it names none."""
+    """Return the actuators with which all readings of a claim hold and those with which not; empty if it names none."""
     kept: dict[str, bool] = {}
     for reading in readings:
         if reading.actuators:
@@ -114,9 +116,10 @@ def _cell(text: str) -> str:
 def _ranking(ranks: dict[str, dict[str, Rank]]) -> str:
     controllers = list(next(iter(ranks.values())))
     rows = [
-        "Case 1 on the same metrics: nominal vehicle / worst of all vehicles, the place of each in brackets, smaller "
-        "is better. Robust MPC flies the decoupled model (DM) without filter, as in the paper, the tubes the coupled "
-        "one (CM). Rates that have not decayed at the end, 100 s after the fault, count as 100 s.\n",
+        "The controllers are compared in Case 1 on the same metrics. Each cell gives the nominal vehicle / the worst "
+        "of all vehicles, with the rank of each in brackets; smaller is better. Robust MPC flies the decoupled model "
+        "(DM) without the filter, as in the paper; the tube controllers fly the coupled model (CM). Rates that have "
+        "not decayed by the end, 100 s after the fault, count as 100 s.\n",
         "| | " + " | ".join(controllers) + " |",
         "| --- |" + " --- |" * len(controllers),
     ]
@@ -128,12 +131,12 @@ def _ranking(ranks: dict[str, dict[str, Rank]]) -> str:
         ]
         rows.append(f"| {what} | " + " | ".join(cells) + " |")
     places = mean_places(ranks)
-    rows.append("| **mean place** | " + " | ".join(f"{a:.1f} / {b:.1f}" for a, b in places.values()) + " |")
+    rows.append("| **mean rank** | " + " | ".join(f"{a:.1f} / {b:.1f}" for a, b in places.values()) + " |")
     return "\n".join(rows) + "\n"
 
 
 def mean_places(ranks: dict[str, dict[str, Rank]]) -> dict[str, tuple[float, float]]:
-    """Return the mean place of each controller over all metrics: nominal vehicle, worst of all."""
+    """Return the mean rank of each controller over all metrics: nominal vehicle, worst of all."""
     rows = list(ranks.values())
     return {
         name: (

@@ -1,4 +1,4 @@
-"""Robust MPC, tube, and tube with notch on the same metrics, the nominal vehicle and the worst corner."""
+"""Ranking of robust MPC and the tube controllers on the same metrics: nominal vehicle and worst corner."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ METRICS = {
     "velocity_end_error": ("velocity error at the end", "m/s"),
     "post_fault_altitude_error": ("largest altitude error after the fault", "m"),
     "post_fault_attitude_deviation": ("attitude excursion after the fault", "rad"),
-    "attitude_settling_time": ("attitude settled after", "s"),
-    "elastic_decay_time": ("elastic rates decayed after", "s"),
-    "elastic_rate_2_ringing": ("second elastic rate, span 10 s to 20 s after the fault", "kg^0.5 m/s"),
+    "attitude_settling_time": ("attitude settling time", "s"),
+    "elastic_decay_time": ("decay time of the elastic rates", "s"),
+    "elastic_rate_2_ringing": ("peak-to-peak second elastic rate, 10 s to 20 s after the fault", "kg^0.5 m/s"),
     "altitude_integral_absolute_error": ("integral of the altitude error", "m s"),
-    "elevator_deflection_maximum": ("largest elevator", "rad"),
-    "saturated_steps": ("limited steps", "1"),
+    "elevator_deflection_maximum": ("largest elevator deflection", "rad"),
+    "saturated_steps": ("steps with saturated inputs", "1"),
 }
-"""All of them better when smaller."""
+"""Name and unit by metric; smaller is better for all of them."""
 
 
 @dataclass(frozen=True)
 class Rank:
-    """A controller on a metric (SI): value and place for the nominal vehicle, and for the worst of all."""
+    """A controller on a metric (SI): value and rank for the nominal vehicle, and for the worst of all."""
 
     nominal: float
     worst: float
@@ -55,5 +55,5 @@ def ranking(evidence: Evidence) -> dict[str, dict[str, Rank]]:
 
 
 def _place(values: dict[str, float], name: str) -> int:
-    # Differences below a thousandth are none.
+    # Values that differ by less than a thousandth share a rank.
     return 1 + int(np.count_nonzero(np.array(list(values.values())) < values[name] * (1.0 - 1e-3)))

@@ -6,7 +6,7 @@ from typing import Any
 
 from hsv.study.claims.evidence import Evidence
 from hsv.study.claims.finding import shown
-from hsv.study.linear_loop import critical_coupling
+from hsv.study.linear_loop import COUPLING_SCALES, critical_coupling
 from hsv.vehicle.vehicle import load_vehicle
 
 FAMILY = "case1_rmpc_fourth_k"
@@ -20,7 +20,7 @@ def gains(evidence: Evidence) -> int:
 
 
 def losses(evidence: Evidence) -> dict[int, int]:
-    """Return how many vehicles robust MPC loses by gain, from the last of the family to the first that loses none."""
+    """Return the number of vehicles lost by gain, from the last of the family to the first that loses none."""
     lost = {}
     for index in reversed(range(gains(evidence))):
         changes = () if index == FLOWN_GAIN else (("robust_mpc.gain_index", index),)
@@ -31,7 +31,7 @@ def losses(evidence: Evidence) -> dict[int, int]:
 
 
 def rmpc_flexible(evidence: Evidence) -> dict[str, Any]:
-    """Return how the gains of robust MPC fare on the coupled model."""
+    """Return the results of robust MPC on the coupled model, by gain."""
     count, coupled = gains(evidence), ("vehicle.model", "CM")
     last, alone = (evidence.changed(FAMILY, ("robust_mpc.gain_index", count - 1), *c) for c in ((coupled,), ()))
     derived = [
@@ -40,7 +40,8 @@ def rmpc_flexible(evidence: Evidence) -> dict[str, Any]:
     ]
     family = evidence.design("baseline").flown
     limits = [critical_coupling(family.nominal_gains[index], (), family.period) for index in (0, count - 1)]
-    single_limit, last_limit = ("any share studied" if kappa is None else f"{kappa:.3f}" for kappa in limits)
+    studied = f"at least {COUPLING_SCALES[-1]:g}"
+    single_limit, last_limit = (studied if kappa is None else f"{kappa:.3f}" for kappa in limits)
     return {
         "gains": count,
         "lost": sum(flight["diverged"] for flight in derived),
@@ -55,7 +56,7 @@ def rmpc_flexible(evidence: Evidence) -> dict[str, Any]:
 
 
 def rmpc_altitude(evidence: Evidence) -> dict[str, Any]:
-    """Return how far off the altitude ends with the tightest gain, with the last one, and with the tube."""
+    """Return the altitude errors at the end with the last gain and with the tube, and which gains lose vehicles."""
     count, lost = gains(evidence), losses(evidence)
     last = evidence.changed(FAMILY, ("robust_mpc.gain_index", count - 1))
     tightest, error = min(lost), abs(last["altitude_end_error"])
@@ -72,6 +73,6 @@ def rmpc_altitude(evidence: Evidence) -> dict[str, Any]:
 
 def _survival(lost: dict[int, int], tightest: int, vehicles: int) -> str:
     if lost[tightest]:
-        return f"was flown, and loses {lost[tightest]} of {vehicles} vehicles"
-    tighter = ", ".join(f"number {index + 1} loses {count}" for index, count in lost.items() if count)
-    return f"loses none of {vehicles} vehicles" + (f" ({tighter})" if tighter else "")
+        return f"that was flown, and {lost[tightest]} of {vehicles} vehicles are lost with it"
+    tighter = ", ".join(f"{count} with number {index + 1}" for index, count in lost.items() if count)
+    return f"with which none of {vehicles} vehicles is lost" + (f" (lost: {tighter})" if tighter else "")
