@@ -1,4 +1,4 @@
-"""The curves of Figures 9 to 12, and when their nominal gain changes."""
+"""The curves of Figures 9 to 12, and the times at which their nominal gain changes."""
 
 from __future__ import annotations
 
@@ -17,26 +17,26 @@ SCENARIOS = (*NOTCH, *NO_NOTCH, *RMPC)
 """Scenarios of Figures 10 to 12."""
 
 
-def conditions(nominal: str = "thin") -> str:
-    """Return a description of the flights; ``nominal``: where those with nominal parameters are shown."""
+def conditions(nominal: str = "thin lines show") -> str:
+    """Return a description of the flights; ``nominal``: what shows those with nominal parameters."""
     return (
-        "Uncertain parameters as in `case1_uncertain` (mass +5 %, moment of inertia -5 %, the rest at half its bound), "
-        f"elevator effectiveness 0.9 from 100 s; {nominal}: nominal parameters. Robust MPC flies the decoupled model "
-        "without tube and notch filter, as in the paper, with the fourth gain of the family, the tightest with "
-        "which it loses no corner of the bounds"
+        "The uncertain parameters are those of `case1_uncertain` (mass +5 %, moment of inertia -5 %, the others at "
+        "half of their bounds), and the elevator effectiveness is 0.9 from 100 s on; "
+        f"{nominal} nominal parameters. Robust MPC flies the decoupled model without tube and notch filter, as in the "
+        "paper, with the fourth gain of the family, the tightest gain with which no corner of the bounds is lost."
     )
 
 
 def curves(material: Material, *, single: bool = False, vibrating: bool = False) -> list[Curve]:
-    """Return the controllers of Figures 9 to 12, what rings most lowest, so that the others are seen before it.
+    """Return the controllers of Figures 9 to 12; what rings most is drawn first, so that it does not hide the others.
 
     Args:
         material: Gives the flights.
         single: Show robust MPC with the single gain too.
-        vibrating: Robust MPC rings about as much as the tube with notch: lay it on top, thinner.
+        vibrating: Robust MPC rings about as much as the tube with notch: draw it last, with a thinner line.
     """
     f = material.flights
-    # Under the curve with notch, where both are the same, the one without stays visible.
+    # The curve without notch is wider, so that it stays visible where both are the same.
     without = ("Tube-MPC without notch", GREEN, NO_NOTCH, 2.0 if single else 1.1)
     tube = ("Tube-MPC with notch", BLUE, NOTCH, 1.1)
     robust = [("RMPC on the DM, fourth gain", ORANGE, RMPC, 0.7 if vibrating else 1.1)]

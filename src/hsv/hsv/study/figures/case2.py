@@ -1,4 +1,4 @@
-"""The curves of Figures 14 to 17, and what is measured on them."""
+"""The curves of Figures 14 to 17."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ BASELINE = ("case2_uncertain_baseline", "case2_baseline")
 SCENARIOS = (*ADJUSTABLE, *WHOLE, *BASELINE)
 
 
-def conditions(nominal: str = "thin") -> str:
-    """Return a description of the flights; ``nominal``: where those with nominal parameters are shown."""
+def conditions(nominal: str = "thin lines show") -> str:
+    """Return a description of the flights; ``nominal``: what shows those with nominal parameters."""
     return (
-        "Uncertain parameters as in `case2_uncertain` (those of Case 1), ramp from 20 s to 80 s, elevator "
-        f"effectiveness 0.9 from 100 s; {nominal}: nominal parameters. The adjustable design at the paper's tau = 0.8 "
-        "and at 1, and the baseline design on the same ramp"
+        "The uncertain parameters are those of `case2_uncertain` (the same as in Case 1). The ramp lasts from 20 s to "
+        f"80 s, and the elevator effectiveness is 0.9 from 100 s on; {nominal} nominal parameters. The adjustable "
+        "design is flown with the paper's tau = 0.8 and with tau = 1, and the baseline design on the same ramp."
     )
 
 

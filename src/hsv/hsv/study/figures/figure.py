@@ -54,7 +54,7 @@ class Material:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure drawn, and three remarks on it with the numbers of this drawing."""
+    """A drawn figure and three remarks on it, with the numbers of this drawing."""
 
     figure: Figure
     shows: str

@@ -42,14 +42,15 @@ def draw(material: Material) -> Drawing:
     rows, columns = model["vertices"]
     return Drawing(
         figure,
-        f"Elevator deflection to pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} ft/s, off the samples, both "
-        f"models discrete at {period:g} s; {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
-        "The two lines overlap: all over the envelope, all states and inputs, the Bode plots are "
-        f"{accuracy['bode_magnitude_error_db']:.1g} dB and {accuracy['bode_phase_error_deg']:.1g} deg apart at most; "
-        f"at {accuracy['points']} points the matrices differ by {accuracy['relative_frobenius_error']:.1g} of their "
-        "norm.",
-        "The paper does not say which point, input and output it shows. Both lines are of the decoupled model: the "
-        "comparison says nothing about what the coupling leaves out (Figure 4).",
+        f"The response is from elevator deflection to pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} ft/s, between "
+        f"the samples of the model. Both models are discrete with a period of {period:g} s; the polytopic model has "
+        f"{rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
+        "The two lines overlap. Over the whole envelope, for all states and inputs, the Bode plots differ by at most "
+        f"{accuracy['bode_magnitude_error_db']:.1g} dB and {accuracy['bode_phase_error_deg']:.1g} deg; at "
+        f"{accuracy['points']} points, the matrices differ by at most {accuracy['relative_frobenius_error']:.1g} of "
+        "their norm.",
+        "The paper does not say which point, input and output it shows. Both lines belong to the decoupled model, so "
+        "the comparison says nothing about the effect of the neglected coupling (Figure 4).",
     )
 
 

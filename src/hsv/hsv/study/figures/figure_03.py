@@ -1,4 +1,4 @@
-"""Figure 3: what the parameters of the notch filter do to the open loop."""
+"""Figure 3: effect of the parameters of the notch filter on the open loop."""
 
 from __future__ import annotations
 
@@ -46,12 +46,14 @@ def draw(material: Material) -> Drawing:
     lag = float(np.degrees(np.angle(notch_response([section], np.array([5.0]))[0])))
     return Drawing(
         figure,
-        "Elevator to pitch rate after the filter, coupled model with the paper-like coupling where Case 1 starts; "
-        f"zeros at {section.zero_frequency:g} rad/s with damping {section.zero_damping:g}.",
-        f"The peak of the first mode {peak_in_words(fall)}, with the design's filter; wider poles widen the notch.",
-        f"The filter is not free of charge off its centre: at 5 rad/s it takes {-lag:.0f} deg of phase. With omega_p "
-        "away from omega_z the gain above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %: one moves both "
-        "together. The paper gives neither its zeros nor the channel it shows.",
+        "The response is from elevator to filtered pitch rate of the coupled model, with the paper-like coupling, "
+        f"where Case 1 starts. The zeros are at {section.zero_frequency:g} rad/s, with a damping of "
+        f"{section.zero_damping:g}.",
+        f"With the design's filter, the peak of the first mode {peak_in_words(fall)}. A larger damping of the poles "
+        "widens the notch.",
+        f"The filter also acts away from its centre: at 5 rad/s it costs {-lag:.0f} deg of phase. If omega_p differs "
+        "from omega_z, the gain above the notch changes by (omega_p/omega_z)^2, 2.4 dB per 15 %; both should be moved "
+        "together. The paper gives neither its zeros nor the channel that it shows.",
     )
 
 

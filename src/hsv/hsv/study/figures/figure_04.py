@@ -71,14 +71,16 @@ def draw(material: Material) -> Drawing:
     fast = max(pole.real for pole in rigid)
     return Drawing(
         figure,
-        "Poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), both sets of inertial "
-        "coupling.",
-        f"{len(rigid)} poles of the rigid body and {len(like)} lightly damped pairs, the paper's seven motion modes; "
-        f"with the paper-like coupling the pairs are at {' and '.join(like)} rad/s, almost the structural "
-        f"{' and '.join(f'{omega:g}' for omega in frequencies)} rad/s. The rigid body is unstable, {fast:+.2f} 1/s.",
-        f"With the coupling derived from a beam model they are at {' and '.join(derived)} rad/s, not almost "
-        f"structural: the paper's statement is what makes the paper-like set {share:g} times the derived one. The "
-        f"seven count the slow pair as two: the rigid body has {len(slow)} modes.",
+        "The figure shows the poles of the coupled model linearised where Case 1 starts (85500 ft, 7900 ft/s), for "
+        "both sets of inertial coupling.",
+        f"There are {len(rigid)} poles of the rigid body and {len(like)} lightly damped pairs, the paper's seven "
+        f"motion modes. With the paper-like coupling, the pairs are at {' and '.join(like)} rad/s, close to the "
+        f"structural frequencies of {' and '.join(f'{omega:g}' for omega in frequencies)} rad/s. The rigid body is "
+        f"unstable, with a pole at {fast:+.2f} 1/s.",
+        f"With the coupling derived from a beam model, the pairs are at {' and '.join(derived)} rad/s, not close to "
+        f"the structural frequencies: the paper-like set is {share:g} times the derived one in order to agree with the "
+        "paper's statement. The number seven counts the slow pair of the rigid body as two modes; counted as one, the "
+        f"rigid body has {len(slow)} modes.",
     )
 
 

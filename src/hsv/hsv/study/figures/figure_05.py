@@ -46,14 +46,13 @@ def draw(material: Material) -> Drawing:
     phase.set_xticks([], minor=True)
     return Drawing(
         figure,
-        "Elevator to pitch rate, coupled model with the paper-like coupling where Case 1 starts; notch at "
-        f"{section[0].zero_frequency:g} rad/s.",
-        f"The peak beside the first mode {peak_in_words(falls['first'])}; that of the second, at the edge of the "
-        f"notch, {peak_in_words(falls['second'])}.",
-        f"The centre is {section[0].zero_frequency:g} rad/s, the value of the paper's Figure 3, and not the mode "
-        f"itself ({modes['first']:.2f} rad/s): a dip at the centre and a small peak at the mode "
-        "remain beside each other. The "
-        "lower centre serves the derived coupling too, whose first mode is lower, at "
+        "The response is from elevator to pitch rate of the coupled model, with the paper-like coupling, where Case 1 "
+        f"starts; the notch is at {section[0].zero_frequency:g} rad/s.",
+        f"The peak near the first mode {peak_in_words(falls['first'])}; the peak of the second mode, at the edge of "
+        f"the notch, {peak_in_words(falls['second'])}.",
+        f"The notch is centred at {section[0].zero_frequency:g} rad/s, the value of the paper's Figure 3, and not at "
+        f"the mode itself ({modes['first']:.2f} rad/s), so that a dip at the centre and a small peak at the mode "
+        "remain next to each other. The lower centre also suits the derived coupling, whose first mode is lower, at "
         f"{elastic_modes('derived')['first'].natural_frequency:.2f} rad/s.",
     )
 

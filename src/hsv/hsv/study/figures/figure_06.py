@@ -113,17 +113,19 @@ def draw(material: Material) -> Drawing:
     sizes = [_size(flight) for _, _, flight in flights.values()]
     return Drawing(
         figure,
-        f"Tube errors e = x - x_r - x_n with uncertain parameters at the same {len(INSTANTS)} instants, named by the "
-        "seconds since the fault where there is room, in three planes of the certified ellipsoid (its shadows), and "
-        "the level of the rigid errors in its shadow over time: of their distance from the centre c, which lies where "
-        "half of the lost elevator moves them, so that the fault brings them nearer to it.",
-        f"The rigid errors stay inside, with the notch (worst level {worst['Tube-MPC with notch']:.2f}) and without "
-        f"({worst['Tube-MPC without notch']:.2f}). Over the {len(INSTANTS)} instants the pitch-rate error with the "
-        f"notch is the smaller one {closer} times.",
-        "Closer to the nominal trajectory with the notch is true of the pitch rate, where the vibration shows (its "
-        f"root mean square over the 20 s after the fault is {sizes[0] / sizes[1]:.2f} times as large without), "
-        "and hardly of the other states, which the lost elevator and the parameters move. The set is certified for the "
-        "loop with the notch; without it the picture is no proof.",
+        f"The errors e = x - x_r - x_n with uncertain parameters are shown at the same {len(INSTANTS)} instants, which "
+        "are labelled with the seconds since the fault where there is space, in three projections of the certified "
+        "ellipsoid. The last panel shows the level of the rigid-body errors in the projected ellipsoid over time. The "
+        "level measures the distance from the centre c, to which half of the lost elevator shifts the errors, so that "
+        "the fault brings them closer to it.",
+        "The rigid-body errors stay inside the set, both with the notch (largest level "
+        f"{worst['Tube-MPC with notch']:.2f}) and without it ({worst['Tube-MPC without notch']:.2f}). The "
+        f"pitch-rate error is smaller with the notch at {closer} of the {len(INSTANTS)} instants.",
+        "The statement that the states are closer to the nominal trajectory with the notch is true of the pitch rate, "
+        "in which the vibration is visible (its root-mean-square error over the 20 s after the fault is "
+        f"{sizes[0] / sizes[1]:.2f} times as large without the notch). It is hardly true of the other states, which "
+        "are determined by the lost elevator and the parameters. The set is certified for the loop with the notch; "
+        "without the notch, the figure is no proof.",
     )
 
 

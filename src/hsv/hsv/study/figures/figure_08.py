@@ -52,17 +52,19 @@ def draw(material: Material) -> Drawing:
     rows, columns = certificate["model"]["vertices"]
     return Drawing(
         figure,
-        f"Elevator deflection to filtered pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} ft/s, off the samples, "
-        f"all discrete at {period:g} s; {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
-        "The co-designed model conforms to the ECM without its coupling, the notch included: all over the envelope, "
-        f"all states and inputs, {accuracy['bode_magnitude_error_db']:.2f} dB and "
-        f"{accuracy['bode_phase_error_deg']:.2f} deg apart at most; at {accuracy['points']} points the matrices differ "
-        f"by {accuracy['relative_frobenius_error']:.1g} of their norm.",
-        "To the ECM as the paper writes it, with its coupling (grey, paper-like), it conforms up to the elastic modes "
-        f"only: in what is drawn they are up to {decibel[loud]:.1f} dB ({FREQUENCIES[loud]:.1f} rad/s) and "
-        f"{degree[late]:.0f} deg ({FREQUENCIES[late]:.1f} rad/s) apart, beside the modes at {' and '.join(elastic)} "
-        "rad/s. No control-oriented model of the paper has these: that the weak coupling is ignored is part of the "
-        "design, and the price is that stability with flexibility has to be shown by other means.",
+        f"The response is from elevator deflection to filtered pitch rate at {POINT[0]:.0f} ft and {POINT[1]:.0f} "
+        f"ft/s, between the samples of the model. All models are discrete with a period of {period:g} s; the "
+        f"co-designed model has {rows * columns} vertices ({rows} in altitude, {columns} in velocity).",
+        "The co-designed model, which includes the notch, agrees with the ECM without its coupling. Over the whole "
+        f"envelope, for all states and inputs, they differ by at most {accuracy['bode_magnitude_error_db']:.2f} dB and "
+        f"{accuracy['bode_phase_error_deg']:.2f} deg; at {accuracy['points']} points, the matrices differ by at most "
+        f"{accuracy['relative_frobenius_error']:.1g} of their norm.",
+        "With the ECM as the paper writes it, including the coupling (grey, paper-like), the co-designed model agrees "
+        f"only below the elastic modes: the lines differ by up to {decibel[loud]:.1f} dB (at {FREQUENCIES[loud]:.1f} "
+        f"rad/s) and {degree[late]:.0f} deg (at {FREQUENCIES[late]:.1f} rad/s), near the modes at "
+        f"{' and '.join(elastic)} rad/s. No control-oriented model of the paper contains these modes: neglecting the "
+        "weak coupling is part of the design, and the price is that stability with flexibility must be shown by other "
+        "means.",
     )
 
 

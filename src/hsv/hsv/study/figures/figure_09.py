@@ -14,11 +14,11 @@ from hsv.study.figures.time_histories import ALTITUDE, VELOCITY, histories
 from hsv.vehicle.envelope import FOOT
 
 TOP = 86480.0
-"""ft: where the altitude panel ends, the single gain flies on."""
+"""ft: top of the altitude panel; the flight with the single gain goes beyond it."""
 
 
 def draw(material: Material) -> Drawing:
-    """Draw altitude and velocity, with the altitude error of robust MPC on the axis and the single gain's off it."""
+    """Draw altitude and velocity; the altitude with the single gain leaves its panel."""
     altitude = replace(ALTITUDE, shown=(85450.0, TOP))
     velocity = replace(VELOCITY, shown=(7880.0, 8190.0))
     figure = histories((altitude, velocity), case1.curves(material, single=True), reference=True, height=2.7)
@@ -40,14 +40,15 @@ def draw(material: Material) -> Drawing:
     velocity_off = measured(material, case1.RMPC_SINGLE[0], "velocity_end_error", "m/s")
     return Drawing(
         figure,
-        case1.conditions() + "; its single gain of the whole step is shown beside it.",
-        f"Both tubes track through the fault, {end[case1.NOTCH[0]]:.1f} ft from the command at 200 s with the notch "
-        f"and {end[case1.NO_NOTCH[0]]:.1f} ft without; robust MPC does not, it ends {end[case1.RMPC[0]]:.0f} ft off.",
-        "How far robust MPC ends off is the size of its gain, which the paper does not state: with the single gain of "
-        f"(32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. The tube keeps a few "
-        "feet of error, because its law has no integral action. The tubes' velocity bends "
+        case1.conditions() + " The single gain, designed for the whole step, is also shown.",
+        f"Both tube controllers track through the fault, with an altitude error at 200 s of {end[case1.NOTCH[0]]:.1f} "
+        f"ft with the notch and {end[case1.NO_NOTCH[0]]:.1f} ft without it. Robust MPC does not; its error at the end "
+        f"is {end[case1.RMPC[0]]:.0f} ft.",
+        "The error of robust MPC at the end depends on its gain, which the paper does not state: with the single gain "
+        f"of (32) to (35) it is {end[case1.RMPC_SINGLE[0]]:.0f} ft and {velocity_off:.0f} ft/s. An error of a few feet "
+        "remains with the tube controllers, because their law has no integral action. Their velocity has kinks "
         f"{case1.switches(material)}, where the nominal state enters the next smaller ellipsoid of the nested family "
-        "and the law takes its gain; the law of the paper has one gain and would not bend.",
+        "and the law switches to its gain; the paper's law has a single gain and would have no kinks.",
     )
 
 

@@ -24,14 +24,14 @@ def draw(material: Material) -> Drawing:
         rates[name] = np.degrees(np.ptp(flight.state[late, 4]))
     return Drawing(
         figure,
-        case1.conditions() + ".",
-        "Attitude moves at the fault and settles at the new equilibrium, less with the tube "
-        f"({off[case1.NOTCH[0]]:.2f} deg) than with robust MPC ({off[case1.RMPC[0]]:.2f} deg). With the notch it is "
-        f"the smoother: the pitch rate between 10 s and 20 s after the fault spans {rates[case1.NOTCH[0]]:.3f} deg/s, "
-        f"without it {rates[case1.NO_NOTCH[0]]:.3f} deg/s.",
-        f"The size of the excursion is set by the lost elevator and not by the notch: {off[case1.NO_NOTCH[0]]:.2f} "
-        "deg without it. What the notch takes away is the ringing that follows. The dips of the tubes before the fault "
-        f"follow switches of their gain {case1.switches(material)} (Figure 12).",
+        case1.conditions(),
+        "The attitude moves at the fault and settles at the new equilibrium. The excursion is smaller with the tube "
+        f"({off[case1.NOTCH[0]]:.2f} deg) than with robust MPC ({off[case1.RMPC[0]]:.2f} deg). The response is "
+        "smoother with the notch: between 10 s and 20 s after the fault, the peak-to-peak pitch rate is "
+        f"{rates[case1.NOTCH[0]]:.3f} deg/s with it and {rates[case1.NO_NOTCH[0]]:.3f} deg/s without it.",
+        "The size of the excursion is determined by the lost elevator and not by the notch: without the notch it is "
+        f"{off[case1.NO_NOTCH[0]]:.2f} deg. The notch removes the ringing that follows. The dips of the tube "
+        f"controllers before the fault follow gain switches {case1.switches(material)} (Figure 12).",
     )
 
 

@@ -30,18 +30,20 @@ def draw(material: Material) -> Drawing:
     bursts = [_largest(flight, flight.time[step]) for step in gain_switches(flight)]
     return Drawing(
         figure,
-        case1.conditions("middle column") + ".",
-        f"The coordinates vibrate at the fault and return to rest; with the notch within {decay[case1.NOTCH[0]]:.1f} "
-        f"s (5 % of the peak of their rates; nominal parameters {decay[case1.NOTCH[1]]:.1f} s), without it they still "
-        f"ring at the end, {decay[case1.NO_NOTCH[0]]:.0f} s later (nominal {decay[case1.NO_NOTCH[1]]:.0f} s).",
-        "Without the notch the second mode already grows before the fault with these parameters: its rate spans "
-        f"{before[0]:.2f} {_UNIT} from 30 s to 40 s and {before[1]:.2f} from 90 s to 100 s. The fault lowers the "
-        "gain of the loop and calms it. Robust MPC does not vibrate a lot more than the tubes: it flies the decoupled "
-        f"model, which feeds no vibration back (second rate after the fault {spans[1]:.2f}, tube with notch "
-        f"{spans[0]:.2f}); what moves far are its coordinates, with the angle of attack. The bursts of the tubes "
-        f"{case1.switches(material)} are switches of the nested family's gain, which moves the elevator in one step; "
-        f"with the notch the second rate reaches {max(bursts):.2f} in them, {_largest(flight, 100.0):.2f} at the "
-        "fault. The law of the paper has one gain and none of them.",
+        case1.conditions("the middle column shows"),
+        "The coordinates vibrate at the fault and return to rest. With the notch, both rates are within 5 % of their "
+        f"peak after {decay[case1.NOTCH[0]]:.1f} s (with nominal parameters, {decay[case1.NOTCH[1]]:.1f} s). Without "
+        f"the notch, they still ring at the end, {decay[case1.NO_NOTCH[0]]:.0f} s after the fault (with nominal "
+        f"parameters, they decay in {decay[case1.NO_NOTCH[1]]:.0f} s).",
+        "Without the notch, the second mode already grows before the fault with these parameters: its peak-to-peak "
+        f"rate is {before[0]:.2f} {_UNIT} from 30 s to 40 s and {before[1]:.2f} from 90 s to 100 s. The fault lowers "
+        "the loop gain and thereby reduces the vibration. Robust MPC does not vibrate a lot more than the tube "
+        "controllers: it flies the decoupled model, which feeds no vibration back (peak-to-peak second rate after the "
+        f"fault {spans[1]:.2f}, tube with notch {spans[0]:.2f}). Only its coordinates move far, with the angle of "
+        f"attack. The bursts of the tube controllers {case1.switches(material)} are gain switches of the nested "
+        f"family, which move the elevator within one step; with the notch, the second rate reaches {max(bursts):.2f} "
+        f"in them and {_largest(flight, 100.0):.2f} at the fault. The paper's law has a single gain and would have no "
+        "bursts.",
     )
 
 

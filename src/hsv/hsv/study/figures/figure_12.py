@@ -20,17 +20,18 @@ def draw(material: Material) -> Drawing:
     jumps = np.abs(flight.command[steps] - flight.command[steps - 1]).max(axis=0)
     return Drawing(
         figure,
-        case1.conditions() + f". Limits: {LIMITS}, drawn where they are near.",
-        f"The inputs keep to their limits, {limited(material, case1.SCENARIOS)}. Fuel ratio "
-        "and elevator range, uncertain and nominal parameters together, with the notch "
-        f"over {input_ranges(material, case1.NOTCH)}, without it over {input_ranges(material, case1.NO_NOTCH)}, by "
-        f"robust MPC over {input_ranges(material, case1.RMPC)}.",
-        "The tubes are far from the limits, so the figure says little about how their law behaves at them; robust MPC "
-        f"is not: at the step it asks for {largest[0]:.2f} of {limits[0]:g} of fuel and for {largest[1]:.0f} "
-        f"deg of {np.degrees(limits[1]):.0f} deg of elevator. The teeth of the tubes' inputs "
-        f"{case1.switches(material)}, up to {jumps[0]:.2f} and {np.degrees(jumps[1]):.1f} deg high, are switches of "
-        "the nested family's gain: nearer to rest a tighter gain fits in the same bounds. The law of the paper has one "
-        "gain and none of them. Without the notch the elevator carries the vibration.",
+        case1.conditions() + f" The limits, {LIMITS}, are drawn where they are near the curves.",
+        f"The inputs stay within their limits and are {limited(material, case1.SCENARIOS)}. With uncertain and nominal "
+        "parameters together, the fuel ratio and the elevator range over "
+        f"{input_ranges(material, case1.NOTCH)} with the notch, over {input_ranges(material, case1.NO_NOTCH)} without "
+        f"it, and over {input_ranges(material, case1.RMPC)} with robust MPC.",
+        "The tube controllers stay far from the limits, so the figure says little about their behaviour at the limits. "
+        f"Robust MPC does not: at the step it commands a fuel ratio of {largest[0]:.2f} (limit {limits[0]:g}) and an "
+        f"elevator deflection of {largest[1]:.0f} deg (limit {np.degrees(limits[1]):.0f} deg). The jumps in the inputs "
+        f"of the tube controllers {case1.switches(material)}, of up to {jumps[0]:.2f} and {np.degrees(jumps[1]):.1f} "
+        "deg, are gain switches of the nested family: closer to rest, a tighter gain satisfies the same bounds. The "
+        "paper's law has a single gain and would have no jumps. Without the notch, the vibration appears in the "
+        "elevator.",
     )
 
 

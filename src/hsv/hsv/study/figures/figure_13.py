@@ -32,13 +32,13 @@ def draw(material: Material) -> Drawing:
     passed = abs(notch_response(filter_.sections, np.array([modes["first"].natural_frequency]))[0])
     return Drawing(
         figure,
-        'Nominal parameters, as we read the paper\'s "nominal system", with the fault; notch at '
-        f"{filter_.sections[0].zero_frequency:g} rad/s, the second coupled mode is at "
+        'The parameters are nominal, which is our interpretation of the paper\'s "nominal system", and the fault '
+        f"occurs. The notch is at {filter_.sections[0].zero_frequency:g} rad/s; the second coupled mode is at "
         f"{modes['second'].natural_frequency:.2f} rad/s.",
         f"The second rate decays in {second[1]:.1f} s instead of {second[0]:.1f} s.",
-        f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, more than the slight effect the "
-        f"paper sees: a filter with poles this wide passes only {100.0 * passed:.0f} % of the pitch rate at the first "
-        "mode.",
+        f"The first rate decays in {first[1]:.1f} s instead of {first[0]:.1f} s, which is more than the slight effect "
+        f"that the paper describes: a filter with such wide poles passes only {100.0 * passed:.0f} % of the pitch rate "
+        "at the first mode.",
     )
 
 

@@ -18,12 +18,13 @@ def draw(material: Material) -> Drawing:
     end = measured(material, names[0], "altitude_end_error", "m")
     return Drawing(
         figure,
-        case2.conditions() + ".",
-        f"The ramp is tracked, at most {largest[0]:.0f} ft off and {end:.1f} ft at the end, through the fault.",
-        "The paper says that the adjustable scheme responds faster in velocity. Along a ramp nothing of it shows: the "
+        case2.conditions(),
+        f"The ramp is tracked through the fault; the altitude error is at most {largest[0]:.0f} ft, and {end:.1f} ft "
+        "at the end.",
+        "The paper says that the adjustable scheme responds faster in velocity. Along a ramp this cannot be seen: the "
         f"integral of the velocity error is {lag[0]:.0f} ft with tau = 0.8, {lag[1]:.0f} ft with tau = 1 and "
-        f"{lag[2]:.0f} ft with the baseline. The relaxed bounds of K' make velocity faster on a step; the ramp does "
-        "not need them. The length of the ramp is ours, the paper gives none.",
+        f"{lag[2]:.0f} ft with the baseline. The relaxed bounds of K' make the velocity response faster on a step; the "
+        "ramp does not need them. The length of the ramp is our choice; the paper gives none.",
     )
 
 

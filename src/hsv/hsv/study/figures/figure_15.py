@@ -21,13 +21,13 @@ def draw(material: Material) -> Drawing:
     rates = [_rate(material.flights[name]) for name in names]
     return Drawing(
         figure,
-        case2.conditions() + ".",
-        f"Attitude moves by {off[0]:.2f} deg at the fault and settles.",
-        f"With the whole feedback it moves less, {off[1]:.2f} deg, as with the baseline, {off[2]:.2f} deg: this is "
-        f"what tau = 0.8 costs. As the ramp begins and ends attitude moves too, by {moved[0]:.2f} deg and "
-        f"{moved[1]:.2f} deg: the reference's climb sets in and ends within one step. The baseline pitches faster "
-        f"then, {rates[2]:.2f} deg/s at most, the adjustable design {rates[0]:.2f} deg/s with tau = 0.8 and "
-        f"{rates[1]:.2f} deg/s with tau = 1.",
+        case2.conditions(),
+        f"The attitude moves by {off[0]:.2f} deg at the fault and settles.",
+        f"With tau = 1 it moves less, by {off[1]:.2f} deg, and with the baseline by {off[2]:.2f} deg: this is the "
+        f"price of tau = 0.8. The attitude also moves when the ramp begins, by {moved[0]:.2f} deg, and when it ends, "
+        f"by {moved[1]:.2f} deg, because the reference starts and stops climbing within one step. At these times, the "
+        f"largest pitch rate is {rates[2]:.2f} deg/s with the baseline; with the adjustable design it is "
+        f"{rates[0]:.2f} deg/s at tau = 0.8 and {rates[1]:.2f} deg/s at tau = 1.",
     )
 
 

@@ -16,12 +16,12 @@ def draw(material: Material) -> Drawing:
     nominal = [measured(material, name, "elastic_decay_time", "s") for name in (case2.ADJUSTABLE[1], case2.WHOLE[1])]
     return Drawing(
         figure,
-        case2.conditions("middle column") + ".",
+        case2.conditions("the middle column shows"),
         f"The coordinates vibrate at the fault and are at rest after {decay[0]:.1f} s (both rates within 5 % of "
         "their peak).",
-        f"So they are with tau = 1 ({decay[1]:.1f} s) and with the baseline ({decay[2]:.1f} s): all three fly the "
-        "notch filter, without which Case 1 rings on (Figure 11). With nominal parameters it takes "
-        f"{nominal[0]:.1f} s with tau = 0.8 and {nominal[1]:.1f} s with tau = 1.",
+        f"The same is true with tau = 1 ({decay[1]:.1f} s) and with the baseline ({decay[2]:.1f} s): all three fly "
+        "with the notch filter, without which the vibration continues in Case 1 (Figure 11). With nominal parameters, "
+        f"the decay takes {nominal[0]:.1f} s with tau = 0.8 and {nominal[1]:.1f} s with tau = 1.",
     )
 
 

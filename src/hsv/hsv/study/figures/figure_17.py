@@ -13,22 +13,23 @@ from hsv.study.figures.time_histories import INPUTS, Zoom, histories
 def draw(material: Material) -> Drawing:
     """Draw both inputs as commanded."""
     figure = histories(INPUTS, case2.curves(material), zoom=Zoom(98.0, 118.0), height=2.3)
-    peaks = [_answer(material, name) for name in (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])]
+    peaks = [_peak_delay(material, name) for name in (case2.ADJUSTABLE[0], case2.WHOLE[0], case2.BASELINE[0])]
     return Drawing(
         figure,
-        case2.conditions() + f". Limits: {LIMITS}, beyond what is drawn.",
-        f"The inputs stay within a reasonable range, {limited(material, case2.SCENARIOS)}. Fuel ratio "
-        "and elevator range, uncertain and nominal parameters together, "
-        f"with tau = 0.8 over {input_ranges(material, case2.ADJUSTABLE)}, with tau = 1 over "
-        f"{input_ranges(material, case2.WHOLE)}, with the baseline over {input_ranges(material, case2.BASELINE)}.",
-        f"With tau = 0.8 the elevator answers the fault later, its highest {peaks[0]:.2f} s after it, with tau = 1 "
-        f"{peaks[1]:.2f} s and with the baseline {peaks[2]:.2f} s. The jumps of the fuel ratio at 20 s and 80 s are "
-        "the climbing trim's: the reference's climb and acceleration set in and end within one step.",
+        case2.conditions() + f" The limits, {LIMITS}, are outside the range of the panels.",
+        f"The inputs stay within a reasonable range and are {limited(material, case2.SCENARIOS)}. With uncertain and "
+        "nominal parameters together, the fuel ratio and the elevator range over "
+        f"{input_ranges(material, case2.ADJUSTABLE)} with tau = 0.8, over {input_ranges(material, case2.WHOLE)} with "
+        f"tau = 1, and over {input_ranges(material, case2.BASELINE)} with the baseline.",
+        f"With tau = 0.8, the elevator responds later to the fault: its deflection is largest {peaks[0]:.2f} s after "
+        f"the fault, compared with {peaks[1]:.2f} s with tau = 1 and {peaks[2]:.2f} s with the baseline. "
+        "The jumps of the fuel ratio at 20 s and 80 s come from the climbing trim: the climb and the acceleration of "
+        "the reference start and stop within one step.",
     )
 
 
-def _answer(material: Material, scenario: str) -> float:
-    """Return how long after the fault (s) the elevator is highest."""
+def _peak_delay(material: Material, scenario: str) -> float:
+    """Return the time (s) from the fault to the largest elevator deflection."""
     flight = material.flights[scenario]
     assert flight.fault_start is not None
     after = flight.time >= flight.fault_start

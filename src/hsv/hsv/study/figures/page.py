@@ -5,7 +5,7 @@ from __future__ import annotations
 from hsv.study.figures.figure import Drawing, PaperFigure
 
 _PAGE = """# Figure {number}
-Made by `hsv figures --only {number} --out docs/figures`; the numbers are of this drawing.
+Made by `hsv figures --only {number} --out docs/figures`; the numbers are computed from the data of this drawing.
 
 ![Figure {number}, ours]({stem}.png)
 
@@ -21,7 +21,7 @@ Made by `hsv figures --only {number} --out docs/figures`; the numbers are of thi
 
 def page(figure: PaperFigure, drawing: Drawing) -> str:
     """Return the page in Markdown."""
-    runs = f"\nThe flights, one by one: {', '.join(f'`hsv run {name}`' for name in figure.scenarios)}.\n"
+    runs = f"\nThe flights can be repeated with {', '.join(f'`hsv run {name}`' for name in figure.scenarios)}.\n"
     return _PAGE.format(
         number=figure.number,
         stem=figure.stem,

@@ -1,4 +1,4 @@
-"""Numbers in the remarks on the figures, measured on the flights that are drawn."""
+"""Numbers for the remarks on the figures, measured on the flights that are drawn."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ def input_ranges(material: Material, scenarios: Sequence[str]) -> str:
 
 
 def limited(material: Material, scenarios: Sequence[str]) -> str:
-    """Return in how many steps of several flights a command was limited, in words."""
+    """Return in how many steps of several flights a command was saturated, in words."""
     steps = sum(int(np.any(material.flights[scenario].saturated, axis=1).sum()) for scenario in scenarios)
-    return f"limited in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
+    return f"saturated in {steps or 'no'} step{'s' if steps > 1 else ''} of the {len(scenarios)} flights"
 
 
 def peak_in_words(fall: PeakFall) -> str:
-    """Return from where to where a filter takes the peak of a mode, in words."""
+    """Return in words how far a filter lowers the peak of a mode."""
     start = f"falls from {fall.before.magnitude:.1f} dB at {fall.before.frequency:.2f} rad/s"
     if fall.after is None:
-        return f"{start}, none is left"
+        return f"{start} so far that no peak remains"
     end = f"to {fall.after.magnitude:.1f} dB at {fall.after.frequency:.2f} rad/s"
     return f"{start} {end}, by {fall.decibel:.1f} dB peak to peak"
 

@@ -1,4 +1,4 @@
-"""Panels over time: several controllers laid over one another, with uncertain and with nominal parameters."""
+"""Panels over time: several controllers in one panel, with uncertain and with nominal parameters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _THIN = 0.5
 """Width of the lines of nominal flights."""
 
 _NEAR = 1.0 / 3.0
-"""Share of a panel's range beyond its curves within which a limit is drawn; farther ones would flatten them."""
+"""A limit is drawn if it is within this share of the panel's range from the curves, so that they stay readable."""
 
 _OFF = 0.03
 """Share of a panel's range that is left between a limit and the panel's frame."""
@@ -64,12 +64,12 @@ class Zoom(NamedTuple):
 
 
 def column(index: int) -> Callable[[FlightData], np.ndarray]:
-    """Return what takes a state out of a flight."""
+    """Return a function that returns a state of a flight."""
     return lambda flight: flight.state[:, index]
 
 
 def command(index: int) -> Callable[[FlightData], np.ndarray]:
-    """Return what takes an input out of a flight, as commanded."""
+    """Return a function that returns a commanded input of a flight."""
     return lambda flight: flight.command[:, index]
 
 
@@ -110,11 +110,11 @@ def histories(
 
     Args:
         panels: Panels to show.
-        curves: Whom to show, the last one on top.
+        curves: Controllers to show, the last one on top.
         zoom: Range of an additional, enlarged column.
         reference: Whether the panels are altitude and velocity, with their commands.
-        nominal_apart: Give nominal flights a column of their own, where they would hide behind vibration; otherwise
-            they are thin lines on top.
+        nominal_apart: Show nominal flights in a column of their own, if vibration would hide them; otherwise they are
+            thin lines on top.
         height: Height of a row, inches.
     """
     columns = _columns(zoom, nominal_apart)
@@ -180,7 +180,7 @@ def _panel(axis: Axes, panel: Panel, curves: Sequence[Curve], column: _Column, r
     near = [limit for limit in limits if column.window is None and low - margin <= limit <= high + margin]
     for limit in near:
         axis.axhline(limit, **_LIMIT)
-    if near:  # off the panel's frame
+    if near:  # keep the limit visible beside the frame
         axis.set_ylim(min(low, min(near) - _OFF * (high - low)), max(high, max(near) + _OFF * (high - low)))
     if column.window:
         axis.set_xlim(column.window.start, column.window.end)
