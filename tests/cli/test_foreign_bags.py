@@ -11,6 +11,7 @@ import pytest
 from changed_bags import changed_bag
 from flown_bags import flown_bag
 
+from hsv.recording.reader import Bag
 from hsv.recording.topic import Topic
 
 Hsv = Callable[..., Any]
@@ -75,6 +76,19 @@ def test_a_field_that_a_definition_lacks_is_named(
         ran = hsv(*command.split(), str(made))
         assert ran.code == 2 and "recorded with another definition" in ran.err and ran.err.count("\n") == 1
         assert f"expected a field {field}" in ran.err and str(made) in ran.err
+
+
+def test_messages_whose_definition_is_damaged_are_recovered(hsv: Hsv, bag: Path, tmp_path: Path) -> None:
+    made = changed_bag(bag, tmp_path / "made", _with(FORCES, definition="no message\0"))
+    file = next(made.glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:-1000])
+    messages = sum(topic.count for topic in Bag(made).topics.values())
+    ran = hsv("recover", str(made), "--out", "new", "--json")
+    assert ran.code == 0 and ran.json["messages"] == messages and ran.json["lost_s"] is None
+    assert ran.json["loss"][-1].startswith("definition of hsv_msgs/msg/VehicleForces: ")
+    said = hsv("recover", str(made), "--out", "again").out
+    assert "an unknown time lost: definition of hsv_msgs/msg/VehicleForces: " in said
+    assert hsv("recover", "new").code == 2, "nothing is left to be recovered, and it is no whole bag"
 
 
 def test_an_attachment_that_is_no_text(hsv: Hsv, bag: Path, tmp_path: Path) -> None:

@@ -25,6 +25,7 @@ def recover(
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
+    from hsv.errors import RecordingError
     from hsv.recording.bag_warnings import loss_in_words
     from hsv.recording.reader import Bag
     from hsv.recording.recover import recover as mend
@@ -33,7 +34,15 @@ def recover(
     recovery = mend(bag, out)
     kept = Bag(recovery.path)
     start, end = kept.span
-    seconds, lost = (end - start) * 1e-9, lost_seconds(kept)
+    seconds = (end - start) * 1e-9
+    lost: float | None
+    try:
+        lost, missing = lost_seconds(kept), irregularities(kept)
+    except RecordingError as error:
+        if not recovery.changed:
+            raise
+        # A definition is damaged: its messages are kept, and cannot be decoded.
+        lost, missing = None, [str(error).removeprefix(f"{kept.path}: ")]
     loss = recovery.bag.loss
     if json:
         print_json(
@@ -46,7 +55,7 @@ def recover(
                 "lost_messages_counted": loss.counted,
                 "lost_attachments": loss.attachments,
                 "lost_s": lost,
-                "loss": loss_in_words(loss) + irregularities(kept),
+                "loss": loss_in_words(loss) + missing,
             }
         )
         return
@@ -58,5 +67,7 @@ def recover(
     console.print(f"{recovery.path}: {recovery.messages} messages, {seconds:.2f} s", soft_wrap=True)
     for words in loss_in_words(loss):
         console.print(words, soft_wrap=True)
-    if lost:
-        console.print(f"{lost:.2f} s lost: {'; '.join(irregularities(kept))}", soft_wrap=True)
+    if lost is None:
+        console.print(f"an unknown time lost: {'; '.join(missing)}", soft_wrap=True)
+    elif lost:
+        console.print(f"{lost:.2f} s lost: {'; '.join(missing)}", soft_wrap=True)
