@@ -68,8 +68,9 @@ def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay) -> Non
     for name in ("baseline.yaml", "baseline.certificate.json"):
         (tmp_path / name).symlink_to(DESIGNS / name)
     with own_environment() as environment:
-        mark = f"HSV_INTERRUPTED={tmp_path.name}"
-        marked = environment | {"HSV_INTERRUPTED": tmp_path.name}
+        # The whole path: other test runs on this machine have a folder of this name, too.
+        mark = f"HSV_INTERRUPTED={tmp_path}"
+        marked = environment | {"HSV_INTERRUPTED": str(tmp_path)}
         command = ["hsv", *words.split(), *(["--out", "mine.yaml"] if words.startswith("design") else [])]
         popen = subprocess.Popen(
             command,
