@@ -5,7 +5,7 @@ from __future__ import annotations
 from hsv.study.figures.figure import Drawing, PaperFigure
 
 _PAGE = """# Figure {number}
-Made by `hsv figures --only {number} --out docs/figures`; the numbers are computed from the data of this drawing.
+Made by `hsv figures --only {number} --out docs/figures`, including all numbers.
 
 ![Figure {number}, ours]({stem}.png)
 

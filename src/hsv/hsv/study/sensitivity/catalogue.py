@@ -10,7 +10,7 @@ STUDIES: dict[str, Study] = {
 }
 
 _PAGE = """# Sensitivity: {title}
-Made by `hsv study {name} --out docs/study`; the numbers are of this run.
+Made by `hsv study {name} --out docs/study`, including all numbers.
 
 ![{title}]({name}.png)
 

@@ -34,7 +34,7 @@ class Controller:
     design: str = "baseline"
     changes: tuple[tuple[str, Any], ...] = ()
     kept: bool = True
-    """Whether its flights are kept: they hang on nothing but parameters and this library"""
+    """Whether its flights are kept, because they depend only on the parameters and this library."""
 
     def parameters(self) -> dict[str, Any]:
         """Flat parameters of the flight."""
@@ -106,10 +106,10 @@ def growth(
     *,
     notch: Sequence[NotchSection] | None = None,
 ) -> float:
-    """Return the largest real part (1/s) of the sampled loop's poles, the worst as in :func:`worst_growth`.
+    """Return the largest real part (1/s) of the sampled loop's poles, over all cases of :func:`worst_growth`.
 
     Args:
-        controller: Its feedback, and its filter where ``notch`` gives no other.
+        controller: Controller with the feedback, and with the filter unless ``notch`` gives another.
         vehicle: Coupled or not.
         notch: Sections of the filter.
     """
@@ -119,7 +119,7 @@ def growth(
 
 @dataclass(frozen=True)
 class CouplingLimits:
-    """kappa at which the linear loop stops being stable, of the nominal vehicle and of the worst of ``over``."""
+    """kappa at which the linear loop becomes unstable, of the nominal vehicle and of the worst of ``over``."""
 
     nominal: float | None
     worst: float | None
@@ -128,10 +128,13 @@ class CouplingLimits:
     def said(self) -> str:
         """Return both in words."""
         nominal, worst = (
-            f"{COUPLING_SCALES[-1]:g} at least" if limit is None else f"{limit:.2f}"
+            f"at least κ = {COUPLING_SCALES[-1]:g}" if limit is None else f"κ = {limit:.2f}"
             for limit in (self.nominal, self.worst)
         )
-        return f"linear loop stable up to κ = {nominal} (nominal vehicle), {worst} (worst of {said_corners(self.over)})"
+        return (
+            f"the linear loop is stable up to {nominal} (nominal vehicle) and {worst} (worst of "
+            f"{said_corners(self.over)})"
+        )
 
 
 def coupling_limits(

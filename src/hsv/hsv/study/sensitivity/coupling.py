@@ -25,7 +25,7 @@ from hsv.study.sensitivity.controllers import (
 )
 from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.study.sensitivity.sweep_figures import draw_metric, legend, lost_where, widths
+from hsv.study.sensitivity.sweep_figures import SATURATED, draw_metric, legend, lost_where, widths
 from hsv.vehicle.vehicle import load_vehicle
 
 PAPER_LIKE = load_vehicle().coupling_scale("paper_like")
@@ -33,7 +33,7 @@ PAPER_LIKE = load_vehicle().coupling_scale("paper_like")
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Fly and linearise every controller from kappa = 0, the decoupled model, on."""
+    """Fly and linearise every controller, beginning at kappa = 0, the decoupled model."""
     kappas = grid(COUPLING_SCALES[0], COUPLING_SCALES[-1], 0.05, coarseness)
     over = corners_of(1.0, coarseness)
     results = sweep("coupling", {c: [_point(c, float(k), over) for k in kappas] for c in ALL}, folder, progress)
@@ -67,10 +67,11 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     findings = [f"{c.label}: {limits[c].said()}; {lost_where(kappas, results[c], 'κ = {}')}" for c in ALL]
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, nominal vehicle (solid) and the worst of {said_corners(over)} of the "
-        "parameter bounds (dashed). (a) Linear sampled loop, the worst of both ends of the step, before and after the "
-        "fault; its limits below are found by root finding. (b), (c) Flights, a line ends where one is lost; a decay "
-        f"of 100 s: not before the end of the flight. {SAID_RMPC}; with κ = 0 and without notch it is the one of the "
+        f"Case 1 on the coupled model, with the nominal vehicle (solid) and the worst of {said_corners(over)} of the "
+        "parameter bounds (dashed). (a) Largest real part of the poles of the linear sampled loop, over both ends of "
+        "the step, before and after the fault; the limits of stability below are found by root finding. (b), (c) "
+        "Flights; a line ends where a flight is lost, and a decay time of 100 s means that the rates have not decayed "
+        f"by the end of the flight. {SATURATED} {SAID_RMPC}; with κ = 0 and without notch, it is the controller of the "
         "paper, which flies it on the decoupled model only.",
         (*findings, _margin(limits[WITHOUT_NOTCH])),
         {
@@ -97,13 +98,13 @@ def _margin(limits: CouplingLimits) -> str:
     unstable = np.array(growth_over(WITHOUT_NOTCH, PAPER_LIKE, list(limits.over))) >= 0.0
     said = f"the paper-like coupling, κ = {PAPER_LIKE:.2f},"
     if limits.nominal is None:
-        return f"{said} is below any limit of the {WITHOUT_NOTCH.label}"
+        return f"{said} is below the limit of the {WITHOUT_NOTCH.label}, which is stable at every coupling studied"
     share = PAPER_LIKE / limits.nominal - 1.0
     side = "below" if share < 0.0 else "above"
     return (
-        f"{said} lies {abs(100.0 * share):.1f} % {side} the limit of the {WITHOUT_NOTCH.label}, κ = "
-        f"{limits.nominal:.4f} (nominal vehicle), whose linear loop is unstable there at {unstable[1:].sum()} of "
-        f"{said_corners(limits.over)}"
+        f"{said} is {abs(100.0 * share):.1f} % {side} the limit of stability of the {WITHOUT_NOTCH.label}, κ = "
+        f"{limits.nominal:.4f} (nominal vehicle); with the paper-like coupling, the linear loop without notch is "
+        f"unstable at {unstable[1:].sum()} of the {len(limits.over) - 1} corners"
     )
 
 

@@ -1,4 +1,4 @@
-"""The adjustable factor tau: what it buys and what it costs, from 1 to where the loop is lost."""
+"""Benefit and cost of the adjustable factor tau, from 1 to the factor at which the loop is lost."""
 
 from __future__ import annotations
 
@@ -66,16 +66,16 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 def _shows(over: Sequence[Corner]) -> str:
     selection = said_corners(fraction(load_vehicle().uncertainty))
     return (
-        "The adjustable design made anew for each factor, and flown. (a) Rightmost pole of the linear sampled loop "
-        "around the coupled vehicle, notch filter included, the worst of both ends of the step, before and after the "
-        f"fault; nominal vehicle (solid), worst of {said_corners(over)} of the parameter bounds (dashed); shaded: one "
-        "Lyapunov function is found for the factor and everything up to 1, over the vertices of the design's model, "
-        "which knows no coupling. (b) Half-width of the invariant set in "
-        "velocity: Z' for the gain in use and W'(τ), the same for the whole W, and the paper's τZ. (c) What is left "
-        "for the nominal input about the target's trim, on the side with less of it, as a share of that at τ = 1 (eq. "
+        "The adjustable design is computed and flown for each factor. (a) Largest real part of the poles of the linear "
+        "sampled loop around the coupled vehicle, including the notch filter, over both ends of the step, before and "
+        f"after the fault: nominal vehicle (solid), and the worst of {said_corners(over)} of the parameter bounds "
+        "(dashed). Shaded: one Lyapunov function is found for the factor and all larger ones up to 1, over the "
+        "vertices of the design's model, which does not include the coupling. (b) Half-width of the invariant set in "
+        "velocity: Z' for the gain in use and W'(τ), the same for the full W, and the paper's τZ. (c) Range that "
+        "remains for the nominal input about the target's trim, on the smaller side, relative to that at τ = 1 (eq. "
         "53). (d) Time until a step of +600 ft, +250 ft/s has settled to 2 % under K'(τ). (e) Case 2: integral of the "
-        "error of altitude and velocity, nominal vehicle, as a share of that at τ = 1. (f) Attitude after the fault, "
-        f"from nominal: nominal vehicle, and the worst of {selection}, another selection."
+        "error of altitude and velocity, nominal vehicle, relative to that at τ = 1. (f) Attitude deviation from "
+        f"nominal after the fault: nominal vehicle, and the worst of {selection}, a different selection."
     )
 
 
@@ -103,32 +103,33 @@ def _draw_sets(panel: Axes, done: FactorStudy, tau: np.ndarray) -> None:
 def _findings(done: FactorStudy, linear: str) -> tuple[str, ...]:
     degrees, feet = to_paper(1.0, "rad")[0], to_paper(1.0, "m/s")[0]
     found = [
-        f"one Lyapunov function for every factor from τ = {done.least_certified:.2f} to 1; the linear loop is stable "
-        + ", ".join(
-            f"{_stable(nominal)} (nominal vehicle) and {_stable(worst)} (worst of {linear}) with the "
-            f"{name.replace('_', '-')} coupling"
+        f"one Lyapunov function is found for every factor from τ = {done.least_certified:.2f} to 1; "
+        + "; ".join(
+            f"with the {name.replace('_', '-')} coupling, the linear loop is stable {_stable(nominal)} (nominal "
+            f"vehicle) and {_stable(worst)} (worst of {linear})"
             for name, (nominal, worst) in done.limits.items()
         )
     ]
     first = done.rows[0]
     for row in done.rows:
-        settled = ", ".join(
-            f"{name} {value:.1f} s" for name, value in zip(("altitude", "velocity"), row.settling, strict=True)
+        settled = " and ".join(
+            f"{value:.1f} s ({name})" for name, value in zip(("altitude", "velocity"), row.settling, strict=True)
         )
         room = " and ".join(f"{value:.2f}" for value in row.room / first.room)
         share = row.ramp / first.ramp
         found.append(
-            f"at τ = {row.tau:g}: Z' {feet * row.half_width[1]:.1f} ft/s, τZ {feet * row.scaled[1]:.1f} ft/s; room of "
-            f"the nominal input (fuel and elevator) {room} of that at 1; step settled in {settled}; Case 2 error over "
-            f"time {share[0]:.2f} (altitude) and {share[1]:.2f} (velocity) of that at 1; attitude after the fault "
-            f"{degrees * row.attitude:.3f} deg, worst corner {degrees * row.worst_attitude:.3f} deg, its end "
-            f"{feet * row.worst_error[0]:.1f} ft and {feet * row.worst_error[1]:.1f} ft/s off"
+            f"at τ = {row.tau:g}, the half-width in velocity is {feet * row.half_width[1]:.1f} ft/s (Z') and "
+            f"{feet * row.scaled[1]:.1f} ft/s (τZ); the range of the nominal input (fuel and elevator) is {room} times "
+            f"that at τ = 1; the step settles in {settled}; the integral of the error in Case 2 is {share[0]:.2f} "
+            f"(altitude) and {share[1]:.2f} (velocity) times that at τ = 1; the attitude deviation after the fault is "
+            f"{degrees * row.attitude:.3f} deg (worst corner {degrees * row.worst_attitude:.3f} deg); the largest "
+            f"errors at the end are {feet * row.worst_error[0]:.1f} ft and {feet * row.worst_error[1]:.1f} ft/s"
         )
     return (*found, _claim(done))
 
 
 def _claim(done: FactorStudy) -> str:
-    """Return what shows of the paper's claim that a smaller factor is faster and less robust (section 4.3)."""
+    """Return what the flights show of the paper's claim that a smaller factor is faster but less robust (4.3)."""
 
     def compared(before: float, after: float, less: str, more: str) -> str:
         return less if after < before else more
@@ -136,21 +137,21 @@ def _claim(done: FactorStudy) -> str:
     first, last = done.rows[0], done.rows[-1]
     velocity = compared(first.settling[1], last.settling[1], "settles sooner", "does not settle sooner")
     tau = [row.tau for row in done.rows[1:] if row.settling[0] > first.settling[0]]
-    altitude = f"later at τ = {', '.join(f'{t:g}' for t in tau)}" if tau else "no later"
+    altitude = f"settles later at τ = {', '.join(f'{t:g}' for t in tau)}" if tau else "does not settle later"
     ramp = compared(first.ramp[1], last.ramp[1], "is followed more closely", "is followed less closely")
     attitude = compared(first.worst_attitude, last.worst_attitude, "moves less", "moves more")
-    size = compared(first.half_width[1], last.half_width[1], "smaller", "larger, not smaller as τZ is")
+    size = compared(first.half_width[1], last.half_width[1], "smaller", "larger, whereas τZ is smaller")
     return (
-        f"of the paper's claim, from τ = {first.tau:g} to {last.tau:g}: the velocity {velocity} after a step, because "
-        f"K' may use more of the inputs, altitude {altitude}; the ramp, on which the nominal input has nothing to "
-        f"do, {ramp}; after the "
-        f"fault the attitude {attitude}; the set of the gain that flies is {size}"
+        f"the paper claims that a smaller factor is faster but less robust. From τ = {first.tau:g} to {last.tau:g}, "
+        f"the velocity {velocity} after a step, because K' may use more of the inputs; the altitude {altitude}; the "
+        f"ramp, on which the nominal input is hardly used, {ramp}; after the fault the attitude {attitude}; and the "
+        f"set of the gain in flight is {size}"
     )
 
 
 def _stable(limit: float | None) -> str:
     if limit is None:
-        return f"down to τ = {FINE[0]:g} at least"
+        return f"down to at least τ = {FINE[0]:g}"
     return "not even at τ = 1" if limit == 1.0 else f"down to τ = {limit:.2f}"
 
 

@@ -46,7 +46,7 @@ def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: S
     figure = new_figure(7.2)
     label = "elevator effectiveness after the fault (0.9: the paper's)"
     axes = draw_losses(figure, shares, {c: results[c] for c in (*ALL, *others)}, label)
-    # Without a fault hardly anything moves: that end of the curves would take most of the axis.
+    # Without a fault the excursions are tiny, and that end of the curves would take most of the axis.
     axes[1].set_ylim(bottom=0.05)
     axes[2].set_ylim(bottom=1.0)
     for axis in axes:
@@ -54,8 +54,8 @@ def run_beside(coarseness: float, folder: Path, progress: Progress, scenarios: S
         axis.set_xlim(1.0, 0.3)
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {said_corners(over)} of the parameter "
-        f"bounds. {LOSSES} {SAID_RMPC}.",
+        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
+        f"{said_corners(over)} of the parameter bounds. {LOSSES} {SAID_RMPC}.",
         tuple(
             finding(c, shares, columns, "effectiveness {}", digits=3, rising=False) for c, columns in results.items()
         ),

@@ -1,7 +1,7 @@
-"""The largest gust that a controller bears, by root finding over its velocity in simulated flights.
+"""The largest gust that a controller tolerates, by root finding over its velocity in simulated flights.
 
 Level flight at the end of Case 1's step with its fault, the nominal vehicle behind an elevator of 50 rad/s with its
-limits, among them stops nearer than those of the vehicle. The transient of the fault is over when the gust comes.
+limits, including stops that are closer than the vehicle's. The transient of the fault has ended before the gust.
 """
 
 from __future__ import annotations
@@ -33,25 +33,31 @@ STOP = ACTUATOR_SETS[SURFACE].stop
 
 @dataclass(frozen=True)
 class Shape:
-    """A gust 1 - cos that builds up over ``length`` (m), and stays or falls as it rose."""
+    """A 1 - cos gust that builds up over ``length`` (m), and then stays or decays over the same length."""
 
     length: float
     stays: bool
 
     @property
+    def key(self) -> str:
+        """Name in the results of a study."""
+        return f"1 - cos over {self.length / FOOT:g} ft that {'stays' if self.stays else 'falls as it rose'}"
+
+    @property
     def said(self) -> str:
         """Description in words."""
-        return f"1 - cos over {self.length / FOOT:g} ft that {'stays' if self.stays else 'falls as it rose'}"
+        after = "persists" if self.stays else "decays in the same way"
+        return f"1 - cos gust that builds up over {self.length / FOOT:g} ft and then {after}"
 
 
 SHAPES = (Shape(350.0 * FOOT, False), Shape(1750.0 * FOOT, True))
 """The longest of CS-25.341, and that of MIL-F-8785C with the length of turbulence up here."""
 
 HALF_DEGREE = float(np.radians(0.5))
-"""rad: what the paper allows the attitude angles to be off (5.1)."""
+"""rad: the paper's largest allowable error of the attitude angles (5.1)."""
 
 VELOCITIES = tuple(np.linspace(0.0, 100.0, 9)[1:].tolist())
-"""m/s, up to the largest that a scenario may have, between which limits are looked for."""
+"""m/s, up to the largest that a scenario may have; the grid in which limits are bracketed."""
 
 _START, _END = 30.0, 50.0
 """s: when the gust begins and the flight ends."""
@@ -62,7 +68,7 @@ _ATTITUDE = [STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angl
 class Answer(NamedTuple):
     """Response to a gust: largest change of an attitude angle and largest |elevator command| (rad), flight lost or not.
 
-    The command is the one before anything limits it.
+    The command is the one before saturation.
     """
 
     attitude: float
@@ -74,8 +80,8 @@ class Answer(NamedTuple):
 class GustLimits:
     """Velocities (m/s), of the worse of both directions; ``None``: not up to the last of :data:`VELOCITIES`.
 
-    ``attitude``: an attitude angle changes by half a degree; ``elevator``: it is told to go beyond its stop; ``lost``:
-    the flight is.
+    ``attitude``: an attitude angle changes by half a degree; ``elevator``: its command exceeds its stop; ``lost``: the
+    flight is lost.
     """
 
     attitude: float | None
@@ -85,10 +91,16 @@ class GustLimits:
     @property
     def said(self) -> str:
         """Description in words."""
-        what = {"half a degree of attitude": self.attitude, "elevator at its stop": self.elevator, "lost": self.lost}
-        reached = [f"{name} from {_velocity(value)} on" for name, value in what.items() if value is not None]
-        others = " or ".join(name for name, value in what.items() if value is None)
-        return ", ".join(reached + ([f"not {others} up to {_velocity(VELOCITIES[-1])}"] if others else []))
+        limits = (
+            (self.attitude, "the attitude changes by half a degree", "the attitude changes by less than half a degree"),
+            (self.elevator, "the elevator reaches its stop", "the elevator does not reach its stop"),
+            (self.lost, "the flight is lost", "the flight is not lost"),
+        )
+        if all(value is None for value, *_ in limits):
+            return f"no limit is reached up to {_velocity(VELOCITIES[-1])}"
+        parts = [f"{what} from {_velocity(value)} on" for value, what, _ in limits if value is not None]
+        parts += [f"{otherwise} up to {_velocity(VELOCITIES[-1])}" for value, _, otherwise in limits if value is None]
+        return f"{', '.join(parts[:-1])}, and {parts[-1]}"
 
 
 def _velocity(value: float) -> str:
@@ -141,7 +153,7 @@ def gust_limits(controller: Controller, coupling: str, shape: Shape) -> GustLimi
     }
 
     def limit(excess: Callable[[Answer], float]) -> float | None:
-        # From still air on: the first of the velocities may be beyond a limit already.
+        # Beginning in still air, because the first of the velocities may already be beyond a limit.
         return stability_limit(lambda v: excess(worse(controller, coupling, shape, v)), (0.0, *VELOCITIES), 1e-3)
 
     return GustLimits(**{name: limit(excess) for name, excess in beyond.items()})

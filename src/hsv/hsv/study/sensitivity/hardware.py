@@ -69,13 +69,16 @@ ELEVATORS: dict[str, Hardware] = {
     "one of 20 rad/s, first order": Hardware((FUEL, ACTUATOR_SETS["elevator_first_order_20"])),
     "one of 20 rad/s": Hardware((FUEL, ACTUATOR_SETS["elevator_20"])),
 }
-"""Published elevators, each with the fuel delivery of 10 rad/s."""
+"""Published elevators by their names in the results, each with the fuel delivery of 10 rad/s."""
+
+_SAID = {name: name.replace("one of", "an elevator of") for name in ELEVATORS}
+"""Their descriptions in words."""
 
 BANDWIDTHS = tuple(np.geomspace(3.0, 2000.0, 61).tolist())
 """rad/s, of elevators of the second order."""
 
 DELAYS = tuple(np.arange(0.0, 0.3001, 0.01).tolist())
-"""s, between which the limit is looked for."""
+"""s, the grid in which the limit is bracketed."""
 
 _SHOWN_DELAY = 0.16
 
@@ -85,7 +88,7 @@ _ONE_DEGREE = np.pi / 180.0
 
 
 def elevator(bandwidth: float, delay: float = 0.0) -> Hardware:
-    """Return an elevator of ``bandwidth`` (rad/s), the damping that of the realistic one, its fuel, a ``delay`` (s)."""
+    """Return the realistic elevator with another ``bandwidth`` (rad/s), its fuel delivery, and a ``delay`` (s)."""
     return Hardware((FUEL, replace(ELEVATOR, natural_frequency=bandwidth)), delay)
 
 
@@ -97,7 +100,7 @@ def growth(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> fl
 
 
 def delay_borne(case: Case, hardware: Hardware, over: Sequence[Corner] = ({},)) -> float | None:
-    """Return the delay (s) at which the loop stops being stable; ``None``: beyond all of :data:`DELAYS`."""
+    """Return the delay (s) at which the loop becomes unstable; ``None``: beyond all of :data:`DELAYS`."""
     return stability_limit(lambda delay: growth(case, replace(hardware, delay=delay), over), DELAYS)
 
 
@@ -117,7 +120,7 @@ def elevator_noise(case: Case, hardware: Hardware, sensors: str) -> float:
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Linearise every controller behind elevators of all bandwidths and behind delays."""
+    """Linearise every controller with elevators of all bandwidths and with delays."""
     over = corners_of(1.0, coarseness)
     bandwidths = np.geomspace(5.0, 500.0, max(4, round(31 / coarseness)))
     delays = np.linspace(0.0, _SHOWN_DELAY, max(3, round(33 / coarseness)))
@@ -142,11 +145,11 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
             panel.plot([to_paper(v, "m/s")[0] for v in velocities], degrees, style, color=case.color)
         limits = Limits.of(case, over)
         gusts = [gust_limits(case.controller, case.coupling, shape) for shape in SHAPES]
-        borne_gusts = "; ".join(f"gust {s.said}: {one.said}" for s, one in zip(SHAPES, gusts, strict=True))
-        findings.append(f"{case.label}: {limits.said(said_corners(over))}; {borne_gusts}")
+        in_words = "; ".join(f"in a {s.said}, {one.said}" for s, one in zip(SHAPES, gusts, strict=True))
+        findings.append(f"{case.label}: {limits.said(said_corners(over))}; {in_words}")
         numbers[case.label] = {
             **limits.report(),
-            "gust_limits_m_per_s": {s.said: vars(one) for s, one in zip(SHAPES, gusts, strict=True)},
+            "gust_limits_m_per_s": {s.key: vars(one) for s, one in zip(SHAPES, gusts, strict=True)},
             "in_gusts": [one._asdict() for one in in_gusts],
             "growth_per_s": growths,
             "growth_behind_delay_per_s": late,
@@ -182,17 +185,17 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return Outcome(
         figure,
-        "Linear sampled loop of Case 1 around the coupled vehicle, the worst of both ends of the step, before and "
-        f"after the fault, with an elevator of the second order, damping {ELEVATOR.damping_ratio:g}, and the fuel "
-        f"delivery of {FUEL.natural_frequency:g} rad/s; nominal vehicle. (a) Over the bandwidth of the elevator. (b) "
-        "Over a delay of the command. (c) The delay at which the loop stops being stable, by root finding. (d) Rms of "
-        "the elevator command from the noise of the fine sensor set, without a fault; no line where the loop is "
-        "unstable. Limits of the actuators are left out of (a) to (d). (e), (f) Flight through a gust from "
-        f"below or from above, whichever is worse, {_SHOWN_GUST.said}, behind an elevator of "
-        f"{ELEVATOR.natural_frequency:g} rad/s with its limits, at the end of the step and after the fault: largest "
-        f"change of an attitude angle, the line half a degree, and largest command of the elevator, the line its stop. "
-        "The velocity of a gust at which an attitude angle changes by half a degree, the elevator is told "
-        f"to go beyond its stop, or the flight is lost is found by root finding over such flights. {SAID_RMPC}.",
+        "Linear sampled loop of Case 1 around the coupled nominal vehicle, with a second-order elevator (damping "
+        f"{ELEVATOR.damping_ratio:g}) and the fuel delivery of {FUEL.natural_frequency:g} rad/s; each value is the "
+        "worst over both ends of the step, before and after the fault. (a) Largest real part of the poles over the "
+        "bandwidth of the elevator. (b) The same over a delay of the command. (c) Delay at which the loop becomes "
+        "unstable, by root finding. (d) Rms elevator command due to the noise of the fine sensor set, without a fault; "
+        "there is no line where the loop is unstable. The limits of the actuators are not included in (a) to (d). "
+        f"(e), (f) Flight through a {_SHOWN_GUST.said}, from below or from above, whichever is worse, at the end of "
+        f"the step and after the fault, with an elevator of {ELEVATOR.natural_frequency:g} rad/s and its limits: (e) "
+        "largest change of an attitude angle, with a line at half a degree, and (f) largest elevator command, with a "
+        "line at the stop. The gust velocity at which an attitude angle changes by half a degree, the elevator command "
+        f"exceeds its stop, or the flight is lost is found by root finding over such flights. {SAID_RMPC}.",
         tuple(findings),
         {
             "bandwidth_rad_per_s": bandwidths.tolist(),
@@ -245,20 +248,24 @@ class Limits:
                 self.bandwidths, self.ends, ("nominal vehicle", f"worst of {corners}"), strict=True
             )
         ]
-        growths = ", ".join(f"{value:+.3f} with {name}" for name, value in self.growths.items())
+        growths = ", ".join(f"{value:+.3f} with {_SAID[name]}" for name, value in self.growths.items())
         delays = "; ".join(
-            f"delay borne with {name} {_milliseconds(nominal)} (nominal vehicle), {_milliseconds(worst)} (worst)"
+            f"with {_SAID[name]}, the tolerated delay is {_milliseconds(nominal)} (nominal vehicle) and "
+            f"{_milliseconds(worst)} (worst corner)"
             for name, (nominal, worst) in self.delays.items()
         )
-        return f"elevator {'; '.join(spans)}; largest real part (1/s) {growths}; {delays}; {self._said_noise()}"
+        return (
+            f"over the bandwidth of the elevator, the loop is {' and '.join(spans)}; the largest real part of the "
+            f"poles (1/s) is {growths}; {delays}; {self._said_noise()}"
+        )
 
     def _said_noise(self) -> str:
         if any(np.isnan(value) for value in self.noise.values()):
-            return "no statement on noise: unstable with an elevator of 50 rad/s"
-        said = " and ".join(f"{to_paper(value, 'rad')[0]:.2f} deg ({name})" for name, value in self.noise.items())
+            return "the response to sensor noise is undefined: the loop is unstable with an elevator of 50 rad/s"
+        said = " and ".join(f"{to_paper(value, 'rad')[0]:.2f} deg ({name} set)" for name, value in self.noise.items())
         return (
-            f"sensor noise moves the elevator by {said} rms, by 1 deg if it is {_ONE_DEGREE / self.noise['fine']:.1f} "
-            "times the fine set"
+            f"sensor noise causes an rms elevator command of {said}; it is 1 deg with "
+            f"{_ONE_DEGREE / self.noise['fine']:.1f} times the noise of the fine set"
         )
 
     def report(self) -> dict[str, object]:
@@ -273,19 +280,19 @@ class Limits:
 
 
 def _stable(changes: Sequence[float], first: bool) -> str:
-    """Return in words where a loop is stable that changes at these bandwidths, ``first``: so at the lowest."""
+    """Return in words where a loop is stable: stability changes at ``changes``; ``first``: stable at the lowest."""
     edges = [BANDWIDTHS[0], *changes, BANDWIDTHS[-1]]
     spans = [
         f"from {low:.3g} to {high:.3g} rad/s" if high < BANDWIDTHS[-1] else f"from {low:.3g} rad/s on"
         for index, (low, high) in enumerate(pairwise(edges))
         if (index % 2 == 0) == first
     ]
-    return f"stable {' and '.join(spans)}" if spans else "stable nowhere"
+    return f"stable {' and '.join(spans)}" if spans else "stable at no bandwidth"
 
 
 def _milliseconds(delay: float | None) -> str:
     if delay is None:
-        return f"{1e3 * DELAYS[-1]:g} ms at least"
+        return f"at least {1e3 * DELAYS[-1]:g} ms"
     return f"{1e3 * delay:.0f} ms" if delay > 0.0 else "none"
 
 

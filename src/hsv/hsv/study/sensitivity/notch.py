@@ -28,7 +28,7 @@ SETS = (
     Controller("paper-like coupling", "case1", BLUE),
     Controller("derived coupling", "case1_derived", RED),
 )
-"""Both with the baseline's gains, and its filter moved."""
+"""Both have the gains of the baseline and its filter, with another centre or depth."""
 
 
 @cache
@@ -91,13 +91,14 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     letter((*panels, axis))
     return Outcome(
         figure,
-        "(a), (b) Largest real part of the sampled loop's poles over the notch's centre and the damping of its zeros, "
-        "the worst of both ends of the step, before and after the fault; colours and solid line, the limit of "
-        f"stability: nominal vehicle; dashed: limit of the worst of {said_corners(over)} of the parameter bounds; "
-        "cross: the baseline's filter. Zeros and poles share the centre, pole damping "
-        f"{own.pole_damping:g}. (c) Decay time in flight, nominal vehicle (solid) and worst corner (dashed); no point "
-        "where a flight is lost; dotted: the limits of the scenarios, of which "
-        f"{SETS[1].scenario} flies another design, {load_scenario(SETS[1].scenario).design}.",
+        "(a), (b) Largest real part of the poles of the sampled loop over the centre of the notch and the damping of "
+        "its zeros, over both ends of the step, before and after the fault. The colours and the solid line, the limit "
+        "of stability, are those of the nominal vehicle; the dashed line is the limit of the worst of "
+        f"{said_corners(over)} of the parameter bounds; the cross is the baseline's filter. Zeros and poles have the "
+        f"same centre; the damping of the poles is {own.pole_damping:g}. (c) Decay time in flight, nominal vehicle "
+        "(solid) and worst corner (dashed); there is no point where a flight is lost. The dotted lines are the limits "
+        f"of the scenarios; the scenario {SETS[1].scenario} itself flies another design, "
+        f"{load_scenario(SETS[1].scenario).design}.",
         tuple(_finding(c, limits[c], results[c], centres, said_corners(over)) for c in SETS),
         {
             "centre_rad_per_s": centres.tolist(),
@@ -115,7 +116,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
 class Limits:
     """Range of stability: from ``least`` to ``largest`` centre (rad/s), up to ``shallowest`` damping of zeros.
 
-    Along the one the other is the baseline's. ``None``: to the end of what was looked at; not a number: nowhere.
+    While one is varied, the other is the baseline's. ``None``: to the end of the range studied; not a number: nowhere.
     """
 
     least: float | None
@@ -123,23 +124,23 @@ class Limits:
     shallowest: float | None
 
     def said(self, centres: np.ndarray) -> str:
-        """Return the limits in words; ``centres``: those looked at."""
+        """Return the limits in words; ``centres``: those studied."""
         own = filter_of_the_baseline()
         least = f"{centres[0]:g}" if self.least is None else f"{self.least:.2f}"
         largest = f"{centres[-1]:g}" if self.largest is None else f"{self.largest:.2f}"
         if self.least is None and self.largest is None:
-            span = f"stable wherever the centre is put, {least} to {largest} rad/s"
+            span = f"stable with every centre from {least} to {largest} rad/s"
         elif self.least is not None and np.isnan(self.least):
-            span = f"stable nowhere with zeros as deep, {own.zero_damping:g}"
+            span = f"stable with no centre at a zero damping of {own.zero_damping:g}"
         else:
             span = f"stable with the centre from {least} to {largest} rad/s"
         if self.shallowest is None:
-            depth = f"at every zero damping, even at {own.pole_damping:g}: no notch"
+            depth = f"stable at every zero damping, even at {own.pole_damping:g} (no notch)"
         elif np.isnan(self.shallowest):
-            depth = f"not with a zero damping of {own.zero_damping:g}"
+            depth = f"unstable at a zero damping of {own.zero_damping:g}"
         else:
-            depth = f"up to a zero damping of {self.shallowest:.2g}"
-        return f"{span}, at {own.zero_frequency:g} rad/s {depth}"
+            depth = f"stable up to a zero damping of {self.shallowest:.2g}"
+        return f"{span}; with the centre at {own.zero_frequency:g} rad/s, it is {depth}"
 
 
 def _limits(coupled: Controller, over: list[Corner], centres: np.ndarray, depths: np.ndarray) -> Limits:
@@ -197,11 +198,14 @@ def _finding(
         if np.isfinite(decay).any():
             least = int(np.nanargmin(decay))
             best[suffix] = f"{decay[least]:.1f} s with the centre at {centres[least]:.1f} rad/s"
-    flights = "; ".join(
-        f"shortest decay in flight {best.get(suffix, 'none: lost wherever the centre is')} ({vehicle})"
+    flights = " and ".join(
+        f"{best.get(suffix, 'undefined, as a flight is lost with every centre')} ({vehicle})"
         for suffix, vehicle in (("nominal", "nominal vehicle"), ("worst", "worst corner"))
     )
-    return f"{coupled.label}: {nominal} (nominal vehicle); {worst} (worst of {of}); {flights}"
+    return (
+        f"{coupled.label}: the linear loop of the nominal vehicle is {nominal}. That of the worst of {of} is {worst}. "
+        f"The shortest decay time in flight is {flights}"
+    )
 
 
 STUDY = Study("notch", "Centre and depth of the notch filter", run)

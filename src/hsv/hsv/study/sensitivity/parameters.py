@@ -26,8 +26,8 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
         axis.axvline(1.0, color=GREY, linewidth=0.6, linestyle=":")
     return Outcome(
         figure,
-        f"Case 1 on the coupled model, paper-like coupling; nominal vehicle and {said_corners(over[0])} of the scaled "
-        f"bounds. {LOSSES} {SAID_RMPC}.",
+        "Case 1 on the coupled model with the paper-like coupling, flown with the nominal vehicle and "
+        f"{said_corners(over[0])} of the scaled bounds. {LOSSES} {SAID_RMPC}.",
         tuple(finding(c, scales, columns, "{} times the bounds", nominal=False) for c, columns in results.items()),
         {"scale": scales.tolist(), "flights": {c.label: columns for c, columns in results.items()}},
     )

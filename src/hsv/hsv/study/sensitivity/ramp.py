@@ -14,7 +14,7 @@ from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, letter, new_figur
 from hsv.study.sensitivity.controllers import Controller, corners_of, said_corners
 from hsv.study.sensitivity.study import Outcome, Study, grid
 from hsv.study.sensitivity.sweep import Point, sweep
-from hsv.study.sensitivity.sweep_figures import draw_metric, legend
+from hsv.study.sensitivity.sweep_figures import SATURATED, draw_metric, legend
 from hsv.study.sensitivity.sweep_result import SweepResult
 from hsv.units import to_paper
 
@@ -26,7 +26,7 @@ CONTROLLERS = (
 
 
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
-    """Fly Case 2 with ramps of 15 s to 80 s; the last ends as the fault sets in."""
+    """Fly Case 2 with ramps of 15 s to 80 s; the last ends when the fault occurs."""
     lengths = grid(15.0, 80.0, 5.0, coarseness)
     over = corners_of(1.0, coarseness)
     along = {c: [Point(_values(c, float(length)), over) for length in lengths] for c in CONTROLLERS}
@@ -48,9 +48,10 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     legend(figure, shares=False)
     return Outcome(
         figure,
-        f"Case 2 with the ramp from {shipped.start:g} s on; nominal vehicle (solid) and the worst of "
-        f"{said_corners(over)} of the parameter bounds (dashed). The one of {lengths[-1]:g} s ends as the fault sets "
-        "in, so that its largest error includes the fault's. (c) After the fault, black: half a degree.",
+        f"Case 2 with a ramp that starts at {shipped.start:g} s; nominal vehicle (solid) and the worst of "
+        f"{said_corners(over)} of the parameter bounds (dashed). The ramp of {lengths[-1]:g} s ends when the fault "
+        "occurs, so that its largest error includes the effect of the fault. (c) Attitude deviation from nominal "
+        f"after the fault; the black line is half a degree. {SATURATED}",
         tuple(_finding(controller, lengths, columns) for controller, columns in results.items()),
         {"length_s": lengths.tolist(), "flights": {c.label: columns for c, columns in results.items()}},
     )
@@ -72,22 +73,21 @@ def _values(controller: Controller, length: float) -> dict[str, object]:
 def _finding(controller: Controller, lengths: np.ndarray, columns: SweepResult) -> str:
     feet, degrees = to_paper(1.0, "m")[0], to_paper(1.0, "rad")[0]
 
-    def off(index: int, which: str) -> str:
+    def errors(index: int, which: str) -> str:
         altitude, velocity = (columns[f"{axis}_error_maximum_{which}"][index] for axis in ("altitude", "velocity"))
         return f"{feet * altitude:.0f} ft and {feet * velocity:.1f} ft/s"
 
     ends = "; ".join(
-        f"ramp of {lengths[i]:g} s: nominal vehicle {off(i, 'nominal')} off at most, worst corner {off(i, 'worst')}"
+        f"with a ramp of {lengths[i]:g} s, the largest errors are {errors(i, 'nominal')} (nominal vehicle) and "
+        f"{errors(i, 'worst')} (worst corner)"
         for i in (0, -1)
     )
     attitude = degrees * np.array(columns["post_fault_attitude_from_nominal_worst"])
     limited = lengths[np.array(columns["without_limits"]) < 1.0]
-    met = (
-        f"at the input limits with ramps up to {limited.max():g} s" if len(limited) else "no second at the input limits"
-    )
+    met = f"flights are saturated with ramps up to {limited.max():g} s" if len(limited) else "no flight is saturated"
     return (
-        f"{controller.label}: {ends}; worst attitude from nominal after the fault {attitude.min():.3f} to "
-        f"{attitude.max():.3f} deg; {met}"
+        f"{controller.label}: {ends}; the worst attitude deviation from nominal after the fault is "
+        f"{attitude.min():.3f} to {attitude.max():.3f} deg; {met}"
     )
 
 

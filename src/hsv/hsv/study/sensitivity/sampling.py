@@ -66,15 +66,16 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     letter(axes)
     return Outcome(
         figure,
-        "The baseline's inputs designed anew at each period (polytopic model, F, K), its notch discretised at that "
-        "period. Largest real part of the sampled loop's poles over the coupling, the worst of both ends of the step, "
-        f"before and after the fault; nominal vehicle (solid) and the worst of {said_corners(over)} of the parameter "
-        "bounds (dashed); the limits below are found by root finding.",
+        "At each period, the polytopic model, F and K are designed from the baseline's inputs, and its notch is "
+        "discretised at that period. The panels show the largest real part of the poles of the sampled loop over the "
+        "coupling, over both ends of the step, before and after the fault: nominal vehicle (solid) and the worst of "
+        f"{said_corners(over)} of the parameter bounds (dashed). The limits of stability below are found by root "
+        "finding.",
         tuple(
             "; ".join(
                 (
                     f"{controller.label}: with the notch, {limits[period, FILTERS[0]].said()}",
-                    f"without, {limits[period, FILTERS[1]].said()}",
+                    f"without it, {limits[period, FILTERS[1]].said()}",
                     _flown(results[controller]),
                 )
             )
@@ -98,9 +99,9 @@ def _flown(columns: SweepResult) -> str:
     decay = [columns[f"elastic_decay_time_{which}"][0] for which in ("nominal", "worst")]
     lost = 1.0 - columns["finished"][0]
     return (
-        f"Case 1 with the paper-like coupling and the notch: attitude excursion {attitude[0]:.3f} deg (worst corner "
-        f"{attitude[1]:.3f} deg), decay {decay[0]:.1f} s ({decay[1]:.1f} s), "
-        + (f"{100.0 * lost:.0f} % of the flights lost" if lost else "no flight lost")
+        f"in Case 1 with the paper-like coupling and the notch, the attitude excursion is {attitude[0]:.3f} deg (worst "
+        f"corner {attitude[1]:.3f} deg), the decay time is {decay[0]:.1f} s (worst corner {decay[1]:.1f} s), and "
+        + (f"{100.0 * lost:.0f} % of the flights are lost" if lost else "no flight is lost")
     )
 
 

@@ -25,9 +25,9 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Study:
-    """A study; ``run`` takes how coarse to be (1: as in the docs), a folder for designs, and a progress callback.
+    """A study; ``run`` takes the coarseness (1: as in the docs), a folder for designs, and a progress callback.
 
-    ``run_beside``, where there is one, flies others beside its own controllers: the scenarios that it takes last.
+    ``run_beside``, if there is one, also flies the controllers of the scenarios in its last argument.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""The flights of a sweep, kept controller by controller: a study that was interrupted goes on where it stopped."""
+"""The flights of a sweep, stored by controller, so that an interrupted study continues where it stopped."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hsv.study.sensitivity.sweep_result import SweepResult, sweep_result
 from hsv.study.sources import DIGITS, code_digest, digest_of, kept, measuring_code
 
 _HALF_WIDTH = np.ones(5)
-"""The sweeps use no measure that weighs rigid errors against each other."""
+"""The sweeps use no measure that compares errors of different rigid-body states."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Sweeps of flights drawn and put in words: every controller over one quantity, nominal vehicle and corners."""
+"""Plots and findings of sweeps of flights: every controller over one quantity, nominal vehicle and corners."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def legend(figure: Figure, *, shares: bool) -> None:
 
 
 def draw_losses(figure: Figure, x: np.ndarray, results: dict[Controller, SweepResult], label: str) -> np.ndarray:
-    """Draw and return three panels over ``x``: which flights are lost, attitude after the fault, altitude at the end.
+    """Draw and return three panels over ``x``: share of lost flights, attitude after the fault, altitude at the end.
 
     Args:
         figure: Empty.
@@ -72,9 +72,12 @@ def draw_losses(figure: Figure, x: np.ndarray, results: dict[Controller, SweepRe
     return axes
 
 
+SATURATED = "A flight counts as saturated if its inputs are at their limits for more than a second, or if it is lost."
+"""Explanation of the word in findings."""
+
 LOSSES = (
-    "(a) Share of flights that come to their end (solid), and without a second at the limits of the inputs (dotted); "
-    "(b), (c) nominal vehicle solid, worst corner dashed, a line ends where a flight is lost."
+    "(a) Share of the flights that are not lost (solid), and of those that are not saturated (dotted). (b), (c) "
+    f"Nominal vehicle (solid) and worst corner (dashed); a line ends where a flight is lost. {SATURATED}"
 )
 """Description of the plot of :func:`draw_losses`."""
 
@@ -89,16 +92,16 @@ def finding(
     rising: bool = True,
     nominal: bool = True,
 ) -> str:
-    """Return in words between which points a controller reaches its limits and is lost, going along ``x``.
+    """Return in words between which points flights of a controller begin to saturate and to be lost, along ``x``.
 
     Args:
-        controller: Whose sweep it is.
+        controller: Controller of the sweep.
         x: Values along the sweep, increasing.
         columns: Columns of the sweep.
-        words: Around a value, which stands for ``{}``.
+        words: Text around a value, with ``{}`` in its place.
         digits: Decimals of a value.
-        rising: Go from the least value on, else from the largest.
-        nominal: Whether the sweep changes the nominal vehicle's flight, too.
+        rising: Begin at the smallest value, otherwise at the largest.
+        nominal: Whether the sweep also changes the flight of the nominal vehicle.
     """
     where = lost_where(x, columns, words, digits=digits, rising=rising, nominal=nominal)
     return f"{controller.label}: {where}"
@@ -111,14 +114,17 @@ def lost_where(
     order = slice(None) if rising else slice(None, None, -1)
     along = [f"{value:.{digits}f}" for value in x[order]]
 
-    def first(name: str) -> str:
+    def first(name: str, begin: str, none: str) -> str:
         lost = np.array(columns[name])[order] < 1.0
         begins = np.flatnonzero(lost & ~np.concatenate(([False], lost[:-1])))
         said = (words.format(f"{along[i - 1]} and {along[i]}" if i else along[0]) for i in begins)
-        return (
-            " and again ".join(f"between {w}" if i else f"at {w} already" for i, w in zip(begins, said, strict=True))
-            or "nowhere"
-        )
+        where = (f"between {w}" if i else f"already at {w}" for i, w in zip(begins, said, strict=True))
+        return f"{begin} {' and again '.join(where)}" if len(begins) else none
 
-    lost = f"at its limits {first('without_limits')}, a flight lost {first('finished')}"
-    return f"{lost}, the nominal vehicle {first('nominal_finished')}" if nominal else lost
+    parts = [
+        first("without_limits", "saturation begins", "no flight is saturated"),
+        first("finished", "losses begin", "no flight is lost"),
+    ]
+    if nominal and min(columns["finished"]) < 1.0:
+        parts.append(first("nominal_finished", "the nominal vehicle is first lost", "the nominal vehicle is not lost"))
+    return f"{', '.join(parts[:-1])}, and {parts[-1]}"

@@ -52,7 +52,7 @@ WEIGHTS = (
     Group("scale of the fuel equivalence ratio", ORANGE, inputs=_INPUTS[:1]),
     ELEVATOR,
 )
-"""The weights are one over the squares of these scales: psi and sigma of K (eq. 31), and those of F likewise."""
+"""The weights are one over the squares of these scales: psi and sigma of K (eq. 31), and those of F."""
 
 BOUNDS = Group("bounds of the nominal inputs", PURPLE, bounds=_INPUTS)
 """Groups of K alone (eq. 35)."""
@@ -62,7 +62,7 @@ GROUPS = {"F": WEIGHTS, "K": (*WEIGHTS, BOUNDS)}
 
 @dataclass(frozen=True)
 class Variations:
-    """The baseline's inputs, and what flies of them."""
+    """The design inputs of the baseline, and the design that is flown."""
 
     inputs: DesignInputs
     flown: ControlDesign

@@ -78,15 +78,17 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     _draw(figure, factors, growths, (of_F, of_K, of_rmpc))
     return Outcome(
         figure,
-        "The baseline with one group of its weights times a factor (1: its own; weights are one over squared scales, "
-        "so that a larger scale weighs less), left: of F, right: of K with its input bounds; all else as it is. Case "
-        f"1, paper-like coupling, nominal vehicle and {said_corners(over)} of the parameter bounds. (a) Largest real "
-        "part of the linear sampled loop's poles, the worst of all vehicles, of both ends of the step, before and "
-        "after the fault; with notch (solid), without (dashed). (c), (d) Attitude from nominal after the fault, worst "
-        "corner; black: half a degree. (e) Altitude error at the end, nominal vehicle (solid), worst corner (dashed). "
-        "(b) Altitude (solid) and velocity (dashed) settled to 2 % of the step, nominal vehicle; a line ends where "
-        "that is not before the fault. (f) The error of (e) under robust MPC with the fourth of the gains, as the "
-        "paper flies it: on the decoupled model, without notch; a dashed line ends where a flight is lost.",
+        "The baseline with one group of its scales or input bounds multiplied by a factor (1 is the baseline itself; a "
+        "weight is one over the square of its scale, so that a larger scale is a smaller weight). The left panels vary "
+        "F, the right panels K with its input bounds; everything else is unchanged. The flights are those of Case 1 "
+        f"with the paper-like coupling, for the nominal vehicle and {said_corners(over)} of the parameter bounds. (a) "
+        "Largest real part of the poles of the linear sampled loop, over all vehicles and both ends of the step, "
+        "before and after the fault; with notch (solid) and without (dashed). (b) Time until altitude (solid) and "
+        "velocity (dashed) have settled to 2 % of the step, nominal vehicle; a line ends where they do not settle "
+        "before the fault. (c), (d) Attitude deviation from nominal after the fault, worst corner; the black line is "
+        "half a degree. (e) Altitude error at the end, nominal vehicle (solid) and worst corner (dashed). (f) The same "
+        "error with robust MPC and the fourth gain, as the paper flies it: on the decoupled model, without notch; a "
+        "dashed line ends where a flight is lost.",
         (
             *_feedback_findings(factors["F"], of_F, growths[False]),
             *limits,
@@ -112,7 +114,7 @@ def _growth(varied: Variations, gain: np.ndarray, notched: bool, over: list[Corn
 
 
 def _elevator_limits(varied: Variations, over: list[Corner]) -> list[str]:
-    """Return in words up to which scale of the elevator in F the linear loops are stable."""
+    """Return in words the scale of the elevator in F up to which the linear loops are stable."""
     own = varied.inputs.feedback.input_scale.elevator_deflection
 
     @cache
@@ -124,8 +126,8 @@ def _elevator_limits(varied: Variations, over: list[Corner]) -> list[str]:
         return "at every factor" if found is None else f"up to {found * own:.3f} rad"
 
     return [
-        f"{controller.label}, scale of the elevator in F, {own:g} rad in the baseline: linear loop stable "
-        f"{limit(notched, over[:1])} (nominal vehicle), {limit(notched, over)} (worst of {said_corners(over)})"
+        f"{controller.label}, scale of the elevator in F ({own:g} rad in the baseline): the linear loop is stable "
+        f"{limit(notched, over[:1])} (nominal vehicle) and {limit(notched, over)} (worst of {said_corners(over)})"
         for controller, notched in ((WITH_NOTCH, True), (WITHOUT_NOTCH, False))
     ]
 
@@ -190,8 +192,8 @@ def _feedback_findings(factors: tuple[float, ...], results: Results, without: di
         )
         loop = "stable" if without[group][index] < 0.0 else "unstable"
         return (
-            f"attitude from nominal {degrees * attitude:.3f} deg, altitude at the end {feet * altitude:.1f} ft off, "
-            f"linear loop without notch {loop}"
+            f"the attitude deviation from nominal is {degrees * attitude:.3f} deg, the altitude error at the end is "
+            f"{feet * altitude:.1f} ft, and the linear loop without notch is {loop}"
         )
 
     own = f"F, the baseline's own weights, worst corner: {at(ELEVATOR, factors.index(1.0))}"
@@ -203,15 +205,15 @@ def _nominal_findings(factors: tuple[float, ...], of_K: Results, of_rmpc: Result
 
     def at(group: Group, index: int) -> str:
         settled = ", ".join(
-            f"{axis} {_seconds(of_K[group][f'{axis}_settling_time_nominal'][index])}"
+            f"the {axis} {_settles(of_K[group][f'{axis}_settling_time_nominal'][index])}"
             for axis in ("altitude", "velocity")
         )
         attitude = degrees * of_K[group]["post_fault_attitude_from_nominal_worst"][index]
         off = feet * of_rmpc[group]["altitude_end_error_nominal"][index]
         lost = 1.0 - of_rmpc[group]["finished"][index]
         return (
-            f"step settled: {settled}; worst attitude from nominal {attitude:.3f} deg; RMPC {off:.0f} ft off at the end"
-            + (f", {100.0 * lost:.0f} % of its flights lost" if lost else "")
+            f"{settled}, the worst attitude deviation from nominal is {attitude:.3f} deg, and the altitude error of "
+            f"RMPC at the end is {off:.0f} ft" + (f" ({100.0 * lost:.0f} % of its flights are lost)" if lost else "")
         )
 
     def ends(results: Results) -> str:
@@ -221,18 +223,18 @@ def _nominal_findings(factors: tuple[float, ...], of_K: Results, of_rmpc: Result
     return [
         f"K, the baseline's own weights: {at(ELEVATOR, factors.index(1.0))}",
         *(f"K, {g.label} {_said(factors, partial(at, g))}" for g in of_K),
-        f"whatever the weights of K looked at, the tube's altitude ends {ends(of_K)} off, that of RMPC {ends(of_rmpc)} "
-        "(nominal vehicle)",
+        f"over all weights of K studied, the altitude error at the end is {ends(of_K)} with the tube and "
+        f"{ends(of_rmpc)} with RMPC (nominal vehicle)",
     ]
 
 
 def _said(factors: tuple[float, ...], say: Callable[[int], str]) -> str:
-    """Return what ``say`` tells of the least and the largest factor."""
+    """Return the texts of ``say`` for the smallest and the largest factor."""
     return "; ".join(f"times {factors[index]:g}: {say(index)}" for index in (0, -1))
 
 
-def _seconds(value: float) -> str:
-    return "not before the fault" if np.isnan(value) else f"{value:.1f} s"
+def _settles(value: float) -> str:
+    return "does not settle before the fault" if np.isnan(value) else f"settles in {value:.1f} s"
 
 
 STUDY = Study("weights", "Weights of F and K, input bounds of K", run)
