@@ -221,12 +221,15 @@ def _operation(
 ) -> None:
     """Let ``function`` take lanes; ``emit`` writes the instruction, of ``result`` or of what is taken."""
 
-    @infer_global(function)
     class _Template(AbstractTemplate):
+        key = function
+
         def generic(self, arguments: Any, keywords: Any) -> Any:
             kind = among(arguments) if len(arguments) == operands and not keywords else None
             return signature(result(kind.count) if result else kind, *[kind] * operands) if kind else None
 
+    # Not as a decorator: it asks for the function's module, and ufuncs of NumPy 1 have none.
+    infer_global(function, types.Function(_Template))
     kind = MaskType if among is _mask_among else LanesType
 
     @lower_builtin(function, *[kind] * operands)
