@@ -64,15 +64,19 @@ def test_a_taken_port_or_a_foreign_address_is_refused():
         pass
 
 
-def test_workers_that_end_are_said_once_and_tried_again(monkeypatch):
+def test_workers_that_end_are_said_once_and_tried_again(monkeypatch, tmp_path):
     monkeypatch.setattr("hsv.campaign.cluster.AGAIN_AFTER", 0.0)
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     said = []
-    ssh = "sh -c 'echo first; echo no route; exit 255'"
+    tries = tmp_path / "tries"
+    ssh = f"sh -c 'echo tried >> {tries}; echo no route; exit 255'"
+
+    def tried() -> int:
+        return len(tries.read_text().splitlines()) if tries.exists() else 0
+
     with cluster([Host("far", 1)], "127.0.0.1", port, "python", ssh, said.append) as look:
-        for _ in range(12):
-            look()
+        wait_until(lambda: tried() > 2, progress=tried, pause=lambda _: look())
     assert said == ["far: no workers (no route), trying again every 0 s"]
 
 

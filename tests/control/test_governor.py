@@ -1,18 +1,33 @@
 import re
+from inspect import signature
+from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.cli.command import command
+from hsv.cli.govern import govern as govern_command
 from hsv.control import governor
 from hsv.control.design_file import find_design, read_design
-from hsv.control.governor import AT_REST, KEPT_FREE, Beginning, CommandGovernor, Governor, InputBounds, Leg, legs_of
+from hsv.control.governor import (
+    AT_REST,
+    KEPT_FREE,
+    USUAL_BLEND,
+    Beginning,
+    CommandGovernor,
+    Governor,
+    InputBounds,
+    Leg,
+    legs_of,
+)
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import Corner, ReferenceTrajectory
 from hsv.errors import GovernorError
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
+ROOT = Path(__file__).parents[2]
 DESIGN = read_design(find_design("baseline"))
 VEHICLE, PERIOD = load_vehicle().decoupled, DESIGN.period
 START, TARGET = (26060.4, 2407.92), (26243.28, 2484.12)
@@ -264,3 +279,10 @@ def test_only_a_certified_plan_in_flight_can_be_commanded():
     ):
         with pytest.raises(GovernorError, match=why):
             CommandGovernor.from_parameters(values, design, trajectory)
+
+
+def test_the_usual_blend_is_that_of_commands_that_say_none():
+    usual = f"{USUAL_BLEND:g} s"
+    assert all(signature(typed).parameters["blend"].default == usual for typed in (govern_command, command))
+    service = (ROOT / "ros_ws/src/hsv_msgs/srv/SetCommand.srv").read_text()
+    assert re.search(rf"float64 blend .*; 0: {usual}\n", service)

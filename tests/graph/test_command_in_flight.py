@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from injected_fault import last_line
-from node_processes import Processes, recorded_steps, short_scenario
-from waiting import output_of, wait_until
+from node_processes import Processes, fly_until, short_scenario
+from waiting import output_of
 
 from hsv.control.reference_trajectory import COLUMNS
 from hsv.recording.reader import Bag
@@ -28,7 +27,7 @@ def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_pa
     bag_path = tmp_path / "flown"
     scenario = short_scenario(tmp_path, duration=3600, fault=6)
     flight = processes.start("hsv", "run", scenario, "--bag", bag_path, "--real-time-factor", "2.0", "--no-report")
-    _fly_until(flight, bag_path, 50)
+    fly_until(flight, bag_path, 50)
     # Paused, the second command certainly comes before the first is flown.
     assert processes.run("hsv", "set", "paused", "true").returncode == 0
     refused = processes.run("hsv", "command", "200000 ft", "8000 ft/s")
@@ -41,7 +40,7 @@ def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_pa
         taken.append(json.loads(last_line(done)))
     assert processes.run("hsv", "set", "real_time_factor", "0").returncode == 0
     assert processes.run("hsv", "set", "paused", "false").returncode == 0
-    _fly_until(flight, bag_path, taken[1]["step"] + 150)
+    fly_until(flight, bag_path, taken[1]["step"] + 150)
     flight.send_signal(signal.SIGINT)
     output = output_of(flight)
     assert flight.returncode == 130, output
@@ -68,11 +67,3 @@ def test_points_are_commanded_recorded_and_repeated(processes: Processes, tmp_pa
     done = processes.run("hsv", "replay", bag_path, "--over-dds", "--node", "nominal_trajectory")
     assert done.returncode == 0, done.stdout
     assert done.stdout.count("identical in every byte") == 1, done.stdout
-
-
-def _fly_until(flight: subprocess.Popen[str], bag: Path, steps: int) -> None:
-    def flown() -> bool:
-        assert flight.poll() is None, flight.communicate()[0]
-        return recorded_steps(bag) >= steps
-
-    wait_until(flown, [flight.pid], lambda: recorded_steps(bag))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from marking import long
-from node_processes import Processes, children, recorded_steps, short_scenario
+from node_processes import Processes, children, fly_until, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
 from hsv.graph.description import PLANT, RECORDER, graph
@@ -29,12 +29,7 @@ def _start_and_fly(processes: Processes, bag: Path, *words: str) -> subprocess.P
     """Start a long flight and return it once some of it is on disk."""
     scenario = short_scenario(processes.folder, duration=10_000, fault=100)
     run = processes.start("hsv", "run", scenario, "--no-report", "--bag", bag, "--real-time-factor", "4", *words)
-
-    def flies() -> bool:
-        assert run.poll() is None, run.communicate()[0]
-        return recorded_steps(bag) >= ON_DISK
-
-    wait_until(flies, [run.pid], lambda: recorded_steps(bag))
+    fly_until(run, bag, ON_DISK)
     return run
 
 

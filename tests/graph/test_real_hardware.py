@@ -8,9 +8,9 @@ import signal
 import numpy as np
 import pytest
 from injected_fault import last_line
-from node_processes import Processes, recorded_steps
+from node_processes import Processes, fly_until
 from real_hardware import ELEVATOR, scenario_file
-from waiting import output_of, wait_until
+from waiting import output_of
 
 from hsv.recording.flight import input_columns, state_columns
 from hsv.recording.info import describe
@@ -64,21 +64,14 @@ def test_a_fault_with_parameters_injected_in_flight_is_repeated(processes: Proce
     words = ["--bag", path, "--real-time-factor", "4.0", "--no-report"]
     flight = processes.start("hsv", "run", scenario, *words)
 
-    def fly_until(step: int) -> None:
-        def flown() -> bool:
-            assert flight.poll() is None, flight.communicate()[0]
-            return recorded_steps(path) >= step
-
-        wait_until(flown, [flight.pid], lambda: recorded_steps(path))
-
-    fly_until(50)
+    fly_until(flight, path, 50)
     oscillation = ("oscillation", "amplitude=0.3 deg", "frequency=0.7 Hz", "random_on=0.4 s", "random_off=0.2 s")
     first = None
     for fault in ((ELEVATOR, *oscillation), ("pitch_rate", "sensor_bias", "0.01 deg/s")):
         answer = processes.run("hsv", "fault", "inject", *fault, "--duration", "5 s", "--json")
         assert answer.returncode == 0, answer.stdout
         first = first or json.loads(last_line(answer))["step"]
-    fly_until(first + 400)
+    fly_until(flight, path, first + 400)
     flight.send_signal(signal.SIGINT)
     output = output_of(flight)
     assert flight.returncode == 130, output

@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import json
 import signal
-import subprocess
 from pathlib import Path
 
 import numpy as np
 import pytest
 from injected_fault import last_line
-from node_processes import Processes, recorded_steps, short_scenario
-from waiting import output_of, wait_until
+from node_processes import Processes, fly_until, recorded_steps, short_scenario
+from waiting import output_of
 
 from hsv.control.design_file import find_design, read_design, write_design
 from hsv.recording.reader import Bag
@@ -41,16 +40,16 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     # No change comes too late for this flight; it is interrupted once there is enough of it for a replay.
     words = ["--bag", bag_path, "--real-time-factor", "4.0", "--no-report"]
     flight = processes.start("hsv", "run", scenario(tmp_path), *words)
-    _fly_until(flight, bag_path, 50)
+    fly_until(flight, bag_path, 50)
     refused = processes.run("hsv", "set", "tau", "0.4, 0.4, 0.7, 0.7, 1")
     assert refused.returncode == 2
     assert "feedback.tau[0] = 0.4: expected 0.5 to 1, the certified range" in refused.stdout
-    _fly_until(flight, bag_path, 150)
+    fly_until(flight, bag_path, 150)
     taken = processes.run("hsv", "set", "feedback.tau", "[80 %, 0.8, 0.9, 0.9, 1]", "--json")
     assert taken.returncode == 0, taken.stdout
     answer = json.loads(last_line(taken))
     assert answer["value"] == [0.8, 0.8, 0.9, 0.9, 1.0]
-    _fly_until(flight, bag_path, recorded_steps(bag_path) + 550)
+    fly_until(flight, bag_path, recorded_steps(bag_path) + 550)
     flight.send_signal(signal.SIGINT)
     output = output_of(flight)
     assert flight.returncode == 130, output
@@ -79,11 +78,3 @@ def test_tau_is_changed_recorded_and_repeated(processes: Processes, tmp_path: Pa
     done = processes.run("hsv", "replay", bag_path, "--over-dds", "--node", "tube_mpc")
     assert done.returncode == 0, done.stdout
     assert done.stdout.count("identical in every byte") == 1, done.stdout
-
-
-def _fly_until(flight: subprocess.Popen[str], bag: Path, steps: int) -> None:
-    def flown() -> bool:
-        assert flight.poll() is None, flight.communicate()[0]
-        return recorded_steps(bag) >= steps
-
-    wait_until(flown, [flight.pid], lambda: recorded_steps(bag))

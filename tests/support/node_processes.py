@@ -93,6 +93,20 @@ def recorded_steps(bag: Path) -> int:
         return 0  # not begun yet
 
 
+def fly_until(flight: subprocess.Popen[str], bag: Path, steps: int) -> None:
+    """Wait until so many steps of a flight are on the disk.
+
+    Raises:
+        AssertionError: The flight has ended before.
+    """
+
+    def flown() -> bool:
+        assert flight.poll() is None, flight.communicate()[0]
+        return recorded_steps(bag) >= steps
+
+    wait_until(flown, [flight.pid], lambda: recorded_steps(bag))
+
+
 def children(pid: int) -> dict[str, int]:
     """Return the node processes below ``hsv run`` with process id ``pid``, by executable name."""
     found = {}

@@ -258,9 +258,9 @@ class Governor:
 class CommandGovernor:
     """Turns the commands that come in flight into references that go on from the one that is flown."""
 
-    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle, period: float) -> None:
-        """Govern the commands of ``trajectory``, which flies the ``vehicle`` with ``period`` (s)."""
-        self._governor, self._trajectory, self._vehicle, self._period = governor, trajectory, vehicle, period
+    def __init__(self, governor: Governor, trajectory: NominalTrajectory, vehicle: Vehicle) -> None:
+        """Govern the commands of ``trajectory``, which flies the ``vehicle``."""
+        self._governor, self._trajectory, self._vehicle = governor, trajectory, vehicle
 
     @classmethod
     def from_parameters(
@@ -283,9 +283,7 @@ class CommandGovernor:
         vehicle = Vehicle.from_parameters(values)
         actuators = actuator_data(values, vehicle.decoupled, design.period)
         bounds = input_bounds(design.plan_bounds, actuators)
-        return cls(
-            Governor(trajectory.data, vehicle.decoupled, design.period, bounds), trajectory, vehicle, design.period
-        )
+        return cls(Governor(trajectory.data, vehicle.decoupled, design.period, bounds), trajectory, vehicle)
 
     def command(self, altitude: float, velocity: float, duration: float = 0.0, blend: float = 0.0) -> tuple[int, float]:
         """Fly to a point as fast as the tightened inputs permit, once the commands given before are flown.
