@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Self
 
 import pytest
+from link_relay import DEVICE
 
 RELAY = Path(__file__).with_name("link_relay.py")
 
@@ -26,8 +27,10 @@ def missing_capability() -> str:
     for tool in ("ip", "unshare", "nsenter"):
         if not shutil.which(tool):
             return f"the command {tool} (Debian: iproute2, util-linux)"
-    if not Path("/dev/net/tun").exists():
-        return "/dev/net/tun, for the network between hosts"
+    try:
+        os.close(os.open("/dev/net/tun", os.O_RDWR))
+    except OSError as error:
+        return f"/dev/net/tun, for the network between hosts ({error.strerror})"
     tried = subprocess.run(["unshare", "--net", "--ipc", "--uts", "--mount", "true"], capture_output=True, check=False)
     return "" if tried.returncode == 0 else "the right to make namespaces (a container without CAP_SYS_ADMIN)"
 
@@ -46,6 +49,14 @@ class Hosts:
         """A process of each host, which keeps its namespaces."""
 
     def __enter__(self) -> Self:
+        try:
+            self._set_up()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def _set_up(self) -> None:
         for name, namespace in self._namespaces.items():
             _ip("netns", "add", namespace)
             words = ["ip", "netns", "exec", namespace, "unshare", "--ipc", "--uts", "--mount", "sh", "-c", _BOOT, name]
@@ -58,12 +69,11 @@ class Hosts:
         for name, namespace in self._namespaces.items():
             for words in (
                 ("link", "set", "lo", "up"),
-                ("addr", "add", f"{self.addresses[name]}/24", "dev", "hsv0"),
-                ("link", "set", "hsv0", "up", "multicast", "on"),
-                ("route", "add", "224.0.0.0/4", "dev", "hsv0"),
+                ("addr", "add", f"{self.addresses[name]}/24", "dev", DEVICE),
+                ("link", "set", DEVICE, "up", "multicast", "on"),
+                ("route", "add", "224.0.0.0/4", "dev", DEVICE),
             ):
                 _ip("-n", namespace, *words)
-        return self
 
     def __exit__(self, *_: object) -> None:
         for process in (*filter(None, [self._relay]), *self._running.values()):
