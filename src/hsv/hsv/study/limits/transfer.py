@@ -1,0 +1,142 @@
+"""The fastest transfer between the two trims of Case 1's step, of the vehicle as flown, inputs anywhere in U.
+
+Two meanings of fastest: all of the vehicle is at rest in the target's trim, or, as settling times are measured,
+altitude and velocity are within 2 % of their steps of the target and stay there on a way on which it comes to rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from scipy.optimize import minimize
+
+from hsv.simulation.metrics import SETTLING_BAND
+from hsv.study.linear_loop import START, TARGET
+from hsv.study.limits.optimum import Bounds, Point, Problem, finer, guess, solve
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, forces
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.trim import trim
+
+SUBSTEP = 0.01
+"""Longest Runge-Kutta step (s), that of the flights."""
+
+MARGIN = np.array([100.0, 10.0])
+"""Altitude (m) and velocity (m/s)."""
+
+LONGEST = 60.0
+"""Upper bound of the time (s)."""
+
+REST = 4.0
+"""Time (s) from settling to rest: a longer one changes nothing."""
+
+
+def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: float = REST) -> Problem:
+    """Return the problem of the least time (s), s, from Case 1's start to its target.
+
+    Args:
+        vehicle: Parameters.
+        periods: Number of periods of equal length in which inputs are held.
+        settling: The time is that after which altitude and velocity are within 2 % of their steps of the target;
+            ``rest`` seconds later the vehicle is at rest. Otherwise it is the time to rest.
+        rest: s.
+    """
+    start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
+    n = periods
+    period, slope = np.zeros(n), np.full(n, 1.0 / n)
+    if settling:
+        tail = max(1, round(rest * n / 10.0))
+        period = np.concatenate((period, np.full(tail, rest / tail)))
+        slope = np.concatenate((slope, np.zeros(tail)))
+    total = len(period)
+    low, high = free_states(vehicle, start.state, total)
+    if settling:
+        band = SETTLING_BAND * np.abs(target.state[:2] - start.state[:2])
+        low[n:, :2], high[n:, :2] = target.state[:2] - band, target.state[:2] + band
+    low[-1] = high[-1] = target.state
+    one = np.ones((total, 1))
+    bounds = Bounds(one * vehicle.input_minimum, one * vehicle.input_maximum, 0.0 * one * [0, 0], 0.0 * one * [0, 0])
+    longest = np.maximum(period, 16.0 * slope)
+    substeps = np.maximum(2, np.ceil(longest / SUBSTEP)).astype(int)
+    return Problem(vehicle, period, slope, substeps, bounds, low, high, False, (1.0, LONGEST))
+
+
+def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds (N + 1, 9) each of states from a ``start`` (9) that leave the vehicle in the model's range."""
+    low = np.full((periods + 1, N_STATES), -np.inf)
+    high = -low
+    low[:, 2:4], high[:, 2:4] = -vehicle.angle_limit, vehicle.angle_limit
+    low[0] = high[0] = start
+    return low, high
+
+
+def straight(problem: Problem, time: float) -> Point:
+    """Return a first guess of ``time`` (s): states and inputs in a straight line from trim to trim."""
+    start, target = trim(problem.vehicle, *START), trim(problem.vehicle, *TARGET)
+    share = np.concatenate(([0.0], np.cumsum(problem.periods(time))))
+    share = np.minimum(share / time, 1.0)[:, None]
+    state = start.state + share * (target.state - start.state)
+    return guess(time, state, (start.input + share * (target.input - start.input))[:-1])
+
+
+def least_time(start: Point, problem: Problem, factor: int, tolerance: float = 1e-5) -> Point:
+    """Return the optimum of a problem whose mesh is ``factor`` times finer than that of the optimum ``start``."""
+    return solve(problem, finer(start, factor), tolerance)
+
+
+def time_bound(vehicle: VehicleParameters) -> float:
+    """Return a time (s) below which no input within U brings the vehicle from rest at the start to rest at the target.
+
+    Over such a transfer, the velocity changes by the difference of both trims and the altitude likewise; the path
+    angle does not change, nor do pitch rate and elastic rates, so that the pitching moment, too, is zero on average.
+    For any weights, the integral of R = dV/dt + a dh/dt + b dgamma/dt + c M / I is thus known, and the time is at least
+    that integral over the largest R. The weights are those of the best such bound. The largest R is that over U, over
+    angles of attack within the model's range, path angles up to 5 deg, and altitudes and velocities up to
+    :data:`MARGIN` outside those of the trims: the bound is for transfers that stay in there.
+    """
+    start, target = trim(vehicle, *START).state, trim(vehicle, *TARGET).state
+    change = target[:2] - start[:2]
+    altitudes = np.array([start[0] - MARGIN[0], 0.5 * (start[0] + target[0]), target[0] + MARGIN[0]])
+    velocities = np.array([start[1] - MARGIN[1], 0.5 * (start[1] + target[1]), target[1] + MARGIN[1]])
+    fuel = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.fuel_equivalence_ratio_maximum])
+    elevator = np.linspace(vehicle.elevator_deflection_minimum, vehicle.elevator_deflection_maximum, 121)
+    alpha = np.linspace(-vehicle.angle_limit, vehicle.angle_limit, 241)
+    path = np.radians([-5.0, 0.0, 5.0])
+    scale = np.array([vehicle.gravity / start[1], start[1], 1.0])
+
+    def inverse(weights: np.ndarray) -> float:
+        a, b, c = weights * scale
+        largest = _largest_rate(vehicle, (a, b, c), altitudes, velocities, alpha, path, fuel, elevator)
+        return -float((change[1] + a * change[0]) / largest)
+
+    simplex = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.2, 0.0], [1.0, 0.2, -10.0]])
+    found = minimize(inverse, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "fatol": 1e-3})
+    return -float(found.fun)
+
+
+@njit(cache=True)
+def _largest_rate(
+    vehicle: VehicleParameters,
+    weights: tuple[float, float, float],
+    altitudes: np.ndarray,
+    velocities: np.ndarray,
+    alphas: np.ndarray,
+    paths: np.ndarray,
+    fuels: np.ndarray,
+    elevators: np.ndarray,
+) -> float:
+    """Return the largest R of :func:`time_bound` on a grid; it is affine in the fuel, the thrust being so."""
+    x, u, rates = np.zeros(N_STATES), np.empty(N_INPUTS), np.empty(N_STATES)
+    largest = -np.inf
+    for altitude in altitudes:
+        for velocity in velocities:
+            for alpha in alphas:
+                for path in paths:
+                    for fuel in fuels:
+                        for elevator in elevators:
+                            x[0], x[1], x[2], x[3] = altitude, velocity, alpha, alpha + path
+                            u[0], u[1] = fuel, elevator
+                            derivative(x, u, vehicle, rates)
+                            moment = forces(x, u, vehicle)[3]
+                            rate = rates[1] + weights[0] * rates[0] - weights[1] * rates[2]
+                            largest = max(largest, rate + weights[2] * moment / vehicle.moment_of_inertia)
+    return largest
