@@ -18,7 +18,7 @@ from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
 
 SUBSTEP = 0.01
-"""Longest Runge-Kutta step (s), that of the flights."""
+"""Runge-Kutta step (s) of the flights."""
 
 MARGIN = np.array([100.0, 10.0])
 """Altitude (m) and velocity (m/s)."""
@@ -26,8 +26,11 @@ MARGIN = np.array([100.0, 10.0])
 LONGEST = 60.0
 """Upper bound of the time (s)."""
 
-REST = 4.0
-"""Time (s) from settling to rest: a longer one changes nothing."""
+REST = 0.4
+"""Time from settling to rest, as a share of the time to settling: a longer one changes nothing."""
+
+TYPICAL = 12.0
+"""Time (s) for which Runge-Kutta steps are as long as in flights; where the time is longer, so are they."""
 
 
 def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: float = REST) -> Problem:
@@ -35,29 +38,23 @@ def transfer(vehicle: VehicleParameters, periods: int, *, settling: bool, rest: 
 
     Args:
         vehicle: Parameters.
-        periods: Number of periods of equal length in which inputs are held.
-        settling: The time is that after which altitude and velocity are within 2 % of their steps of the target;
-            ``rest`` seconds later the vehicle is at rest. Otherwise it is the time to rest.
-        rest: s.
+        periods: Number of periods of equal length within that time in which inputs are held.
+        settling: The time is that after which altitude and velocity are within 2 % of their steps of the target; the
+            vehicle is at rest there a share ``rest`` of the time later. Otherwise it is the time to rest.
+        rest: Share.
     """
     start, target = trim(vehicle, *START), trim(vehicle, *TARGET)
-    n = periods
-    period, slope = np.zeros(n), np.full(n, 1.0 / n)
-    if settling:
-        tail = max(1, round(rest * n / 10.0))
-        period = np.concatenate((period, np.full(tail, rest / tail)))
-        slope = np.concatenate((slope, np.zeros(tail)))
-    total = len(period)
+    total = periods + (round(rest * periods) if settling else 0)
     low, high = free_states(vehicle, start.state, total)
     if settling:
         band = SETTLING_BAND * np.abs(target.state[:2] - start.state[:2])
-        low[n:, :2], high[n:, :2] = target.state[:2] - band, target.state[:2] + band
+        low[periods:, :2], high[periods:, :2] = target.state[:2] - band, target.state[:2] + band
     low[-1] = high[-1] = target.state
-    one = np.ones((total, 1))
-    bounds = Bounds(one * vehicle.input_minimum, one * vehicle.input_maximum, 0.0 * one * [0, 0], 0.0 * one * [0, 0])
-    longest = np.maximum(period, 16.0 * slope)
-    substeps = np.maximum(2, np.ceil(longest / SUBSTEP)).astype(int)
-    return Problem(vehicle, period, slope, substeps, bounds, low, high, False, (1.0, LONGEST))
+    one, none = np.ones((total, 1)), np.zeros((total, 2))
+    bounds = Bounds(one * vehicle.input_minimum, one * vehicle.input_maximum, none, none)
+    substeps = np.full(total, max(2, round(TYPICAL / periods / SUBSTEP)))
+    slope = np.full(total, 1.0 / periods)
+    return Problem(vehicle, np.zeros(total), slope, substeps, bounds, low, high, False, (1.0, LONGEST))
 
 
 def free_states(vehicle: VehicleParameters, start: np.ndarray, periods: int) -> tuple[np.ndarray, np.ndarray]:
