@@ -23,9 +23,6 @@ DECLARED = [Requirement(line) for line in requires("hsv") or []]
 OF_ROS = {"ament_index_python"}
 """Imported where a ROS workspace is sourced only."""
 
-WITHOUT_IMPORT = {"clarabel"}
-"""Distributions that are found by another one: cvxpy solves with it."""
-
 
 def extra_of(requirement: Requirement) -> str:
     """Return the extra that a requirement belongs to, "all" left out; "" if it is always installed."""
@@ -50,7 +47,6 @@ def test_every_import_is_of_a_declared_distribution_and_every_distribution_is_us
     used: dict[str, set[str]] = {}
     for module in imported():
         used.setdefault(EXTRAS.get(module, ""), set()).update(map(canonicalize_name, by_module[module]))
-    used["design"] |= WITHOUT_IMPORT
     declared: dict[str, set[str]] = {}
     for requirement in DECLARED:
         declared.setdefault(extra_of(requirement), set()).add(canonicalize_name(requirement.name))

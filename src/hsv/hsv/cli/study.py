@@ -14,7 +14,8 @@ from hsv.cli.targets import check_folder
 
 def study(
     name: Annotated[
-        str, typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor or hardware.")
+        str,
+        typer.Argument(help="coupling, sampling, notch, parameters, fault, weights, ramp, factor, hardware or limits."),
     ],
     out: Annotated[Path, typer.Option(help="Folder for a PDF, a PNG and a page on the study.")] = Path("study"),
     flights: FlightsOption = Path("bags/study"),

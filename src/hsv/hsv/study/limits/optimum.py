@@ -1,17 +1,15 @@
 """Optimal control of the vehicle as flown, inputs held over periods, by sequential quadratic programming.
 
 The states at all ends of periods are unknowns beside the inputs (multiple shooting): a single trajectory of an unstable
-vehicle would amplify every change of an early input. What is linearised is the integrator of the flights, by the complex
-step. Each iteration solves a convex programme with the curvature of the Lagrangian as far as it is convex, a proximal
-term, and an exact penalty on what is missing in the dynamics (Nocedal and Wright, Numerical Optimization, 2nd ed.,
-section 18.5); where the curvature of the dynamics spoils a step, a second-order correction follows (section 18.3).
+vehicle would amplify every change of an early input. What is linearised is the integrator of the flights, by the
+complex step. Each iteration solves a convex programme with the curvature of the Lagrangian as far as it is convex, a
+proximal term, and an exact penalty on what is missing in the dynamics (Nocedal and Wright, Numerical Optimization, 2nd
+ed., section 18.5); where the curvature of the dynamics spoils a step, a second-order correction follows (section 18.3).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -45,6 +43,10 @@ class Bounds:
     high: np.ndarray
     low_slope: np.ndarray
     high_slope: np.ndarray
+
+    def at(self, scalar: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the lower and the upper bounds for a value of s."""
+        return self.low + scalar * self.low_slope, self.high + scalar * self.high_slope
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,6 @@ class Point:
     state: np.ndarray
     input: np.ndarray
     multipliers: np.ndarray
-    iterations: int = 0
 
 
 def guess(scalar: float, state: np.ndarray, inputs: np.ndarray) -> Point:
@@ -123,7 +124,8 @@ def transitions(
                 x[i] = complex(state[k, i], step if i == j else 0.0)
             for i in range(N_INPUTS):
                 u[i] = complex(inputs[k, i], step if N_STATES + i == j else 0.0)
-            advance(x, u, vehicle, complex(period[k], step if j == _SIZE - 1 else 0.0), substeps[k], work)
+            length: Any = complex(period[k], step if j == _SIZE - 1 else 0.0)
+            advance(x, u, vehicle, length, substeps[k], work)
             slope[k, :, j] = x.imag / step
         end[k] = x.real
     return end, slope
@@ -160,7 +162,8 @@ def curvatures(
                         x[i] = complex(point[i], step if i == b else 0.0)
                     for i in range(N_INPUTS):
                         u[i] = complex(point[N_STATES + i], step if N_STATES + i == b else 0.0)
-                    advance(x, u, vehicle, complex(point[-1], step if b == _SIZE - 1 else 0.0), substeps[k], work)
+                    length: Any = complex(point[-1], step if b == _SIZE - 1 else 0.0)
+                    advance(x, u, vehicle, length, substeps[k], work)
                     gradient[side, b] = np.sum(weights[k] * x.imag) / step
             for b in curved:
                 half = (gradient[0, b] - gradient[1, b]) / (4.0 * reach[a])
@@ -185,26 +188,29 @@ def solve(
     problem: Problem,
     first: Point,
     tolerance: float = 1e-6,
-    progress: Callable[[Point], None] = lambda point: None,
 ) -> Point:
     """Return the local optimum reached from the guess ``first``: no step promises more than ``tolerance`` of cost.
 
     Raises:
         DesignError: The iteration ends elsewhere.
     """
-    point = replace(first, state=np.clip(first.state, problem.state_low, problem.state_high))
+    # Steps keep to the bounds, so that the merit is of the dynamics alone: the first point must, too.
+    state = np.clip(first.state, problem.state_low, problem.state_high)
+    point = replace(first, state=state, input=np.clip(first.input, *problem.inputs.at(first.scalar)))
     weight, merit, settled = 1e-2, _merit(problem, point), 0
     for iteration in range(1, _ITERATIONS + 1):
         local = _Local(problem, point)
+        promises = []
         while True:
             trial, promise = local.step(weight)
+            promises.append(promise)
             value = _merit(problem, trial)
             if merit - value < 0.75 * promise:
                 corrected, _ = local.step(weight, defects(problem, trial))
                 if (other := _merit(problem, corrected)) < value:
                     trial, value = corrected, other
             gain = merit - value
-            if gain >= 0.1 * promise or promise < tolerance * 1e-3:
+            if gain >= 0.1 * promise or promise < 1e-3 * tolerance:
                 break
             weight *= 4.0
         if gain > 0.7 * promise:
@@ -212,16 +218,15 @@ def solve(
         elif gain < 0.25 * promise:
             weight *= 2.0
         if gain > 0.0:
-            point, merit = replace(trial, iterations=iteration), value
-        progress(point)
-        settled = settled + 1 if promise < tolerance else 0
-        if settled >= 2:
+            point, merit = trial, value
+        settled = settled + 1 if promises[0] < tolerance else 0
+        missing = float(np.abs(defects(problem, point)).max())
+        if settled >= 2 and missing < DEFECT:
             break
-    missing = float(np.abs(defects(problem, point)).max())
-    if settled < 2 or missing > DEFECT:
+    else:
         raise DesignError(
             f"optimal control: after {iteration} iterations the largest defect is {missing:.1e}, expected {DEFECT:g}, "
-            f"and a step promises {promise:.1e}, expected {tolerance:g}"
+            f"and a step promises {promises[0]:.1e}, expected {tolerance:g}"
         )
     return point
 
@@ -238,6 +243,7 @@ class _Local:
 
     def __init__(self, problem: Problem, point: Point) -> None:
         self._problem, self._point = problem, point
+        self._found = np.zeros(0)  # of the last step that was not corrected
         n = len(point.input)
         self._states, self._inputs = n * N_STATES, n * N_INPUTS
         self._moved = self._states + self._inputs + 1
@@ -300,7 +306,9 @@ class _Local:
         s = point.scalar
         equal, below = [], []
         index = np.arange(self._states)
-        low, high = (((side - point.state) / STATE_SCALE)[1:].ravel() for side in (problem.state_low, problem.state_high))
+        low, high = (
+            ((side - point.state) / STATE_SCALE)[1:].ravel() for side in (problem.state_low, problem.state_high)
+        )
         given = low == high
         equal.append((self._rows(index[given], 1.0), low[given]))
         for sign, room in ((1.0, high), (-1.0, -low)):
@@ -334,14 +342,10 @@ class _Local:
         where = np.full(len(index), self._moved - 1)
         return rows + sparse.csr_matrix((by_scalar, (count, where)), (len(index), self._size))
 
-    @cached_property
-    def _first(self) -> dict[float, np.ndarray]:
-        return {}
-
     def step(self, weight: float, missed: np.ndarray | None = None) -> tuple[Point, float]:
         """Return the next point with a proximal ``weight``, and by how much the merit should fall.
 
-        ``missed``: the defects after the step found before with this weight; the step is corrected for them.
+        ``missed``: the defects after the last step, which had the same weight; it is corrected for them.
 
         Raises:
             DesignError: The solver fails.
@@ -351,7 +355,7 @@ class _Local:
         m = len(self._right)
         right = self._right
         if missed is not None:
-            found = self._first[weight]
+            found = self._found
             slack = found[self._moved : self._moved + m] - found[self._moved + m :]
             right = self._equations @ found - missed - slack
         proximal = np.zeros(self._size)
@@ -369,7 +373,7 @@ class _Local:
         if not np.isfinite(z).all():
             raise DesignError(f"optimal control: the solver ended with {solution.status}")
         if missed is None:
-            self._first[weight] = z
+            self._found = z
         point, n = self._point, len(self._point.input)
         state = point.state.copy()
         state[1:] += z[: self._states].reshape(n, N_STATES) * STATE_SCALE

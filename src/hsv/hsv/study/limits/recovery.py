@@ -1,7 +1,7 @@
 """The deepest constant loss of elevator effectiveness from which inputs within U still recover the vehicle.
 
-The vehicle is in its trim at Case 1's target when the effectiveness falls from 1 to P; the elevator that acts is P times
-the command. For a delay the command of the trim is kept, then any inputs within U are at once those that are best for P.
+The vehicle is in its trim at Case 1's target when the effectiveness falls from 1 to P; the elevator that acts is P
+times the command. For a delay the command of the trim is kept, then any inputs within U are permitted.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import numpy as np
 from numba import njit
 
 from hsv.errors import TrimError
-from hsv.study.linear_loop import TARGET
 from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.limits.transfer import free_states
+from hsv.study.linear_loop import TARGET
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.integration import advance
 from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.trim import Trim, balance, trim
+from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
 
 PERIOD = 0.02
@@ -49,7 +49,7 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
         divide: In how many each period is divided, for a finer mesh.
     """
     before = trim(vehicle, *TARGET)
-    held = np.array(_held(horizon))
+    held = np.array(held_periods(horizon))
     period = np.repeat(held * PERIOD / divide, divide)
     n, kept = len(period), round(delay / PERIOD) * divide
     low, high = free_states(vehicle, before.state, n)
@@ -67,7 +67,8 @@ def recovery(vehicle: VehicleParameters, envelope: Vehicle, delay: float, horizo
     return Problem(vehicle, period, np.zeros(n), substeps, bounds, low, high, True, (0.05, 1.0), COST)
 
 
-def _held(horizon: float) -> list[int]:
+def held_periods(horizon: float) -> list[int]:
+    """Return for how many periods of the flight each input is held, up to a ``horizon`` (s)."""
     held: list[int] = []
     while (time := sum(held) * PERIOD) < horizon - 1e-9:
         held.append(1 if time < 1.5 - 1e-9 else 2 if time < 3.0 - 1e-9 else 5)
@@ -99,17 +100,18 @@ def envelope_points(envelope: Vehicle) -> np.ndarray:
     return np.array([(altitude, velocity) for altitude in axes[0] for velocity in axes[1]])
 
 
-def turning_limit(vehicle: VehicleParameters, delay: float, fuel: float, resolution: float = 1e-4) -> float:
+def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 1e-4) -> float:
     """Return the least effectiveness with which the elevator at its stop turns the vehicle's nose down.
 
     Found by bisection of flights, without any optimisation: after the ``delay`` (s) the elevator goes to its stop and
-    the fuel equivalence ratio to ``fuel``; the nose is turned when the angle of attack is that of the trim once more.
+    the fuel, whose thrust lifts the nose, is shut off; the nose is turned when the angle of attack is back at
+    that of the trim.
     """
     before = trim(vehicle, *TARGET)
     low, high = 0.0, 1.0
     while high - low > resolution:
         share = 0.5 * (low + high)
-        if _turns(vehicle, before.state, before.input, round(delay / PERIOD), fuel, share):
+        if _turns(vehicle, before.state, before.input, round(delay / PERIOD), share):
             high = share
         else:
             low = share
@@ -117,12 +119,10 @@ def turning_limit(vehicle: VehicleParameters, delay: float, fuel: float, resolut
 
 
 @njit(cache=True)
-def _turns(
-    vehicle: VehicleParameters, state: np.ndarray, inputs: np.ndarray, kept: int, fuel: float, share: float
-) -> bool:
+def _turns(vehicle: VehicleParameters, state: np.ndarray, inputs: np.ndarray, kept: int, share: float) -> bool:
     x, u, work = state.copy(), np.empty(2), np.empty((3, len(state)))
     for k in range(int(20.0 / PERIOD)):
-        u[0] = inputs[0] if k < kept else fuel
+        u[0] = inputs[0] if k < kept else vehicle.fuel_equivalence_ratio_minimum
         u[1] = share * (inputs[1] if k < kept else vehicle.elevator_deflection_maximum)
         advance(x, u, vehicle, PERIOD, SUBSTEPS, work)
         if k >= kept and x[4] < 0.0 and x[2] <= state[2]:

@@ -24,7 +24,7 @@ _LAST_WEIGHT = 100.0
 
 @dataclass(frozen=True)
 class Loop:
-    """What a flight needs besides its commands: vehicle, period (s), Runge-Kutta steps of it, elevator effectiveness."""
+    """What a flight needs besides commands: vehicle, period (s), its Runge-Kutta steps, elevator effectiveness."""
 
     vehicle: VehicleParameters
     period: float
@@ -128,7 +128,7 @@ def fly_optimum(
 
 
 def _regulator(loop: Loop, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Return the gains (N, 2, 9) of the linear-quadratic regulator along states and inputs, weighted by their scales."""
+    """Return the gains (N, 2, 9) of the linear-quadratic regulator along a trajectory, weighted by the scales."""
     n = len(inputs)
     lengths, substeps = np.full(n, loop.period), np.full(n, loop.substeps)
     _, slope = transitions(states[:-1], inputs, lengths, substeps, loop.vehicle)

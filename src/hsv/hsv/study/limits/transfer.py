@@ -11,8 +11,8 @@ from numba import njit
 from scipy.optimize import minimize
 
 from hsv.simulation.metrics import SETTLING_BAND
+from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.linear_loop import START, TARGET
-from hsv.study.limits.optimum import Bounds, Point, Problem, finer, guess, solve
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, forces
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
@@ -22,6 +22,9 @@ SUBSTEP = 0.01
 
 MARGIN = np.array([100.0, 10.0])
 """Altitude (m) and velocity (m/s)."""
+
+GRID_ERROR = 5e-4
+"""More than the largest rate between the points of the grid can exceed that at them, of itself: from its curvature."""
 
 LONGEST = 60.0
 """Upper bound of the time (s)."""
@@ -75,11 +78,6 @@ def straight(problem: Problem, time: float) -> Point:
     return guess(time, state, (start.input + share * (target.input - start.input))[:-1])
 
 
-def least_time(start: Point, problem: Problem, factor: int, tolerance: float = 1e-5) -> Point:
-    """Return the optimum of a problem whose mesh is ``factor`` times finer than that of the optimum ``start``."""
-    return solve(problem, finer(start, factor), tolerance)
-
-
 def time_bound(vehicle: VehicleParameters) -> float:
     """Return a time (s) below which no input within U brings the vehicle from rest at the start to rest at the target.
 
@@ -107,7 +105,7 @@ def time_bound(vehicle: VehicleParameters) -> float:
 
     simplex = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.2, 0.0], [1.0, 0.2, -10.0]])
     found = minimize(inverse, simplex[0], method="Nelder-Mead", options={"initial_simplex": simplex, "fatol": 1e-3})
-    return -float(found.fun)
+    return -float(found.fun) * (1.0 - GRID_ERROR)
 
 
 @njit(cache=True)

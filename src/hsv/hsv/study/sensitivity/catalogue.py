@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from hsv.study.limits import study as limits
 from hsv.study.sensitivity import coupling, factor, fault, hardware, notch, parameters, ramp, sampling, weights
 from hsv.study.sensitivity.study import Outcome, Study
 
 STUDIES: dict[str, Study] = {
-    m.STUDY.name: m.STUDY for m in (coupling, sampling, notch, parameters, fault, weights, ramp, factor, hardware)
+    m.STUDY.name: m.STUDY
+    for m in (coupling, sampling, notch, parameters, fault, weights, ramp, factor, hardware, limits)
 }
 
-_PAGE = """# Sensitivity: {title}
+_PAGE = """# {kind}: {title}
 Made by `hsv study {name} --out docs/study`, including all numbers.
 
 ![{title}]({name}.png)
@@ -23,4 +25,4 @@ Made by `hsv study {name} --out docs/study`, including all numbers.
 def page(study: Study, outcome: Outcome) -> str:
     """Return the page in Markdown."""
     findings = "\n".join(f"- {finding[0].upper()}{finding[1:]}." for finding in outcome.findings)
-    return _PAGE.format(title=study.title, name=study.name, shows=outcome.shows, findings=findings)
+    return _PAGE.format(kind=study.kind, title=study.title, name=study.name, shows=outcome.shows, findings=findings)

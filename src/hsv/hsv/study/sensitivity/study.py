@@ -27,13 +27,15 @@ class Outcome:
 class Study:
     """A study; ``run`` takes the coarseness (1: as in the docs), a folder for designs, and a progress callback.
 
-    ``run_beside``, if there is one, also flies the controllers of the scenarios in its last argument.
+    ``run_beside``, if there is one, also flies the controllers of the scenarios in its last argument. ``kind``: what
+    the title of its page begins with.
     """
 
     name: str
     title: str
     run: Callable[[float, Path, Progress], Outcome]
     run_beside: Callable[[float, Path, Progress, Sequence[str]], Outcome] | None = None
+    kind: str = "Sensitivity"
 
 
 def grid(low: float, high: float, step: float, coarseness: float) -> np.ndarray:
