@@ -1,31 +1,31 @@
-import re
-from pathlib import Path
+"""The settling times of the comparison page, which steps and ramps have in the same sense."""
 
+import numpy as np
 import pytest
 
-from hsv.simulation.comparison import INTEGRAL, NOMINAL_LAWS, ROBUST_AND_TUBE, table
-
-PAGE = (Path(__file__).parents[2] / "docs" / "comparison.md").read_text(encoding="utf-8")
-
-
-def numbers(row):
-    return [float(cell) for cell in re.findall(r"-?\d+\.?\d*", row.split("|", 2)[2])]
+from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.comparison import settling_times
+from hsv.simulation.metrics import flight_metrics
+from hsv.simulation.scenario import load_scenario
 
 
-def rows(text):
-    return {line.split("|")[1].strip(): numbers(line) for line in text.splitlines() if line.startswith("| case1")}
+def flown(scenario, **changes):
+    return fly(assemble({**flight_parameters(load_scenario(scenario)), **changes})).data()
 
 
-def test_page_shows_every_flight_of_the_comparison():
-    assert list(rows(PAGE)) == [*ROBUST_AND_TUBE, *NOMINAL_LAWS, *INTEGRAL]
+def test_settling_times_of_a_step_are_the_metrics():
+    flight = flown("case1")
+    metrics = flight_metrics(flight)
+    assert settling_times(flight) == pytest.approx(
+        [metrics["altitude_settling_time"], metrics["velocity_settling_time"]]
+    )
 
 
-def test_robust_mpc_and_tube_fly_as_the_page_says():
-    for name, values in rows(table(ROBUST_AND_TUBE)).items():
-        # Processors differ in the last digits, and a limited input enlarges that a little.
-        assert rows(PAGE)[name] == pytest.approx(values, rel=2e-3, abs=0.02), name
+def test_settling_times_of_a_ramp_count_from_its_beginning():
+    """As docs/governor.md prints them."""
+    assert settling_times(flown("case1_governed")) == pytest.approx([29.0, 28.8], abs=0.05)
 
 
-def test_the_quadratic_programme_settles_sooner_than_the_family():
-    family, qp = rows(PAGE)["case1"], rows(PAGE)["case1_qp"]
-    assert qp[0] <= family[0] and qp[1] < family[1]
+def test_a_flight_that_is_too_short_has_not_settled():
+    assert np.array_equal(settling_times(flown("case1", duration=50.0)) < np.inf, [True, False])

@@ -5,6 +5,7 @@ import pytest
 
 from hsv.design.region import corners
 from hsv.errors import DesignError
+from hsv.simulation import comparison
 from hsv.study.limits import optimum
 from hsv.study.limits.optimum import (
     INPUT_SCALE,
@@ -157,6 +158,7 @@ def test_the_fastest_transfers_of_the_page():
 
     settled = fastest_transfer(VEHICLE, PERIODS, settling=True)
     assert settled.time == pytest.approx(10.0125, abs=2e-3)
+    assert round(settled.time, 2) == comparison.LEAST_TIME
     inside = settled.flown.state[settled.flown.time >= settled.time - 1e-9, :2]
     step = np.subtract(TARGET, START)
     assert np.all(np.abs(inside - TARGET) <= 0.02 * np.abs(step) * (1.0 + 1e-6))

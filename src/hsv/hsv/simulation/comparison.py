@@ -6,13 +6,17 @@ import numpy as np
 
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import Flight, fly
-from hsv.simulation.metrics import flight_metrics
+from hsv.simulation.metrics import SETTLING_BAND, FlightData, flight_metrics
 from hsv.simulation.scenario import load_scenario
 from hsv.units import to_paper
 
 ROBUST_AND_TUBE = ("case1_rmpc", "case1_tube_dm", "case1_rmpc_last_k", "case1_tube_dm_family")
 NOMINAL_LAWS = ("case1_single_k", "case1", "case1_smooth", "case1_kothare_online", "case1_qp")
+BESIDE_THE_OPTIMUM = (*NOMINAL_LAWS, "case1_governed")
 INTEGRAL = ("case1_integral_heavy", "case1_integral_light")
+
+LEAST_TIME = 10.01
+"""Time (s) after which both commands can be settled with inputs within U: `hsv study limits`."""
 
 _PAGE = """# Comparison of controllers and nominal laws
 Made by `python -m hsv.simulation.comparison > docs/comparison.md`; every row is one scenario, flown in one process as
@@ -30,6 +34,12 @@ its last gain long before the fault.)
 The tube about the nominal trajectories of different laws, for the coupled vehicle with the paper-like coupling.
 
 {laws}
+## Beside the optimum
+With inputs within U, altitude and velocity of the nominal vehicle can be settled to 2 % from {least} s on: the
+[physical limit](study/limits.md), by optimal control (`hsv study limits`). The later of both settling times is so many
+times as long:
+
+{optimum}
 ## Integral action
 An extension of the paper's law that removes the steady-state error caused by a wrong mass.
 
@@ -38,7 +48,34 @@ An extension of the paper's law that removes the steady-state error caused by a 
 
 def comparison() -> str:
     """Return the page."""
-    return _PAGE.format(robust=table(ROBUST_AND_TUBE), laws=table(NOMINAL_LAWS), integral=table(INTEGRAL))
+    return _PAGE.format(
+        robust=table(ROBUST_AND_TUBE),
+        laws=table(NOMINAL_LAWS),
+        least=LEAST_TIME,
+        optimum=ratios(BESIDE_THE_OPTIMUM),
+        integral=table(INTEGRAL),
+    )
+
+
+def ratios(names: tuple[str, ...]) -> str:
+    """Return a table of the later settling time of each scenario, flown, and its ratio to :data:`LEAST_TIME`."""
+    rows = ["| scenario | both settled, s | times the least |", "| --- | ---: | ---: |"]
+    for name in names:
+        later = float(settling_times(fly(assemble(flight_parameters(load_scenario(name)))).data()).max())
+        rows.append(f"| {name} | {later:.1f} | {later / LEAST_TIME:.1f} |" if later < np.inf else f"| {name} | no | |")
+    return "\n".join(rows) + "\n"
+
+
+def settling_times(flight: FlightData) -> np.ndarray:
+    """Return the times (2), s, from which altitude and velocity stay within 2 % of the whole change up to the fault.
+
+    The change is from the first state to the last reference, whether that is a step or not; infinite: not settled.
+    """
+    before = flight.time < (np.inf if flight.fault_start is None else flight.fault_start - 1e-9)
+    target = flight.reference[-1, :2]
+    off = np.abs(flight.state[before, :2] - target) > SETTLING_BAND * np.abs(target - flight.state[0, :2])
+    last = [int(np.flatnonzero(column)[-1]) + 1 if column.any() else 0 for column in off.T]
+    return np.array([flight.time[index] if index < len(off) else np.inf for index in last])
 
 
 def table(names: tuple[str, ...]) -> str:

@@ -198,7 +198,7 @@ def solve(
     state = np.clip(first.state, problem.state_low, problem.state_high)
     point = replace(first, state=state, input=np.clip(first.input, *problem.inputs.at(first.scalar)))
     weight, merit, settled = 1e-2, _merit(problem, point), 0
-    for iteration in range(1, _ITERATIONS + 1):
+    for _ in range(_ITERATIONS):
         local = _Local(problem, point)
         promises = []
         while True:
@@ -225,8 +225,8 @@ def solve(
             break
     else:
         raise DesignError(
-            f"optimal control: after {iteration} iterations the largest defect is {missing:.1e}, expected {DEFECT:g}, "
-            f"and a step promises {promises[0]:.1e}, expected {tolerance:g}"
+            f"optimal control: after {_ITERATIONS} iterations the largest defect is {missing:.1e}, "
+            f"expected {DEFECT:g}, and a step promises {promises[0]:.1e}, expected {tolerance:g}"
         )
     return point
 

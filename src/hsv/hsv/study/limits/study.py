@@ -14,7 +14,8 @@ from hsv.design.region import Corner, corners
 from hsv.progress import Progress
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
-from hsv.simulation.metrics import FlightData, flight_metrics
+from hsv.simulation.comparison import settling_times
+from hsv.simulation.metrics import FlightData
 from hsv.simulation.scenario import load_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.limits.optimum import finer, solve
@@ -206,8 +207,7 @@ def worst_corners(limits: np.ndarray) -> tuple[int, ...]:
 
 def _settling(data: FlightData) -> tuple[float, float, float]:
     """Return the settling times (s) of altitude and velocity, and the later one."""
-    metrics = flight_metrics(data)
-    altitude, velocity = (metrics[f"{axis}_settling_time"] for axis in ("altitude", "velocity"))
+    altitude, velocity = map(float, settling_times(data))
     return altitude, velocity, max(altitude, velocity)
 
 
@@ -251,7 +251,6 @@ def _shows(found: Limits) -> str:
         settling="\n".join(settling),
         margin=MARGIN,
         after=AFTER,
-        horizon=HORIZON,
         faults="\n".join(rows),
         count=len(limits) - 1,
         over="\n".join(over_all),
@@ -420,8 +419,11 @@ faulty vehicle, anywhere in the envelope of commands, and never outside the rang
 - **Optimum**: the least P for which inputs exist, by optimal control, with P among the unknowns.
 
 The optimum equals the larger of the turning limit and the static limit of the trim that it leads to, to the resolution
-of the bisection: nothing else limits the recovery. Within {horizon:g} s, for the nominal vehicle and the worst of all
-corners:
+of the bisection: nothing else limits the recovery. That nothing turns the nose at less can be seen from the rigid pitch
+motion: angle of attack and pitch rate each grow with the other, the elevator lowers both rates and thrust raises the
+pitch rate, so that elevator at its stop and no fuel keep both below those of any other input.
+
+For the nominal vehicle and the worst of all corners:
 
 | vehicle | known after, s | horizon s | least P | on a mesh twice as fine | turning | static, at its end | flown |
 | --- | ---: | ---: | ---: | ---: | ---: | ---: | --- |
