@@ -90,7 +90,8 @@ def static_limit(vehicle: VehicleParameters, points: np.ndarray) -> float:
             needed = trim(vehicle, altitude, velocity).input[1]
         except TrimError:
             continue
-        least = min(least, needed / vehicle.elevator_deflection_maximum)
+        stop = vehicle.elevator_deflection_maximum if needed > 0.0 else vehicle.elevator_deflection_minimum
+        least = min(least, needed / stop)
     return float(least)
 
 
