@@ -1,5 +1,7 @@
 """Fastest transfer and deepest fault by optimal control; the page has the numbers that the long tests recompute."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -29,10 +31,12 @@ from hsv.study.limits.replay import fly_optimum
 from hsv.study.limits.study import PERIODS, deepest_fault, fastest_transfer
 from hsv.study.limits.transfer import straight, time_bound, transfer
 from hsv.study.linear_loop import START, TARGET
+from hsv.study.sensitivity.catalogue import STUDIES, page
 from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
+ROOT = Path(__file__).parents[2]
 ENVELOPE = load_vehicle()
 VEHICLE = ENVELOPE.coupled("paper_like")
 HORIZON = 8.0
@@ -192,3 +196,23 @@ def test_the_limits_of_all_corners():
     worst = others[int(np.argmax(turning))]
     found = deepest_fault(worst, ENVELOPE, 0.2, 10.0, refine=False)
     assert found.effectiveness == pytest.approx(max(turning), abs=2e-4)
+
+
+def test_the_comparison_has_the_least_time_of_the_page():
+    page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
+    assert f"{comparison.LEAST_TIME} s" in page_of_limits
+    assert f"{comparison.LEAST_TIME} s" in (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_a_coarse_study_has_its_page_and_numbers(tmp_path):
+    told = []
+    outcome = STUDIES["limits"].run(8.0, tmp_path, lambda *what: told.append(what))
+    text = page(STUDIES["limits"], outcome)
+    assert text.startswith("# Physical limits: Fastest transfer and deepest fault") and "{" not in text
+    assert [row["flown"] for row in outcome.numbers["faults"]] == [True] * 3
+    assert len(outcome.figure.axes) == 6
+    numbers = outcome.numbers["settling_s"]
+    assert f"| case1_governed | 29.0 | 28.8 | {numbers['case1_governed'] / numbers['least']:.1f} |" in text
+    assert numbers["least"] < min(numbers[name] for name in ("case1", "case1_qp", "case1_governed"))
+    assert told[-1] == ("done", 8, 8)

@@ -277,13 +277,13 @@ def _range(limits: np.ndarray) -> str:
 def _findings(found: Limits) -> tuple[str, ...]:
     rest, settled, limits = found.rest, found.settled, found.corners
     ratios = ", ".join(f"{_settling(data)[2] / settled.time:.1f} ({name})" for name, data in found.flights.items())
-    known = "; ".join(
+    known = " and from ".join(
         f"{fault.effectiveness:.3f} if it is known after {fault.delay:g} s"
         for fault in found.faults
         if fault.delay > 0.0
     )
     at_once = [fault for fault in found.faults if fault.delay == 0.0]
-    moving = "; ".join(f"{fault.effectiveness:.3f} within {fault.horizon:g} s" for fault in at_once)
+    moving = " and ".join(f"{fault.effectiveness:.3f} within {fault.horizon:g} s" for fault in at_once)
     findings = [
         f"the fastest transfer takes {rest.time:.2f} s to rest, and none takes less than {found.bound:.2f} s; altitude "
         f"and velocity can be within 2 % from {settled.time:.2f} s on. The controllers take this many times as long: "
