@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,12 +95,14 @@ class DeepestFault:
 
 @dataclass(frozen=True)
 class Limits:
-    """Results: transfers to rest and to 2 %, bound of the former (s), flights by scenario, recoveries, all vehicles.
+    """Results: transfers in so many ``periods``, to rest and to 2 %, a bound of the former's time (s), and recoveries.
 
-    faults: Of the nominal vehicle. worst: Of some of the corners, by their number. corners: (vehicles, 2 + delays), see
-    :func:`corner_limits`; the first is the nominal vehicle. over: The changes of their parameters.
+    flights: By scenario. faults: Of the nominal vehicle. worst: Of some of the corners, by their number. corners:
+    (vehicles, 2 + delays), see :func:`corner_limits`; the first is the nominal vehicle. over: The changes of their
+    parameters.
     """
 
+    periods: int
     rest: FastestTransfer
     settled: FastestTransfer
     bound: float
@@ -195,7 +198,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 at = vehicle.perturbed(over[index])
                 worst[index].append(deepest_fault(at, envelope, delay, HORIZON, refine=False))
     progress("done", total, total)
-    found = Limits(rest, settled, bound, flights, faults, worst, over, limits)
+    found = Limits(periods, rest, settled, bound, flights, faults, worst, over, limits)
     return Outcome(_figure(found), _shows(found), _findings(found), _numbers(found))
 
 
@@ -209,6 +212,10 @@ def _settling(data: FlightData) -> tuple[float, float, float]:
     """Return the settling times (s) of altitude and velocity, and the later one."""
     altitude, velocity = map(float, settling_times(data))
     return altitude, velocity, max(altitude, velocity)
+
+
+def _rounded_down(value: float) -> float:
+    return math.floor(100.0 * value) / 100.0
 
 
 def _within(limit: np.ndarray, static: np.ndarray) -> np.ndarray:
@@ -246,7 +253,8 @@ def _shows(found: Limits) -> str:
         rest_mesh=100.0 * abs(rest.coarser / rest.time - 1.0),
         settled=settled.time,
         settled_mesh=100.0 * abs(settled.coarser / settled.time - 1.0),
-        bound=found.bound,
+        bound=_rounded_down(found.bound),
+        periods=found.periods,
         deviation=max(rest.flown.deviation(), settled.flown.deviation()),
         gap=100.0 * (rest.time / found.bound - 1.0),
         settling="\n".join(settling),
@@ -285,7 +293,8 @@ def _findings(found: Limits) -> tuple[str, ...]:
     at_once = [fault for fault in found.faults if fault.delay == 0.0]
     moving = " and ".join(f"{fault.effectiveness:.3f} within {fault.horizon:g} s" for fault in at_once)
     findings = [
-        f"the fastest transfer takes {rest.time:.2f} s to rest, and none takes less than {found.bound:.2f} s; altitude "
+        f"the fastest transfer takes {rest.time:.2f} s to rest, and none takes less than "
+        f"{_rounded_down(found.bound):.2f} s; altitude "
         f"and velocity can be within 2 % from {settled.time:.2f} s on. The controllers take this many times as long: "
         f"{ratios}",
         f"known at once, a loss costs nothing as long as a trim is left: the vehicle holds its trim down to "
@@ -392,8 +401,8 @@ after which it is known, by bisection (lines) and by optimal control.
 
 ## The fastest transfer
 Case 1's step, from rest in its trim at 85500 ft and 7900 ft/s to 86100 ft and 8150 ft/s, of the vehicle as flown:
-coupled, with both elastic modes, nominal parameters, inputs anywhere within U and held over periods. Case 1 has ideal
-actuators, and so there are no rate limits. Angles stay within the range of the model. Two times are the least:
+coupled, with both elastic modes, nominal parameters, inputs anywhere within U and held over {periods} equal periods.
+Case 1 has ideal actuators, and so there are no rate limits. Angles stay within the range of the model. Two least times:
 - **To rest**: all nine states are those of the target's trim, the elastic modes at rest: {rest:.2f} s. On a mesh half
   as fine it is {rest_mesh:.2g} % more.
 - **To 2 %**: altitude and velocity are within 2 % of their steps and stay there, as settling times are measured, on a
@@ -406,7 +415,8 @@ Between 2 % and rest many inputs are as good, and those in the figure are one ch
 The optimum is a local one, to which the iteration comes from different guesses. Independently of it, no transfer takes
 less than {bound:.2f} s: of every transfer between two trims the changes of velocity, altitude and path angle are known,
 and the mean pitching moment is zero; for the best weights of the four, the largest weighted rate that U permits gives
-this bound, for transfers within 100 m and 10 m/s of the trims. The optimum is thus within {gap:.1f} % of the fastest.
+this bound, for transfers within 100 m, 10 m/s and 5 deg of path angle of the trims. The optimum is thus within
+{gap:.1f} % of the fastest.
 For the time to 2 %, where the vehicle is not at rest, there is no such bound. Flown by the loop's plant, both are
 within {deviation:.0e} of what was computed, in units of 100 m, 50 m/s and 0.03 rad.
 
@@ -427,9 +437,9 @@ faulty vehicle, anywhere in the envelope of commands, and never outside the rang
 - **Optimum**: the least P for which inputs exist, by optimal control, with P among the unknowns.
 
 The optimum equals the larger of the turning limit and the static limit of the trim that it leads to, to the resolution
-of the bisection: nothing else limits the recovery. That nothing turns the nose at less can be seen from the rigid pitch
-motion: angle of attack and pitch rate each grow with the other, the elevator lowers both rates and thrust raises the
-pitch rate, so that elevator at its stop and no fuel keep both below those of any other input.
+of the bisection: nothing else limits the recovery. The reason, for the rigid pitch motion: angle of attack and pitch
+rate each grow with the other, the elevator lowers the growth of both and thrust raises that of the pitch rate, so that
+elevator at its stop and no fuel keep both below those of any other input.
 
 For the nominal vehicle and the worst of all corners:
 
