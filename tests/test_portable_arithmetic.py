@@ -49,6 +49,8 @@ ON_THE_PATH = (
     "control/tube_factor.py",
     "control/controller.py",
     "control/controllers.py",
+    "control/effectiveness.py",
+    "control/effectiveness_parameters.py",
     "control/estimator.py",
     "control/estimator_parameters.py",
     "control/governor.py",

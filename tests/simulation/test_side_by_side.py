@@ -31,7 +31,9 @@ def check(flights):
     return alone
 
 
-@pytest.mark.parametrize("scenario", ["case1", "case2", "case1_smooth", "case1_integral_heavy", "case1_governed"])
+@pytest.mark.parametrize(
+    "scenario", ["case1", "case2", "case1_smooth", "case1_integral_heavy", "case1_governed", "case1_active"]
+)
 def test_corners_of_a_scenario_are_the_same_in_every_lane(scenario):
     names = ("mass", "moment_of_inertia", "lift_alpha", "moment_elevator", "natural_frequency_1")
     random = np.random.default_rng(3)

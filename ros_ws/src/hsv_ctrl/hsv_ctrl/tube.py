@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hsv_msgs.msg import Run
 
+from hsv.control.effectiveness import EffectivenessMode
 from hsv.control.tube_law import TubeResult, TubeStatusCode
 from hsv.errors import ParameterError
 from hsv.graph.description import NodeDescription
@@ -26,11 +27,13 @@ class TubeNode(BlockNode):
                 f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
             )
         self._outside = False
+        self._mode = EffectivenessMode.HEALTHY
 
     def start_run(self, run: Run) -> None:
         """Begin inside the tube."""
         super().start_run(run)
         self._outside = False
+        self._mode = EffectivenessMode.HEALTHY
 
     def stepped(self, signals: Signals) -> None:
         """Tell of the tube; leaving it is a warning."""
@@ -39,16 +42,28 @@ class TubeNode(BlockNode):
         outside = result.status is TubeStatusCode.OUTSIDE
         left, self._outside = outside and not self._outside, outside
         stamp = signals.header.stamp
+        time = stamp.sec + 1e-9 * stamp.nanosec
         if left:
-            time = stamp.sec + 1e-9 * stamp.nanosec
             self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
-        if left or self.diagnosis_due(stamp):
+        found, changed, known = result.effectiveness, False, {}
+        if found:
+            changed, self._mode = found.mode is not self._mode, found.mode
+            known = {
+                "effectiveness": found.estimate,
+                "effectiveness_low": found.low,
+                "effectiveness_high": found.high,
+                "elevator": found.mode.name,
+            }
+        if found and changed:
+            self.get_logger().warning(f"elevator {found}")
+        if left or changed or self.diagnosis_due(stamp):
             self.diagnose(
                 stamp,
-                result.status.name,
-                warning=left,
+                f"elevator {found}" if changed else result.status.name,
+                warning=left or changed,
                 step=signals.step,
                 saturated=bool(result.saturated.any()),
                 level=result.level,
                 component=result.component,
+                **known,
             )

@@ -8,6 +8,8 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
 from hsv.control.coverage import uncovered_hardware
+from hsv.control.effectiveness import WATCHED_PARAMETERS
+from hsv.control.effectiveness_parameters import EFFECTIVENESS_ENABLED
 from hsv.control.tube_factor import TAU
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.certificate import CERTIFICATE_PARAMETERS
@@ -17,6 +19,7 @@ from hsv.graph.description import TUBE_MPC
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node
+from hsv_node.parameters import declare, declare_vehicle
 
 
 class TubeMpcNode(TubeNode):
@@ -27,6 +30,10 @@ class TubeMpcNode(TubeNode):
         values, design = declare_design(self, (*TUBE_PARAMETERS, *CERTIFICATE_PARAMETERS))
         if design is None:
             raise DesignError("parameter design.name = 'none': expected a design with a tube")
+        if values[EFFECTIVENESS_ENABLED.name]:
+            # Of what only the estimator needs, a node without one has none.
+            declare_vehicle(self)
+            values |= declare(self, WATCHED_PARAMETERS)
         if warning := preflight(design, values["design.certificate"]):
             self.get_logger().warning(warning)
         certified, flown = design.coupling, values["vehicle.coupling"]

@@ -85,6 +85,8 @@ class CFlight:
         law, nominal = components.controller, components.nominal_trajectory
         if not (isinstance(law, TubeLaw) and isinstance(nominal.law, FamilyLaw)):
             raise RunError("C build: it flies the tube law over the nested family, expected a scenario with these")
+        if law.kernel.effectiveness is not None:
+            raise RunError("C build: effectiveness.enabled = true, expected false: the C code has no estimator of it")
         sections = components.notch_filter.sections
         if law.design.filtered and not sections:
             raise RunError("C build: nominal.filtered without a notch filter in the loop, expected one")

@@ -92,6 +92,8 @@ def uncovered_vehicle(values: Mapping[str, Any], design: ControlDesign) -> list[
         found.append("notch: not that of the design, which the invariant set has in the loop")
     if values.get("integral.rate", 0.0) > 0.0:
         found.append("integral: action on states that the invariant set does not have")
+    if values.get("effectiveness.enabled", False):
+        found.append("effectiveness: an estimate by which the elevator command is divided; the certificate has none")
     return found
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step
+from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step, watch_of
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_RIGID
@@ -44,7 +44,7 @@ class RobustMpc(Controller):
         self.kernel = TubeData(
             gains[gain_index][None], np.zeros(1, np.int64), *limits, False, False, no_notch, 0.0, design.period
         )
-        self._memory = memory_of(self.kernel)
+        self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
         x, u = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
         self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.empty(0)))  # compile now: a cold cache must not stall
 
@@ -66,7 +66,7 @@ class RobustMpc(Controller):
         The nominal trajectory is not used, there is no set, and the error is the deviation from the reference.
         """
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        tube_step(self.kernel, self._memory, inputs.step, False, *inputs[1:], u_feedback, total, u)
+        tube_step(self.kernel, self._memory, self._watch, inputs.step, False, *inputs[1:], u_feedback, total, u)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,

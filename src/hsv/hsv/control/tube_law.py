@@ -2,7 +2,8 @@
 
 The pitch rate in x is the filtered one; that of x_r + x_n is too where the design says so (eq. 48). Integral action on
 the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the offset that a
-wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know.
+wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know. Another one, off by
+default as well, divides the elevator command by its estimated effectiveness (:mod:`hsv.control.effectiveness`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,17 @@ from numba import njit
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
+from hsv.control.effectiveness import (
+    WATCHED_PARAMETERS,
+    Effectiveness,
+    EffectivenessData,
+    effectiveness_data,
+    effectiveness_hold,
+    effectiveness_in,
+    effectiveness_shape,
+    effectiveness_step,
+)
+from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
     NotchData,
@@ -50,6 +62,7 @@ TUBE_PARAMETERS = (
     replace(TAU, read_only=False),
     *TAU_CHANGE_PARAMETERS,
     Parameter("integral.rate", 0.0, "k of the integral gain k F(:, [h V]); 0: no integral action", "1/s", 0.0, 1.0),
+    *EFFECTIVENESS_PARAMETERS,
     COUPLING_PARAMETER,
     Parameter("vehicle.digest", "", "digest of the vehicle flown; empty: the default one"),
     *FLOWN_NOTCH_PARAMETERS,
@@ -60,13 +73,17 @@ TUBE_PARAMETERS = (
 _N_INTEGRATED = 2
 """Altitude and velocity, the first two states."""
 
+_ELEVATOR = 1
+"""The elevator among the inputs."""
+
 
 class TubeData(NamedTuple):
     """The law for compiled functions.
 
     ``gains`` F diag(tau) (c, 2, 9), each from its step in ``starts`` (c) on, the first from the beginning; input limits
     (2); whether the error is one from the plan ``x_r + x_n``, or from x_r alone; whether the plan's pitch rate is
-    ``filtered``, by which ``notch``; rate (1/s) and ``period`` (s) of the integral action.
+    ``filtered``, by which ``notch``; rate (1/s) and ``period`` (s) of the integral action; the estimator of the
+    elevator's effectiveness, where there is one.
     """
 
     gains: np.ndarray
@@ -78,6 +95,7 @@ class TubeData(NamedTuple):
     notch: NotchData
     integral_rate: float
     period: float
+    effectiveness: EffectivenessData | None = None
 
 
 def no_tube(vehicle: VehicleParameters) -> TubeData:
@@ -100,6 +118,11 @@ def memory_of(data: TubeData) -> np.ndarray:
     return np.zeros(2 * len(data.notch.D) + _N_INTEGRATED + N_STATES)
 
 
+def watch_of(data: TubeData) -> np.ndarray:
+    """Return the room (r, 9) of the estimator in :func:`tube_step`, no rows where there is none."""
+    return np.zeros(effectiveness_shape(data.effectiveness))
+
+
 @njit(cache=True)
 def active_gain(data: Any, step: int) -> int:
     """Return the index of the gain that holds in ``step``."""
@@ -114,6 +137,7 @@ def active_gain(data: Any, step: int) -> int:
 def tube_step(
     data: Any,
     memory: Any,
+    watch: Any,
     step: int,
     monitored: bool,
     x: Any,
@@ -132,7 +156,8 @@ def tube_step(
     The filter of the plan's pitch rate q'_n (eq. 48) starts from the state ``s`` of the one in the loop, which is exact
     where x = x_r + x_n; it is stepped where the law needs it or is ``monitored``, and where there is one in the loop.
     The integral stands still in every step in which an input is limited. Where the sum is not finite (a measurement
-    that is not a number) the input is the reference's: an actuator gets a number whatever happens.
+    that is not a number) the input is the reference's: an actuator gets a number whatever happens. Sum and limited
+    input are what is commanded: where the elevator's effectiveness is estimated, what is to arrive divided by that.
     """
     active = active_gain(data, step)
     size = 2 * len(data.notch.D)
@@ -150,6 +175,7 @@ def tube_step(
     for j in range(len(x)):
         memory[errors + j] = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
     memory[errors + PITCH_RATE] = pitch_rate_error
+    effectiveness = effectiveness_step(data.effectiveness, watch, step, x)
     limited = False
     for i in range(len(u)):
         feedback, integral = 0.0, 0.0
@@ -160,11 +186,13 @@ def tube_step(
             for j in range(_N_INTEGRATED):
                 integral += data.integral_rate * data.gains[active, i, j] * memory[size + j]
             u_plan += integral
-        u_total[i] = feedback + u_plan + u_r[i]
+        arriving = feedback + u_plan + u_r[i]
+        u_total[i] = arriving / effectiveness if i == _ELEVATOR else arriving
         u_feedback[i] = feedback + integral
         wanted = choose(math.isfinite(u_total[i]), u_total[i], u_r[i])
         u[i] = min(max(wanted, data.minimum[i]), data.maximum[i])
         limited = limited | (u[i] != u_total[i])
+    effectiveness_hold(data.effectiveness, watch, u)
     if data.integral_rate > 0.0:
         for j in range(_N_INTEGRATED):
             more = memory[size + j] + data.period * (x[j] - x_r[j] - x_n[j])
@@ -179,7 +207,7 @@ class TubeResult(ControllerResult):
     ``error`` (n) of the rigid states and, with the filter in the loop, of its states; ``tube_centre`` and
     ``tube_half_width`` (n) are empty, ``level`` is not a number and ``inside`` false where there is no set;
     ``component`` names the largest component of e - c for its half-width, outside the set; ``tau`` holds one factor, or
-    that of each rigid state (5).
+    that of each rigid state (5); ``effectiveness`` is None where it is not estimated.
     """
 
     error: np.ndarray
@@ -192,12 +220,13 @@ class TubeResult(ControllerResult):
     u_nominal: np.ndarray
     tau: np.ndarray
     status: TubeStatusCode
+    effectiveness: Effectiveness | None = None
 
 
 class TubeLaw(Controller):
     """The controller's last stage."""
 
-    PARAMETERS = TUBE_PARAMETERS
+    PARAMETERS = (*TUBE_PARAMETERS, *(p for p in WATCHED_PARAMETERS if p is not COUPLING_PARAMETER))
     compiled_with_loop = True
     kernel: TubeData
     design: ControlDesign
@@ -213,13 +242,14 @@ class TubeLaw(Controller):
         integral_rate: float = 0.0,
         vehicle: str | None = None,
         hardware_covered: bool = True,
+        effectiveness: EffectivenessData | None = None,
     ) -> None:
         """Fly ``design`` on a ``vehicle``, by its digest, with this set of inertial coupling.
 
         ``None``: those that it is certified for. ``hardware_covered``: whether it is for the hardware flown, too. The
         tube's set is one of the error with the design's notch filter: with another ``notch`` there is none. ``changes``
         of tau: first step and factors (5), in order.
-        ``integral_rate``: k (1/s) of K_i = k F(:, [h V]).
+        ``integral_rate``: k (1/s) of K_i = k F(:, [h V]). ``effectiveness``: the estimator of that of the elevator.
         """
         self.design = design
         self._certified = coupling in (None, design.coupling) and vehicle in (None, design.vehicle)
@@ -228,9 +258,10 @@ class TubeLaw(Controller):
         self._tube = design.tube if flown == design.notch else None
         self._notch = discretise(flown, design.period)
         self._integral_rate = integral_rate
+        self._effectiveness = effectiveness
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
-        self._memory = memory_of(self.kernel)
+        self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
         self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown))))
@@ -247,7 +278,9 @@ class TubeLaw(Controller):
         changes = scheduled_changes(values, design.tau_minimum, design.period)
         vehicle = v["vehicle.digest"]
         covered = not uncovered_hardware(values, design)
-        return cls(design, v["vehicle.coupling"], flown_sections(values), changes, v["integral.rate"], vehicle, covered)
+        watch = effectiveness_data(values, design.period)
+        sections, rate = flown_sections(values), v["integral.rate"]
+        return cls(design, v["vehicle.coupling"], sections, changes, rate, vehicle, covered, watch)
 
     @property
     def gain(self) -> np.ndarray:
@@ -284,6 +317,7 @@ class TubeLaw(Controller):
             self._notch,
             self._integral_rate,
             design.period,
+            self._effectiveness,
         )
 
     def step(self, inputs: ControllerInput) -> TubeResult:
@@ -293,7 +327,7 @@ class TubeLaw(Controller):
         in_loop = 0 < size == 2 * len(self._notch.D)
         planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        active = tube_step(self.kernel, memory, k, True, *inputs[1:], u_feedback, total, u)
+        active = tube_step(self.kernel, memory, self._watch, k, True, *inputs[1:], u_feedback, total, u)
         self._next = k + 1
         error, tube = (x - reference - deviation)[:N_RIGID], None
         if in_loop:
@@ -324,4 +358,5 @@ class TubeLaw(Controller):
             u_nominal=inputs.nominal_input,
             tau=compact(self.factors[active][1]),
             status=status,
+            effectiveness=effectiveness_in(self._watch) if self._effectiveness else None,
         )

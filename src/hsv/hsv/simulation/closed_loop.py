@@ -20,7 +20,7 @@ from hsv.control.nominal_law import NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
 from hsv.control.notch_filter import NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.control.tube_law import memory_of, no_tube, tube_step
+from hsv.control.tube_law import memory_of, no_tube, tube_step, watch_of
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
 from hsv.faults.laws import START, FaultRows, apply_command_faults, fault_memory
@@ -65,7 +65,7 @@ class Components:
 
 
 class LoopArrays(NamedTuple):
-    """The signals of a step between nominal trajectory and actuators, and the memory of the tube law, in place.
+    """The signals of a step between nominal trajectory and actuators, and the memories of the tube law, in place.
 
     What a controller is given is one array.
     """
@@ -82,6 +82,7 @@ class LoopArrays(NamedTuple):
     """(1) what the function of a compiled controller returned"""
     gain_index: np.ndarray
     memory: np.ndarray
+    watch: np.ndarray
 
 
 class Workspace(NamedTuple):
@@ -127,13 +128,15 @@ class CommandFaults(NamedTuple):
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def _loop_arrays(filter_states: int, memory: np.ndarray) -> tuple[np.ndarray, list[slice], LoopArrays]:
+def _loop_arrays(
+    filter_states: int, memory: np.ndarray, watch: np.ndarray
+) -> tuple[np.ndarray, list[slice], LoopArrays]:
     """Return what a controller is given, where each signal lies in it, and the arrays of which they are views."""
     ends = [*accumulate(filter_states if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)]
     given = np.zeros(ends[-1])
     cuts = [slice(*cut) for cut in pairwise((0, *ends))]
     views = [given[cut] for cut in cuts]
-    return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), np.zeros(1), memory))
+    return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), np.zeros(1), memory, watch))
 
 
 @njit(cache=True, nogil=True)
@@ -170,7 +173,7 @@ def fly_loop(
         first_fault: Step before which the command arrives as it is: what a call takes is a twentieth of the loop's
             time.
     """
-    estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory = arrays
+    estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory, watch = arrays
     n, m = len(x), len(u_n)
     measurement, filter_state, defect = room(work.measurement, n), room(work.filter_state, len(s)), room(work.defect, n)
     weights, S = room(work.weights, len(nominal.polytope.S)), room(work.schedule, n * (n + m))
@@ -256,7 +259,7 @@ def fly_loop(
                     total[i] = wanted[i]
                     u[i] = min(max(total[i], tube.minimum[i]), tube.maximum[i])
         if not called:
-            tube_step(tube, memory, k, False, estimate, q_f[0], x_r, u_r, x_n, u_n, s, u_feedback, total, u)
+            tube_step(tube, memory, watch, k, False, estimate, q_f[0], x_r, u_r, x_n, u_n, s, u_feedback, total, u)
         for i in range(m):
             beside[k, U_UNSATURATED + i] = total[i]
         for i in range(m):
@@ -403,7 +406,7 @@ def fly_into(history: History, components: Components) -> int:
     notch, injector = components.notch_filter, components.fault_injector
     faults = CommandFaults.of(components)
     tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
-    given, cuts, arrays = _loop_arrays(2 * len(notch.data.D), memory_of(tube))
+    given, cuts, arrays = _loop_arrays(2 * len(notch.data.D), memory_of(tube), watch_of(tube))
     nominal_call = controller_call = NO_CALL
     callbacks = []
     if not nominal.law.compiled_with_loop:

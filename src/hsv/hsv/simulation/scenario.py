@@ -14,6 +14,7 @@ import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
 from hsv.control.controllers import SHIPPED_CONTROLLERS
+from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
 from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
 from hsv.control.tube_factor import TAU, rigid_factors
@@ -74,7 +75,7 @@ class Scenario(Table):
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
     """Key of all that is random"""
     equipment: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors, links and estimator"""
+    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors, links and estimators"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
     limits: dict[str, float] = Field(default_factory=dict)
@@ -131,15 +132,20 @@ class Scenario(Table):
 PERIOD = 0.02
 """Control period, s, until a design defines it; whether equipment is consistent does not depend on it."""
 
-_EQUIPMENT_PARAMETERS = (*EQUIPMENT_PARAMETERS, *COMMAND_LINK_PARAMETERS, *ESTIMATOR_PARAMETERS)
+_EQUIPMENT_PARAMETERS = (
+    *EQUIPMENT_PARAMETERS,
+    *COMMAND_LINK_PARAMETERS,
+    *ESTIMATOR_PARAMETERS,
+    *EFFECTIVENESS_PARAMETERS,
+)
 
 EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
-"""Tables of what is ideal unless they say otherwise, and of the estimator for sensors that are not."""
+"""Tables of what is ideal unless they say otherwise, and of the estimators, of the state and of the effectiveness."""
 
 _NO_KEYS = ("name", "own", "equipment")
 """Fields that a file has not, or has otherwise."""
 
-_OF_A_CONTROLLER = ("tube", "integral", "robust_mpc")
+_OF_A_CONTROLLER = ("tube", "integral", "effectiveness", "robust_mpc")
 """Tables of the bench's own controllers."""
 
 REPLACED = ("limits",)
@@ -390,6 +396,8 @@ def _check(scenario: Scenario) -> None:
     for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc"), ("tube", "tube_mpc")):
         if table in scenario.model_fields_set and scenario.controller != controller:
             raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
+    if scenario.controller != "tube_mpc" and any(name.startswith("effectiveness.") for name in scenario.equipment):
+        raise ScenarioError(f"effectiveness: {scenario.controller} does not read it, expected controller tube_mpc")
     if "nominal" in scenario.model_fields_set and scenario.controller == "robust_mpc":
         raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
     for index, change in enumerate(scenario.tube.change):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from hsv.control.controller import CONTROLLER_INPUTS
-from hsv.control.tube_law import TubeData, memory_of
+from hsv.control.tube_law import TubeData, memory_of, watch_of
 from hsv.lanes import WIDTH, LaneArray, LaneRecord
 from hsv.signals import VARYING
 from hsv.simulation.closed_loop import (
@@ -67,7 +67,8 @@ class FlightGroup:
         zeros: Any = LaneArray.zeros
         vehicle: Any = LaneRecord([plant.vehicle for plant in plants])
         sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
-        arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), zeros(len(memory_of(first.controller.kernel))))
+        memories = (zeros(len(memory_of(tube))), zeros(*watch_of(tube).shape))
+        arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
         flown, beside, _ = self._history
         lanes_flown = LaneArray(flown, split=True)
         fly_loop(
