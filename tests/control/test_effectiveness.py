@@ -1,0 +1,208 @@
+"""The estimator of the elevator's effectiveness: what its intervals hold, and what it makes of faults."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from flights import components, step_by_step
+
+from hsv.control.effectiveness import (
+    EffectivenessMode,
+    effectiveness_bounds,
+    effectiveness_data,
+    effectiveness_hold,
+    effectiveness_in,
+    effectiveness_shape,
+    effectiveness_step,
+)
+from hsv.design.region import Corner
+from hsv.errors import ParameterError, ScenarioError
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.scenario import load_scenario
+from hsv.simulation.side_by_side import fly_perturbed
+from hsv.vehicle.plant import FlightStatus
+from hsv.vehicle.vehicle import load_vehicle
+
+FAULT = 5000
+"""Step of the fault of Case 1."""
+
+
+def active(effectiveness=0.9, **fault):
+    changes = {f"fault[0].{name}": value for name, value in fault.items()}
+    return assemble_flight(load_scenario("case1_active", {"fault[0].effectiveness": effectiveness, **changes}))
+
+
+def known_along(parts, flight):
+    """Return what the estimator of ``parts`` knows after each step of a ``flight``."""
+    data = parts.controller.kernel.effectiveness
+    memory = np.zeros(effectiveness_shape(data))
+    known = []
+    for step, (x, u) in enumerate(zip(flight.history.estimate, flight.history.command, strict=True)):
+        effectiveness_step(data, memory, step, x)
+        effectiveness_hold(data, memory, u)
+        known.append(effectiveness_in(memory))
+    return known
+
+
+def corners() -> list[Corner]:
+    bounds = load_vehicle().uncertainty
+    signs = product((-1.0, 1.0), repeat=len(bounds))
+    return [dict(zip(bounds, np.multiply(s, list(bounds.values())), strict=True)) for s in signs]
+
+
+def test_true_effectiveness_is_in_the_interval_where_the_disturbance_keeps_its_bound():
+    data = active().controller.kernel.effectiveness
+    random = np.random.default_rng(1)
+    for _ in range(2000):
+        effect, e = random.uniform(-0.02, -0.001, 2)
+        true, g = random.uniform(0.3, 1.0), random.uniform(-data.effect, data.effect)
+        i, d, turn = random.uniform(-data.inertia, data.inertia), random.uniform(-1e-3, 1e-3), random.normal(0.0, 5e-3)
+        v = random.uniform(-data.bound, data.bound) * abs(e)
+        # (1 + i) D + b = P (1 + g) e + d + v and y = D + b; d is known with g = 0 from the healthy steps.
+        y = true * (1.0 + g) * e + d + v - i * turn
+        low, high, _, _ = effectiveness_bounds(data, y, e, turn, d + g * effect, effect)
+        assert low <= true <= high
+
+
+def test_offset_is_in_its_interval():
+    data = active().controller.kernel.effectiveness
+    random = np.random.default_rng(2)
+    for _ in range(2000):
+        effect, e = random.uniform(-0.02, -0.001, 2)
+        g, offset = random.uniform(-data.effect, data.effect), random.uniform(-0.01, 0.01)
+        v, turn = random.uniform(-data.bound, data.bound) * abs(e), random.normal(0.0, 5e-3)
+        y = (1.0 + g) * e + offset + v - random.uniform(-data.inertia, data.inertia) * turn
+        _, _, low, high = effectiveness_bounds(data, y, e, turn, g * effect, effect)
+        assert low <= offset <= high
+
+
+@pytest.mark.parametrize("effectiveness", [0.9, 0.7, 0.5, 0.47])
+def test_loss_is_found_in_two_steps_and_exactly(effectiveness):
+    parts = active(effectiveness)
+    flight = fly(parts)
+    known = known_along(parts, flight)
+    assert all(k.mode is EffectivenessMode.HEALTHY and k.estimate == 1.0 for k in known[: FAULT + 1])
+    assert known[FAULT + 1].mode is EffectivenessMode.PENDING
+    assert all(k.mode is EffectivenessMode.LOSS for k in known[FAULT + 2 :])
+    assert all(k.low <= effectiveness <= k.high for k in known[FAULT + 2 :])
+    assert known[FAULT + 2].estimate == pytest.approx(effectiveness, abs=2e-3)
+    assert known[-1].estimate == pytest.approx(effectiveness, abs=1e-3)
+
+
+def test_half_an_elevator_is_survived_by_the_active_law_alone():
+    passive = assemble_flight(load_scenario("case1", {"fault[0].effectiveness": 0.5}))
+    assert fly(passive).status is FlightStatus.DIVERGED
+    flight = fly(assemble_flight(load_scenario("case1_active_deep")))
+    assert flight.status is FlightStatus.FINISHED
+    assert abs(flight.metrics["altitude_end_error"]) < 0.01
+    assert flight.metrics["saturated_steps"] == 0
+
+
+def test_law_divides_by_the_estimate_and_reports_what_is_commanded():
+    flight = step_by_step(components("case1_active_deep", duration=101.0))
+    after = flight["u_unsaturated"][-1, 1], flight["actuator"][-1, 1]
+    assert after[1] == pytest.approx(0.5 * after[0], rel=1e-12)
+    assert np.array_equal(flight["saturated"], flight["u_unsaturated"] != flight["command"])
+
+
+def test_in_process_and_step_by_step_are_the_same_bits():
+    parts = components("case1_active_deep", duration=103.0)
+    stepwise, compiled = step_by_step(parts), fly(parts).history.columns()
+    for name in ("state", "command", "u_unsaturated", "actuator"):
+        assert np.array_equal(stepwise[name], compiled[name]), name
+
+
+def test_without_a_fault_not_a_bit_is_different():
+    passive, watched = (
+        assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
+    )
+    screened = [{}, *corners()[::64]]
+    flights = [fly_perturbed(parts, screened, lambda _, flight: flight.fingerprint) for parts in (passive, watched)]
+    assert flights[0] == flights[1]
+
+
+@pytest.mark.long
+def test_no_false_alarm_at_any_corner():
+    """A flight in which the estimator never took the elevator for faulty has the bits of the passive one."""
+    passive, watched = (
+        assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
+    )
+    every = [{}, *corners()]
+    assert len(every) == 1025
+    flights = [fly_perturbed(parts, every, lambda _, flight: flight.fingerprint) for parts in (passive, watched)]
+    assert flights[0] == flights[1]
+
+
+@pytest.mark.long
+def test_half_an_elevator_is_survived_at_every_corner():
+    parts = active(0.5)
+    ended = fly_perturbed(parts, [{}, *corners()], lambda _, flight: flight.status)
+    assert set(ended) == {FlightStatus.FINISHED}
+
+
+def test_recovery_of_the_elevator_is_followed():
+    parts = active(0.6, stop="120 s")
+    flight = fly(parts)
+    known = known_along(parts, flight)
+    assert flight.status is FlightStatus.FINISHED
+    assert known[-1].mode is EffectivenessMode.HEALTHY and known[-1].estimate == 1.0
+
+
+def test_an_offset_is_not_taken_for_a_loss():
+    bias = {"fault.types": ["bias"], "fault.parameters": [f"offset={float(np.deg2rad(-5.0))!r}"]}
+    parts = components("case1_active", **bias)
+    flight = fly(parts)
+    known = known_along(parts, flight)
+    assert flight.status is FlightStatus.FINISHED
+    assert known[-1].mode is EffectivenessMode.OTHER and known[-1].estimate == 1.0
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_step_that_is_no_number_changes_nothing(value):
+    parts = active()
+    data = parts.controller.kernel.effectiveness
+    memory = np.zeros(effectiveness_shape(data))
+    x, u = data.start.copy(), np.array([0.27, 0.21])
+    for step in range(5):
+        effectiveness_step(data, memory, step, x)
+        effectiveness_hold(data, memory, u)
+    before = effectiveness_in(memory)
+    bad = np.full(9, value)
+    assert effectiveness_step(data, memory, 5, bad) == before.estimate
+    effectiveness_hold(data, memory, u)
+    assert effectiveness_step(data, memory, 6, x) == before.estimate
+    assert np.isfinite(memory[7]).all()
+
+
+def test_an_elevator_that_has_no_effect_is_not_divided_by():
+    data = active().controller.kernel.effectiveness
+    memory = np.zeros(effectiveness_shape(data))
+    for step in range(4):
+        assert effectiveness_step(data, memory, step, data.start) == 1.0
+        effectiveness_hold(data, memory, np.array([0.27, 0.0]))
+    assert np.isfinite(memory[7]).all()
+
+
+@pytest.mark.parametrize("effectiveness", np.linspace(0.0, 1.0, 6))
+def test_estimate_keeps_its_range(effectiveness):
+    parts = active(float(effectiveness))
+    known = known_along(parts, fly(parts))
+    least = parts.controller.kernel.effectiveness.least
+    assert all(least <= k.estimate <= 1.0 for k in known)
+
+
+def test_off_there_is_no_estimator():
+    assert effectiveness_data({}, 0.02) is None
+    assert components("case1").controller.kernel.effectiveness is None
+
+
+@pytest.mark.parametrize(("name", "value"), [("least", 0.0), ("bound", 0.0), ("steps", 1.5), ("time", 0.0)])
+def test_a_wrong_parameter_is_named(name, value):
+    with pytest.raises(ParameterError, match=f"effectiveness.{name}"):
+        components("case1_active", **{f"effectiveness.{name}": value})
+
+
+def test_a_scenario_whose_controller_does_not_estimate_is_refused():
+    with pytest.raises(ScenarioError, match="effectiveness: robust_mpc does not read it"):
+        load_scenario("case1_rmpc", {"effectiveness.enabled": True})
