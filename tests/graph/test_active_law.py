@@ -18,12 +18,12 @@ pytestmark = pytest.mark.graph
 SHORT = """
 extends = "case1_active_deep"
 title = "short"
-duration = "6 s"
+duration = "12 s"
 [[fault]]
 channel = "elevator_deflection"
 type = "loss_of_effectiveness"
 effectiveness = 0.5
-start = "3 s"
+start = "6 s"
 """
 
 
