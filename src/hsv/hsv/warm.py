@@ -11,7 +11,7 @@ from hsv.simulation.side_by_side import FlightGroup
 
 def warm() -> None:
     """Step every component and fly every compiled loop once."""
-    for name in ("case1", "case1_realistic", "case1_hard_sensors"):
+    for name in ("case1", "case1_active", "case1_realistic", "case1_hard_sensors"):
         components = assemble(flight_parameters(load_scenario(name)) | {"duration": 0.1})
         fly(components)
         for _ in steps(components):
