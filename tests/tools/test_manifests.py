@@ -20,7 +20,19 @@ KEYS = {name: f"python3-{name}" for name in ("jinja2", "matplotlib", "numba", "n
 KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 """By imported module: its key in rosdep."""
 
-WITHOUT_KEY = {"cvxpy", "dask", "distributed", "foxglove", "lz4", "markupsafe", "mcap", "pint", "piqp", "pyarrow"}
+WITHOUT_KEY = {
+    "clarabel",
+    "cvxpy",
+    "dask",
+    "distributed",
+    "foxglove",
+    "lz4",
+    "markupsafe",
+    "mcap",
+    "pint",
+    "piqp",
+    "pyarrow",
+}
 WITHOUT_KEY |= {"llvmlite", "rosbags", "tomli_w", "websockets", "zstandard"}
 """Modules for which rosdep has no key of a Debian package that will do; docs/installation.md names them."""
 
