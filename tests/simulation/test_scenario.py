@@ -141,7 +141,7 @@ def test_an_empty_file_lacks_its_first_field():
 @pytest.mark.parametrize(
     ("name", "problem"),
     [
-        ("case9", "expected a path or one of case1, case1_derived"),
+        ("case9", "expected a path or one of case1, case1_active"),
         ("./absent.toml", "cannot be read (No such file or directory), expected a TOML file"),
         ("/", "cannot be read (Is a directory), expected a TOML file"),
     ],
