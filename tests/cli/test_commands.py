@@ -27,6 +27,23 @@ def test_help_of_every_command_has_an_example(hsv, command):
     assert f"Example: hsv {command}" in ran.out
 
 
+@pytest.mark.parametrize(
+    ("words", "prose"),
+    [
+        (("certify",), "A new invariant set is computed, and the nominal trajectory must fit"),
+        (("montecarlo", "fly"), "The exit code is 1 if every flight crashed."),
+    ],
+)
+def test_the_prose_of_a_help_text_is_folded_by_the_terminal_alone(words, prose):
+    ran = subprocess.run(
+        [sys.executable, "-m", "hsv.cli.main", *words, "-h"],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"COLUMNS": "300"},
+    )
+    assert prose in ran.stdout
+
+
 @pytest.mark.parametrize("command", sorted({*COMMANDS} - PRINT_NO_NUMBERS))
 def test_every_command_that_prints_numbers_prints_json_if_asked(hsv, command):
     assert "--json" in hsv(command, "--help").out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import sys
 from contextlib import suppress
@@ -132,6 +133,11 @@ for function in (
     app.command()(function)
 app.add_typer(montecarlo, name="montecarlo")
 app.add_typer(fault, name="fault")
+for group in (app, montecarlo, fault):
+    for registered in group.registered_commands:
+        # Folded to the terminal only: typer keeps the line breaks of the source in all paragraphs but the first.
+        paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
+        registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 
 def main() -> None:
