@@ -36,7 +36,18 @@ def test_a_wrong_value_names_its_file(hsv, wrong, words):
 def test_a_missing_design_is_named_not_its_certificate(hsv):
     ran = hsv("verify", "nope.yaml")
     assert ran.code == 2
-    assert ran.error == "design 'nope.yaml': cannot be read (No such file or directory), expected a parameter file"
+    assert ran.error.startswith("design = 'nope.yaml': no such file, expected the path of a .yaml file, a name in ")
+
+
+def test_a_file_that_is_no_yaml_is_refused_with_what_was_expected(hsv, tmp_path):
+    (tmp_path / "inputs.yaml").write_text("name: a: b\n")
+    ran = hsv("certify", "inputs.yaml")
+    assert ran.code == 2
+    assert ran.error.startswith("design 'inputs.yaml': ") and ran.error.endswith(", expected ROS 2 parameters in YAML")
+
+
+def test_a_shipped_design_is_certified_by_its_name(hsv):
+    assert hsv("certify", "baseline").out == hsv("certify", str(find_design("baseline"))).out
 
 
 def test_a_missing_certificate_is_named(hsv, tmp_path):

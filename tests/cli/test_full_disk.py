@@ -37,7 +37,7 @@ def test_output_that_finds_no_space_is_one_line(words, buffered):
 def test_an_error_stays_that_error_if_nothing_can_be_printed():
     with FULL.open("w") as full:
         code, error = command("verify", "nope.yaml", out=full)
-    assert code == 2 and error.startswith("hsv: error: design 'nope.yaml'") and error.count("\n") == 1
+    assert code == 2 and error.startswith("hsv: error: design = 'nope.yaml'") and error.count("\n") == 1
 
 
 @pytest.mark.parametrize("words", [("trim",), ("trim", "--json")], ids=" ".join)

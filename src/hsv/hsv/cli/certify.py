@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -30,7 +29,12 @@ HALF_WIDTHS = {
 
 
 def certify(
-    file: Annotated[Path, typer.Argument(help="Parameter file of a design, with its certificate in the same folder.")],
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="Parameter file of a design, with its certificate in the same folder, or the name of a shipped design."
+        ),
+    ],
     sensors: Annotated[str, typer.Option(help="Published sensors by name, with their noise and bias.")] = "ideal",
     bias: Annotated[
         list[str],
@@ -68,13 +72,14 @@ def certify(
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
     from hsv.cli.progress import stages
+    from hsv.control.design_file import find_design
     from hsv.design.verification.declared import declared, declared_actuators, described
     from hsv.design.verification.verdict import certified_with
     from hsv.design.verification.verifier import load_subject
     from hsv.simulation.coverage import uncovered_of
     from hsv.simulation.scenario import load_scenario
 
-    subject = load_subject(file)
+    subject = load_subject(find_design(file))
     models, unbounded = described(
         subject, sensor_set=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density, reach=reach
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,7 +18,12 @@ if TYPE_CHECKING:
 
 
 def verify(
-    file: Annotated[Path, typer.Argument(help="Parameter file of a design, with its certificate in the same folder.")],
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="Parameter file of a design, with its certificate in the same folder, or the name of a shipped design."
+        ),
+    ],
     quick: Annotated[bool, typer.Option("--quick", help="Omit flights and random sequences.")] = False,
     scenario: Annotated[
         str, typer.Option(help="Fly this scenario instead, and check level, disturbances and nominal inputs.")
@@ -36,6 +40,7 @@ def verify(
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
     from hsv.cli.progress import stages
+    from hsv.control.design_file import find_design
     from hsv.design.verification.scenario import bounding_corners, scenario_checks
     from hsv.design.verification.verifier import load_subject
     from hsv.design.verification.verifier import verify as recompute
@@ -44,7 +49,7 @@ def verify(
 
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")
-    subject = load_subject(file)
+    subject = load_subject(find_design(file))
     with stages() as progress:
         checks = recompute(subject, quick or bool(scenario), progress)
         if scenario:

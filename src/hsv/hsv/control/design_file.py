@@ -71,7 +71,7 @@ def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
     try:
         tree = parse_yaml(text)
     except DocumentError as error:
-        raise DesignError(f"design {source!r}: {error}") from error
+        raise DesignError(f"design {source!r}: {error}, expected ROS 2 parameters in YAML") from error
     sections: dict[str, dict[str, Any]] = {}
     for section, branch in tree.items() if isinstance(tree, dict) else ():
         if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
