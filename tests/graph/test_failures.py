@@ -88,7 +88,7 @@ def test_interrupt_ends_all_and_closes_the_bag(processes: Processes, number: int
     run.send_signal(number)
     output = output_of(run)
     assert run.returncode == 130
-    assert "interrupted" in output
+    assert output.splitlines()[-1] == f"hsv: error: interrupted; the steps flown so far are in {bag}"
     assert Bag(bag).complete
     assert not any(Path(f"/proc/{pid}").exists() for pid in nodes.values()) and not list(temporary.iterdir())
 

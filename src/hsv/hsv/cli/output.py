@@ -37,7 +37,7 @@ errors = _Terminal(stderr=True, highlight=False, markup=False, emoji=False)
 
 
 class Interrupted(Exception):  # noqa: N818 - what the user did is no error
-    """Ctrl-C in a long computation; the message says how to continue."""
+    """Ctrl-C in a long computation or a flight; the message says where its results are, and how to continue."""
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from hsv.cli.options import (
     UnitsOption,
     live_port_of,
 )
-from hsv.cli.output import report_line
+from hsv.cli.output import Interrupted, report_line
 from hsv.units import UnitSystem
 
 
@@ -73,12 +73,17 @@ def run(
         if verbose or WARNING in text or (node == LIVE.label and text.startswith("live ")):
             report_line(node, text)
 
-    with flight_bar(loaded.name, prepared.steps, units) as shown:
+    try:
+        with flight_bar(loaded.name, prepared.steps, units) as shown:
 
-        def step(number: int) -> None:
-            clock.setdefault("start", time.monotonic())
-            clock["end"] = time.monotonic()
-            shown.step(number)
+            def step(number: int) -> None:
+                clock.setdefault("start", time.monotonic())
+                clock["end"] = time.monotonic()
+                shown.step(number)
 
-        fly_graph(prepared, namespace=namespace, on_step=step, on_line=line, on_snapshot=shown.snapshot)
+            fly_graph(prepared, namespace=namespace, on_step=step, on_line=line, on_snapshot=shown.snapshot)
+    except KeyboardInterrupt:
+        if not prepared.bag.is_dir():
+            raise
+        raise Interrupted(f"interrupted; the steps flown so far are in {prepared.bag}") from None
     conclude_flight(prepared.bag, report=report, units=units, json=json, wall_time=clock["end"] - clock["start"])
