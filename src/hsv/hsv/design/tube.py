@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,13 @@ from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, wid
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
 from hsv.design.sets.box import box
+from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.ellipsoid import ellipsoid
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.design.sets.modal import modal_box
 from hsv.design.sets.sampling import sample
+from hsv.design.sets.star_norm import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem
@@ -54,15 +57,33 @@ class Tube:
         return self.found.seen() if isinstance(self.found, EllipsoidSet) else None
 
 
-def invariant_set(problem: TubeProblem, inputs: InvariantSetInputs) -> InvariantSet:
+def invariant_set(
+    problem: TubeProblem, inputs: InvariantSetInputs, progress: Progress = lambda *_: None
+) -> InvariantSet:
     """Return the set by the method asked for.
 
     Raises:
         DesignError: The method finds none.
     """
-    if inputs.method == "ellipsoid":
-        return ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), inputs.contraction)
+    if inputs.method in ("ellipsoid", "star_norms"):
+        return ellipsoid_set(problem, inputs, progress)
     return {"zonotope": zonotope, "modal": modal_box, "box": box}[inputs.method](problem)
+
+
+def ellipsoid_set(
+    problem: TubeProblem, inputs: InvariantSetInputs, progress: Progress = lambda *_: None
+) -> EllipsoidSet:
+    """Return the ellipsoid, narrowed by star norms where the method is that.
+
+    Raises:
+        DesignError: There is none.
+    """
+    progress("invariant set", 0, 1)
+    found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), inputs.contraction)
+    progress("invariant set", 1, 1)
+    if inputs.method != "star_norms":
+        return found
+    return found.narrowed(star_norms(problem, found.centre, partial(progress, "star norms")))
 
 
 @dataclass(frozen=True)
@@ -100,10 +121,8 @@ def measured_set(design: ControlDesign, region: Region, inputs: DesignInputs, pr
         region, channel_model(design, vehicle), seen, lambda done: progress("disturbances", done, len(seen))
     )
     disturbance = measured.channels.structured(inputs.disturbance.inflation).scaled(inputs.disturbance.share)
-    progress("invariant set", 0, 1)
-    found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set)
+    found = invariant_set(tube_problem(design, vehicle, disturbance), inputs.invariant_set, progress)
     certified = found.certify()
-    progress("invariant set", 1, 1)
     lag = None
     if design.actuators:
         worst = measured.lag_feedback
@@ -222,6 +241,9 @@ def _set_report(found: InvariantSet) -> dict[str, Any]:
             "multipliers": found.multipliers.tolist(),
             "solver": found.solver.as_dict(),
         }
+        if found.star_norms:
+            report["star_norms"] = found.star_norms.as_dict()
+            report["counter_examples"] = counter_examples(found.problem).as_dict()
     return report
 
 

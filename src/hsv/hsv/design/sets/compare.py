@@ -1,9 +1,10 @@
-"""The four ways to an invariant set side by side, for one design and its disturbances."""
+"""The ways to an invariant set side by side, for one design and its disturbances, and what no way can be below."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,16 @@ from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import paper_system
 from hsv.design.inputs import InvariantSetInputs
 from hsv.design.sets.box import box
+from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.ellipsoid import ellipsoid
-from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
+from hsv.design.sets.ellipsoid_set import EllipsoidSet
+from hsv.design.sets.invariant_set import InvariantSet, TubeProblem, mean_size
 from hsv.design.sets.modal import modal_box
+from hsv.design.sets.star_norm import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import tighten
 from hsv.errors import DesignError
+from hsv.vehicle.dynamics import N_RIGID
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,7 @@ def compare_sets(
     inflation: float,
     inputs: InvariantSetInputs,
 ) -> list[Row]:
-    """Return a row for each way of computing the set.
+    """Return a row for each way of computing the set, and a last one for the counter-examples.
 
     Args:
         design: Gains and vertices.
@@ -65,12 +70,18 @@ def compare_sets(
     system = paper_system(polytope.A, polytope.B, design.feedback_gain)
     bounds = DisturbanceSet(inflation * np.array(delta["lower"]), inflation * np.array(delta["upper"]))
     scales = inputs.state_scale.array(), inputs.input_scale.array()
-    ways = {
+
+    @cache
+    def recentred() -> EllipsoidSet:
+        return ellipsoid(problem, *scales, inputs.contraction)
+
+    ways: dict[str, Callable[[], InvariantSet]] = {
         "box, nine states": lambda: box(TubeProblem(system, bounds)),
         "box": lambda: box(problem),
         "modal box": lambda: modal_box(problem),
         "zonotope": lambda: zonotope(problem),
-        "ellipsoid": lambda: ellipsoid(problem, *scales, inputs.contraction),
+        "ellipsoid": recentred,
+        "star norms": lambda: recentred().narrowed(star_norms(problem, recentred().centre)),
     }
     rows = []
     for name, way in ways.items():
@@ -81,7 +92,8 @@ def compare_sets(
             rows.append(Row(name, str(error)))
             continue
         rows.append(_row(name, found, design, scales[0]))
-    return rows
+    driven = counter_examples(problem).half_range
+    return [*rows, Row("counter-examples", "", driven[:N_RIGID], driven[N_RIGID:], mean_size(driven, scales[0]))]
 
 
 def _row(name: str, found: InvariantSet, design: ControlDesign, state_scale: np.ndarray) -> Row:

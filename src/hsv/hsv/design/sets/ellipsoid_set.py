@@ -11,7 +11,7 @@ Convex combinations of vertices follow, because the set is convex. For fixed lam
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,17 +19,23 @@ import numpy as np
 from hsv.control.tube_set import TubeSet
 from hsv.design.lmi import SolverReport, smallest_eigenvalues
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
+from hsv.design.sets.star_norms import StarNorms
 from hsv.errors import DesignError
+from hsv.vehicle.dynamics import N_RIGID
 
 
 @dataclass(frozen=True)
 class EllipsoidSet(InvariantSet):
-    """The set with what certifies it: ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1)."""
+    """The set with what certifies it: ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1).
+
+    With ``star_norms`` it is the intersection with their sums, and half-widths and feedback are the lesser ones.
+    """
 
     Q: np.ndarray
     contraction: float
     multipliers: np.ndarray
     solver: SolverReport
+    star_norms: StarNorms | None = None
 
     kind = "ellipsoid"
 
@@ -57,7 +63,18 @@ class EllipsoidSet(InvariantSet):
             raise DesignError(f"ellipsoid: inequality at vertex {worst} = {residuals[worst]:.3g}, expected above zero")
         if not origin <= 1.0:
             raise DesignError(f"ellipsoid: level of e = 0 is {origin:.6g}, expected at most 1: flights start there")
-        return {"lmi_smallest_eigenvalues": residuals.tolist(), "level_of_zero_error": origin}
+        evidence: dict[str, Any] = {"lmi_smallest_eigenvalues": residuals.tolist(), "level_of_zero_error": origin}
+        if self.star_norms:
+            evidence["star_norms"] = self.star_norms.certify(self.problem, self.centre)
+        return evidence
+
+    def narrowed(self, star_norms: StarNorms) -> EllipsoidSet:
+        """Return the intersection with the sums of ``star_norms``."""
+        bounds = star_norms.bounds(self.problem)
+        half_width = self.half_width.copy()
+        half_width[:N_RIGID] = np.minimum(half_width[:N_RIGID], bounds[:N_RIGID])
+        feedback = np.minimum(self.feedback, bounds[N_RIGID:])
+        return replace(self, half_width=half_width, feedback=feedback, star_norms=star_norms)
 
 
 def _inverse(Q: np.ndarray) -> np.ndarray:
@@ -81,7 +98,7 @@ def from_shape(
 
 def from_report(problem: TubeProblem, report: Mapping[str, Any]) -> EllipsoidSet:
     """Return the set that ``report``, the invariant set in a certificate, describes for ``problem``."""
-    return from_shape(
+    found = from_shape(
         problem,
         np.array(report["centre"]),
         np.array(report["Q"]),
@@ -89,6 +106,8 @@ def from_report(problem: TubeProblem, report: Mapping[str, Any]) -> EllipsoidSet
         np.array(report["multipliers"]),
         SolverReport(**report["solver"], time=0.0),
     )
+    stored = report.get("star_norms")
+    return found.narrowed(StarNorms.from_report(stored)) if stored else found
 
 
 def vertex_residuals(

@@ -66,4 +66,9 @@ class InvariantSet(ABC):
 
     def size(self, state_scale: np.ndarray) -> float:
         """Return the geometric mean of the half-widths of the rigid states over ``state_scale`` (5)."""
-        return float(np.exp(np.mean(np.log(self.half_width[: len(state_scale)] / state_scale))))
+        return mean_size(self.half_width, state_scale)
+
+
+def mean_size(half_width: np.ndarray, state_scale: np.ndarray) -> float:
+    """Return the geometric mean of the first half-widths over the ``state_scale`` (k) of their states."""
+    return float(np.exp(np.mean(np.log(half_width[: len(state_scale)] / state_scale))))

@@ -9,10 +9,12 @@ import numpy as np
 
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, Extremes
+from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_residuals
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.checks import Check, Subject, above, at_most, required, same, same_parameter
+from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.vehicle import Vehicle
 
 
@@ -57,6 +59,11 @@ def set_checks(subject: Subject) -> Iterable[Check]:
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield required(above("invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0))
     yield required(at_most("level of e = 0", float(found.level(np.zeros(len(found.Q)))), 1.0))
+    if found.star_norms:
+        least = found.star_norms.residuals(found.problem, found.centre).min()
+        yield required(above("invariance of the star norms, smallest eigenvalue", least, 0.0))
+        start = found.star_norms.level_at_start(found.problem, found.centre)
+        yield required(at_most("level of e = 0 in the star norms", start, 1.0))
     kept = stored["tightening"]
     bounds = tighten(found, design.input_minimum, design.input_maximum, lag_feedback(kept))
     yield same("tightened bounds, lower", kept["lower"], bounds.lower, "tightened bounds")
@@ -72,3 +79,15 @@ def set_checks(subject: Subject) -> Iterable[Check]:
             parameter = f"nominal.{name}"
             claimed = f"{parameter} from the tightened bounds and plans"
             yield same_parameter(subject, parameter, value, getattr(allowed, name), claimed)
+
+
+def counter_example_checks(subject: Subject) -> Iterable[Check]:
+    """Fly the sequences of disturbances that drive the error far: they show what the half-widths cannot be below."""
+    stored = subject.certificate["tube"]["invariant_set"]
+    if "counter_examples" not in stored:
+        return
+    found = certified_set(subject)
+    driven = counter_examples(found.problem).half_range
+    yield same("counter-examples", stored["counter_examples"]["half_range"], driven, "half-widths")
+    certified = np.concatenate((found.half_width[:N_RIGID], found.feedback))
+    yield required(at_most("counter-examples, largest share of a half-width", (driven / certified).max(), 1.0))

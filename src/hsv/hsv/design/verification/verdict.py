@@ -17,10 +17,10 @@ import numpy as np
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, widened
 from hsv.design.region import Region, incomplete_share, record
-from hsv.design.sets.ellipsoid import ellipsoid
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.tightening import left_by
+from hsv.design.tube import ellipsoid_set
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.design.verification.checks import Subject
 from hsv.design.verification.effects import N_SCHEDULING, Measured, Model, with_models
@@ -213,7 +213,7 @@ def _with_contractions(
 ) -> Verdict:
     inputs, plan = subject.inputs.invariant_set, subject.certificate["tube"]["tightening"]["plan"]
     try:
-        found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), contractions)
+        found = ellipsoid_set(problem, inputs.model_copy(update={"contraction": contractions}))
     except DesignError as failure:
         return Verdict(name, str(failure))
     scheduling = late & (np.arange(N_RIGID) < N_SCHEDULING)
@@ -232,4 +232,8 @@ def _with_contractions(
 def _start(found: EllipsoidSet, error: np.ndarray) -> float:
     """Return the largest level of the error with which a flight starts that is measured with an ``error`` (5)."""
     corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
-    return float(found.level(np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))).max())
+    errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
+    level = float(found.level(errors).max())
+    if found.star_norms is None:
+        return level
+    return max(level, *(found.star_norms.level_at_start(found.problem, found.centre, error) for error in errors))

@@ -10,11 +10,16 @@ from hsv.design.certificate import certificate_path, read_certificate
 from hsv.design.verification.adjustable import adjustable_checks
 from hsv.design.verification.checks import Check, Subject, gathered
 from hsv.design.verification.flights import flight_checks, sequence_checks
+from hsv.design.verification.invariant_set import counter_example_checks
 from hsv.design.verification.model import model_checks
 from hsv.design.verification.quick import QUICK, Part
 from hsv.progress import Progress
 
-RECOMPUTED: dict[str, Part] = {"polytopic model": model_checks, "adjustable design": adjustable_checks}
+RECOMPUTED: dict[str, Part] = {
+    "polytopic model": model_checks,
+    "adjustable design": adjustable_checks,
+    "counter-examples": counter_example_checks,
+}
 """Checks by section that need units, models and the vehicle; they take a second or two."""
 
 FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence_checks}

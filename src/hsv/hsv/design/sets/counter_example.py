@@ -1,0 +1,67 @@
+"""What no certificate can be below: sequences of disturbances that drive the error far, by which sets are measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.design.sets.invariant_set import TubeProblem
+from hsv.design.sets.star_norms import output_rows
+
+_NEGLIGIBLE = 1e-6
+"""Share of a row's sum below which the rest of its response, of steps far back, is left out."""
+
+
+@dataclass(frozen=True)
+class CounterExamples:
+    """For each output row the vertex and the disturbances that drive it farthest of all at a constant vertex.
+
+    ``half_range`` (7): half the distance between what the sequence and its opposite make of zero error, SI; ``vertex``
+    (7); ``steps`` (7) lengths of the sequences. Rows are those of :func:`hsv.design.sets.star_norms.output_rows`.
+    """
+
+    half_range: np.ndarray
+    vertex: np.ndarray
+    steps: np.ndarray
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the numbers for JSON."""
+        return {name: value.tolist() for name, value in vars(self).items()}
+
+
+def counter_examples(problem: TubeProblem) -> CounterExamples:
+    """Return the sequences of all rows, flown: e(k+1) = A_i e(k) + G_i d(k) from e = 0.
+
+    At a constant vertex i, row e(m) = sum_k row A_i^(m-1-k) G_i d(k) is largest for the bound of each disturbance that
+    has the sign of its factor. What changing vertices add to that is not sought.
+    """
+    rows = output_rows(problem)
+    found = [_driven(problem, row) for row in rows]
+    half_range, vertex, steps = (np.array(column) for column in zip(*found, strict=True))
+    return CounterExamples(half_range, vertex, steps)
+
+
+def _driven(problem: TubeProblem, row: np.ndarray) -> tuple[float, int, int]:
+    A, G, disturbance = problem.system.A, problem.system.G, problem.disturbance
+    responses: list[np.ndarray] = []
+    total, left = np.zeros(len(A)), np.broadcast_to(row, (len(A), len(row)))
+    while True:
+        response = np.einsum("in,ind->id", left, G)
+        share = np.abs(response) @ disturbance.half_width
+        total += share
+        responses.append(response)
+        left = np.einsum("in,inm->im", left, A)
+        # The slow poles are real: what is left after a step falls no faster than it has.
+        if len(responses) % 100 == 0 and np.all(share < _NEGLIGIBLE * total):
+            break
+    vertex = int(np.argmax(total))
+    signs = np.sign(np.array(responses)[::-1, vertex])
+    ends = []
+    for side in (1.0, -1.0):
+        e = np.zeros(len(row))
+        for d in disturbance.centre + side * signs * disturbance.half_width:
+            e = A[vertex] @ e + G[vertex] @ d
+        ends.append(float(row @ e))
+    return 0.5 * (ends[0] - ends[1]), vertex, len(signs)
