@@ -25,7 +25,18 @@ def with_entry(values, name, index, factor):
 
 
 @pytest.mark.parametrize(
-    "name", ["baseline", "baseline_single_k", "baseline_derived", "adjustable", "realistic", "smooth", "governed"]
+    "name",
+    [
+        "baseline",
+        "baseline_single_k",
+        "baseline_derived",
+        "adjustable",
+        "realistic",
+        "smooth",
+        "governed",
+        "tight",
+        "derived",
+    ],
 )
 def test_shipped_designs_fly_without_a_word(name):
     assert preflight(read_design(find_design(name))) == ""
