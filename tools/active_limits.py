@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
-
-import numpy as np
-
-from hsv.design.region import Corner
+from hsv.design.region import corners
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import Components, fly
 from hsv.simulation.scenario import load_scenario
@@ -35,9 +31,7 @@ def deepest(scenario: str) -> float:
 
 def main() -> None:
     """Print the deepest loss of the nominal vehicle, and how many of all corners survive, passive and active."""
-    bounds = load_vehicle().uncertainty
-    signs = product((-1.0, 1.0), repeat=len(bounds))
-    over: list[Corner] = [{}, *(dict(zip(bounds, np.multiply(s, [*bounds.values()]), strict=True)) for s in signs)]
+    over = corners(load_vehicle().uncertainty)
     for scenario in ("case1", "case1_active"):
         print(f"{scenario}: nominal vehicle down to {deepest(scenario):.3f}", flush=True)
         for depth in DEPTHS:

@@ -1,7 +1,5 @@
 """The estimator of the elevator's effectiveness: what its intervals hold, and what it makes of faults."""
 
-from itertools import product
-
 import numpy as np
 import pytest
 from flights import components, step_by_step
@@ -15,7 +13,7 @@ from hsv.control.effectiveness import (
     effectiveness_shape,
     effectiveness_step,
 )
-from hsv.design.region import Corner
+from hsv.design.region import corners
 from hsv.errors import ParameterError, ScenarioError
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -45,10 +43,8 @@ def known_along(parts, flight):
     return known
 
 
-def corners() -> list[Corner]:
-    bounds = load_vehicle().uncertainty
-    signs = product((-1.0, 1.0), repeat=len(bounds))
-    return [dict(zip(bounds, np.multiply(s, list(bounds.values())), strict=True)) for s in signs]
+def vehicles() -> list[dict[str, float]]:
+    return corners(load_vehicle().uncertainty)
 
 
 def test_true_effectiveness_is_in_the_interval_where_the_disturbance_keeps_its_bound():
@@ -117,7 +113,8 @@ def test_without_a_fault_not_a_bit_is_different():
     passive, watched = (
         assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
     )
-    screened = [{}, *corners()[::64]]
+    nominal, *others = vehicles()
+    screened = [nominal, *others[::64]]
     flights = [fly_perturbed(parts, screened, lambda _, flight: flight.fingerprint) for parts in (passive, watched)]
     assert flights[0] == flights[1]
 
@@ -128,7 +125,7 @@ def test_no_false_alarm_at_any_corner():
     passive, watched = (
         assemble_flight(load_scenario(name, {"fault[0].effectiveness": 1.0})) for name in ("case1", "case1_active")
     )
-    every = [{}, *corners()]
+    every = vehicles()
     assert len(every) == 1025
     flights = [fly_perturbed(parts, every, lambda _, flight: flight.fingerprint) for parts in (passive, watched)]
     assert flights[0] == flights[1]
@@ -137,7 +134,7 @@ def test_no_false_alarm_at_any_corner():
 @pytest.mark.long
 def test_half_an_elevator_is_survived_at_every_corner():
     parts = active(0.5)
-    ended = fly_perturbed(parts, [{}, *corners()], lambda _, flight: flight.status)
+    ended = fly_perturbed(parts, vehicles(), lambda _, flight: flight.status)
     assert set(ended) == {FlightStatus.FINISHED}
 
 
