@@ -53,17 +53,43 @@ class EffectivenessMode(IntEnum):
     OTHER = 2
     """An offset explains them, a loss of effectiveness does not."""
     PENDING = 3
-    """Neither did; what is to replace them has yet to explain :data:`CONFIRMED` steps."""
+    """What is to replace the explanation so far has yet to explain more steps."""
 
 
 _HEALTHY, _LOSS, _OTHER, _PENDING = (float(mode) for mode in EffectivenessMode)
 
-_WITH, _WITHOUT, _BEFORE, _HELD, _STATE = range(3, 8)
-"""Rows of the memory after the scratch of the integration: states predicted with elevator and without it, state and
-input of the step before, and what follows."""
+# Rows of the memory, after the scratch of the integration.
+_WITH = 3
+"""State predicted with the elevator."""
+_WITHOUT = 4
+"""State predicted without it."""
+_BEFORE = 5
+"""State of the step before: measured where it is rigid, predicted where it is elastic."""
+_HELD = 6
+"""Input commanded in the step before."""
+_KNOWN = 7
+"""What is known of the elevator, in the columns that follow."""
 _ROWS = 8
-_ESTIMATE, _LOW, _HIGH, _OFFSET_LOW, _OFFSET_HIGH, _DISTURBANCE, _EFFECT, _MODE, _COUNT = range(N_STATES)
-"""Columns of the last row."""
+
+_ESTIMATE = 0
+"""P by which the command is divided."""
+_LOW = 1
+_HIGH = 2
+"""Interval of P that a loss of effectiveness leaves."""
+_OFFSET_LOW = 3
+_OFFSET_HIGH = 4
+"""Interval that an offset leaves, rad/s."""
+_DISTURBANCE = 5
+"""d, rad/s, as learned with g = 0."""
+_EFFECT = 6
+"""e of the step in which it was learned, rad/s."""
+_MODE = 7
+"""A mode, as a number."""
+_COUNT = 8
+"""Steps that the explanations have explained."""
+
+_EMPTY_LOW, _EMPTY_HIGH = 2.0, -1.0
+"""Ends of an empty interval."""
 
 
 class EffectivenessData(NamedTuple):
@@ -143,7 +169,7 @@ def effectiveness_shape(data: EffectivenessData | None) -> tuple[int, int]:
 
 def effectiveness_in(memory: np.ndarray) -> Effectiveness:
     """Return what the ``memory`` of :func:`effectiveness_step` says after a step."""
-    row = memory[_STATE]
+    row = memory[_KNOWN]
     mode = EffectivenessMode(int(row[_MODE]))
     return Effectiveness(float(row[_ESTIMATE]), float(row[_LOW]), float(row[_HIGH]), mode)
 
@@ -152,9 +178,9 @@ def effectiveness_in(memory: np.ndarray) -> Effectiveness:
 def _begin(data: Any, memory: Any) -> None:
     for i in range(N_STATES):
         memory[_BEFORE, i] = data.start[i]
-        memory[_STATE, i] = 0.0
+        memory[_KNOWN, i] = 0.0
     for column in (_ESTIMATE, _LOW, _HIGH):
-        memory[_STATE, column] = 1.0
+        memory[_KNOWN, column] = 1.0
 
 
 @njit(cache=True)
@@ -181,59 +207,89 @@ def effectiveness_bounds(data: Any, y: Any, e: Any, turn: Any, disturbance: Any,
 
 
 @njit(cache=True)
-def _judge(data: Any, state: Any, usable: Any, first: bool, y: Any, e: Any, turn: Any) -> None:
-    """Bring the row ``state`` (9) of the memory up to what a step says, where it is ``usable``."""
-    before, mode = state[_ESTIMATE], state[_MODE]
+def _limited(value: Any, most: Any) -> Any:
+    return min(max(value, -most), most)
+
+
+@njit(cache=True)
+def _kept(holds: Any, low: Any, high: Any) -> Any:
+    """Return the interval where it ``holds``, elsewhere an empty one, which no widening brings back."""
+    return choose(holds, low, _EMPTY_LOW), choose(holds, high, _EMPTY_HIGH)
+
+
+@njit(cache=True)
+def _in_range(data: Any, low: Any, high: Any) -> Any:
+    """Return an interval cut to the range of P, below which it is no loss that a division could make up for."""
+    return _kept(high >= data.least, min(max(low, data.least), 1.0), min(high, 1.0))
+
+
+@njit(cache=True)
+def _mode_after(mode: Any, loss: Any, whole: Any, sound: Any, waiting: Any) -> Any:
+    """Return the mode after a step.
+
+    Args:
+        mode: That before it.
+        loss: Whether a loss explains the steps; if not, an offset does, which can always explain the last one alone.
+        whole: Whether the interval of P contains 1.
+        sound: Whether that of the step alone does.
+        waiting: Whether there are too few steps to tell.
+    """
+    explained = choose(loss, choose(whole, _HEALTHY, _LOSS), _OTHER)
+    return choose((mode == _HEALTHY) & sound, _HEALTHY, choose(waiting, _PENDING, explained))
+
+
+@njit(cache=True)
+def _store(known: Any, usable: Any, column: int, value: Any) -> None:
+    known[column] = choose(usable, value, known[column])
+
+
+@njit(cache=True)
+def _judge(data: Any, known: Any, usable: Any, first: bool, y: Any, e: Any, turn: Any) -> None:
+    """Bring the row ``known`` (9) of the memory up to what a step says, where it is ``usable``."""
+    mode = known[_MODE]
     healthy = mode == _HEALTHY
-    effect = choose(healthy, e, state[_EFFECT])
-    most = data.offset * abs(e)
     # The flight begins healthy: what is off then is a disturbance, as far as one is admitted.
-    disturbance = choose(healthy & first, min(max(y - e, -most), most), state[_DISTURBANCE])
-    least, largest, offset_least, offset_largest = effectiveness_bounds(data, y, e, turn, disturbance, effect)
-    # Deeper than the least effectiveness it is no loss that a division could make up for.
-    plausible = largest >= data.least
-    least = choose(plausible, min(max(least, data.least), 1.0), 2.0)
-    largest = choose(plausible, min(largest, 1.0), -1.0)
+    most = data.offset * abs(e)
+    disturbance = choose(healthy & first, _limited(y - e, most), known[_DISTURBANCE])
+    effect = choose(healthy, e, known[_EFFECT])
 
-    low = max(max(state[_LOW] - data.drift, data.least), least)
-    high = min(min(state[_HIGH] + data.drift, 1.0), largest)
+    # What this step says alone, and what it leaves of the steps before.
+    bounds = effectiveness_bounds(data, y, e, turn, disturbance, effect)
+    step_low, step_high = _in_range(data, bounds[0], bounds[1])
+    low = max(max(known[_LOW] - data.drift, data.least), step_low)
+    high = min(min(known[_HIGH] + data.drift, 1.0), step_high)
     widened = data.drift * abs(e)
-    offset_low = max(state[_OFFSET_LOW] - widened, offset_least)
-    offset_high = min(state[_OFFSET_HIGH] + widened, offset_largest)
-    loss, other = low <= high, offset_low <= offset_high
+    offset_low = max(known[_OFFSET_LOW] - widened, bounds[2])
+    offset_high = min(known[_OFFSET_HIGH] + widened, bounds[3])
 
-    # While healthy, and where nothing explains the steps, everything begins with this step.
+    # While healthy, and where nothing explains the steps, everything begins with this one.
     begun = healthy | ((low > high) & (offset_low > offset_high))
-    loss, other = choose(begun, plausible, loss), begun | other
-    low, high = choose(begun, least, low), choose(begun, largest, high)
-    offset_low = choose(begun, offset_least, offset_low)
-    offset_high = choose(begun, offset_largest, offset_high)
+    low, high = choose(begun, step_low, low), choose(begun, step_high, high)
+    offset_low, offset_high = choose(begun, bounds[2], offset_low), choose(begun, bounds[3], offset_high)
+    # A first fault is confirmed sooner than what replaces another.
     begin = choose(healthy, CONFIRMED + 1.0 - data.steps, 1.0)
-    count = choose(begun, begin, state[_COUNT] + 1.0)
+    count = choose(begun, begin, known[_COUNT] + 1.0)
 
-    explained = choose(loss, choose(high < 1.0, _LOSS, _HEALTHY), choose(other, _OTHER, _PENDING))
+    loss = low <= high
     waiting = (begun | (mode == _PENDING)) & (count < CONFIRMED)
-    new = choose(waiting, _PENDING, explained)
-    new = choose(healthy & (largest >= 1.0), _HEALTHY, new)
+    new = _mode_after(mode, loss, high >= 1.0, step_high >= 1.0, waiting)
     middle = 0.5 * (low + high)
-    estimate = choose(new == _PENDING, before, choose(new == _LOSS, middle, 1.0))
-    # An explanation that has failed is not to come back by the widening of its interval.
-    low, high = choose(loss, low, 2.0), choose(loss, high, -1.0)
-    offset_low, offset_high = choose(other, offset_low, 1.0), choose(other, offset_high, -1.0)
+    estimate = choose(new == _PENDING, known[_ESTIMATE], choose(new == _LOSS, middle, 1.0))
 
     # What is farther off than the bound is no disturbance, whatever it is.
-    margin = data.bound * abs(e)
-    learned = disturbance + data.learning * min(max(y - e - disturbance, -margin), margin)
-    learned = choose(new == _HEALTHY, choose(healthy, min(max(learned, -most), most), disturbance), disturbance)
-    state[_ESTIMATE] = choose(usable, estimate, before)
-    state[_LOW] = choose(usable, low, state[_LOW])
-    state[_HIGH] = choose(usable, high, state[_HIGH])
-    state[_OFFSET_LOW] = choose(usable, offset_low, state[_OFFSET_LOW])
-    state[_OFFSET_HIGH] = choose(usable, offset_high, state[_OFFSET_HIGH])
-    state[_DISTURBANCE] = choose(usable, learned, state[_DISTURBANCE])
-    state[_EFFECT] = choose(usable, choose(new == _HEALTHY, e, state[_EFFECT]), state[_EFFECT])
-    state[_MODE] = choose(usable, new, mode)
-    state[_COUNT] = choose(usable, count, state[_COUNT])
+    learned = disturbance + data.learning * _limited(y - e - disturbance, data.bound * abs(e))
+    disturbance = choose(healthy & (new == _HEALTHY), _limited(learned, most), disturbance)
+    low, high = _kept(loss, low, high)
+    offset_low, offset_high = _kept(offset_low <= offset_high, offset_low, offset_high)
+    _store(known, usable, _ESTIMATE, estimate)
+    _store(known, usable, _LOW, low)
+    _store(known, usable, _HIGH, high)
+    _store(known, usable, _OFFSET_LOW, offset_low)
+    _store(known, usable, _OFFSET_HIGH, offset_high)
+    _store(known, usable, _DISTURBANCE, disturbance)
+    _store(known, usable, _EFFECT, choose(new == _HEALTHY, e, known[_EFFECT]))
+    _store(known, usable, _MODE, new)
+    _store(known, usable, _COUNT, count)
 
 
 @njit(cache=True)
@@ -253,7 +309,7 @@ def effectiveness_step(data: Any, memory: Any, step: int, x: Any) -> Any:
     if step == 0:
         _begin(data, memory)
     else:
-        with_elevator, without, held, state = memory[_WITH], memory[_WITHOUT], memory[_HELD], memory[_STATE]
+        with_elevator, without, held, known = memory[_WITH], memory[_WITHOUT], memory[_HELD], memory[_KNOWN]
         for i in range(N_STATES):
             with_elevator[i] = memory[_BEFORE, i]
             without[i] = memory[_BEFORE, i]
@@ -267,7 +323,7 @@ def effectiveness_step(data: Any, memory: Any, step: int, x: Any) -> Any:
         usable = math.isfinite(y) & math.isfinite(e) & (abs(e) > 1e-9)
         _judge(
             data,
-            state,
+            known,
             usable,
             step == 1,
             choose(usable, y, 1.0),
@@ -275,14 +331,14 @@ def effectiveness_step(data: Any, memory: Any, step: int, x: Any) -> Any:
             choose(usable, turn, 0.0),
         )
         # What the elastic modes have felt is known before it is confirmed.
-        unsure = (state[_MODE] == _PENDING) & (state[_LOW] <= state[_HIGH])
-        felt = choose(unsure, 0.5 * (state[_LOW] + state[_HIGH]), state[_ESTIMATE])
+        unsure = (known[_MODE] == _PENDING) & (known[_LOW] <= known[_HIGH])
+        felt = choose(unsure, 0.5 * (known[_LOW] + known[_HIGH]), known[_ESTIMATE])
         for i in range(N_RIGID, N_STATES):
             predicted = without[i] + felt * (with_elevator[i] - without[i])
             memory[_BEFORE, i] = choose(math.isfinite(predicted), predicted, memory[_BEFORE, i])
     for i in range(N_RIGID):
         memory[_BEFORE, i] = x[i]
-    return memory[_STATE, _ESTIMATE]
+    return memory[_KNOWN, _ESTIMATE]
 
 
 @njit(cache=True)
