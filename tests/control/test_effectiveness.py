@@ -19,6 +19,8 @@ from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.simulation.side_by_side import fly_perturbed
+from hsv.vehicle.dynamics import PITCH_RATE
+from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.plant import FlightStatus
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -41,6 +43,34 @@ def known_along(parts, flight):
         effectiveness_hold(data, memory, u)
         known.append(effectiveness_in(memory))
     return known
+
+
+def watched(effectiveness, disturbance=lambda k: 0.0, until=500, **parameters):
+    """Return what an estimator with these parameters knows after each step of constant input and state.
+
+    effectiveness: P by step. disturbance: Of the pitch rate, as a share of the effect of the whole elevator, by step.
+    """
+    values = {f"effectiveness.{name}": value for name, value in parameters.items()}
+    data = components("case1_active", **values).controller.kernel.effectiveness
+    memory = np.zeros(effectiveness_shape(data))
+    x, u = data.start.copy(), np.array([0.27, 0.21])
+    known = []
+    for k in range(until):
+        effectiveness_step(data, memory, k, x)
+        effectiveness_hold(data, memory, u)
+        known.append(effectiveness_in(memory))
+        rates = []
+        for elevator in (u[1], 0.0):
+            predicted = memory[5].copy()
+            advance(predicted, np.array([u[0], elevator]), data.vehicle, data.period, 1, workspace())
+            rates.append(predicted[PITCH_RATE])
+        x = data.start.copy()
+        x[PITCH_RATE] = rates[1] + (effectiveness(k + 1) + disturbance(k + 1)) * (rates[0] - rates[1])
+    return known
+
+
+def lost(depth, after=100):
+    return lambda k: depth if k > after else 1.0
 
 
 def vehicles() -> list[dict[str, float]]:
@@ -187,6 +217,55 @@ def test_estimate_keeps_its_range(effectiveness):
     known = known_along(parts, fly(parts))
     least = parts.controller.kernel.effectiveness.least
     assert all(least <= k.estimate <= 1.0 for k in known)
+
+
+def always_healthy(disturbance, **parameters):
+    return all(k.mode is EffectivenessMode.HEALTHY for k in watched(lost(1.0), disturbance, **parameters))
+
+
+def test_least_is_the_deepest_loss_that_is_one():
+    assert watched(lost(0.12))[-1].mode is EffectivenessMode.OTHER
+    deeper = watched(lost(0.12), least=0.1)[-1]
+    assert deeper.mode is EffectivenessMode.LOSS and deeper.low <= 0.12 <= deeper.high
+
+
+def test_bound_and_noise_are_the_disturbances_of_a_step_that_are_no_fault():
+    assert always_healthy(lambda k: -0.025 * (k == 300))
+    large = {"disturbance": lambda k: -0.09 * (k == 300)}
+    assert not always_healthy(**large)
+    assert always_healthy(**large, bound=0.1)
+    assert always_healthy(**large, noise=1e-3)
+
+
+def test_offset_is_the_largest_disturbance_that_is_learned_at_the_start():
+    assert always_healthy(lambda k: -0.07)
+    assert not always_healthy(lambda k: -0.07, offset=0.02)
+
+
+def test_time_is_that_in_which_a_slow_disturbance_is_learned():
+    slow = {"disturbance": lambda k: max(-0.06, -0.006 * 0.02 * k), "until": 600}
+    assert always_healthy(**slow)
+    assert not always_healthy(**slow, time=100.0)
+
+
+def test_drift_is_the_rate_at_which_the_effectiveness_is_followed():
+    def sinking(k):
+        return 1.0 if k <= 100 else 0.6 - 0.005 * 0.02 * (k - 100)
+
+    def followed(**parameters):
+        return all(
+            known.mode is EffectivenessMode.LOSS and known.low <= sinking(k) <= known.high
+            for k, known in enumerate(watched(sinking, until=1600, **parameters))
+            if k > 110
+        )
+
+    assert followed() and not followed(drift=0.0)
+
+
+@pytest.mark.parametrize("steps", [1.0, 2.0, 5.0])
+def test_steps_are_those_that_must_agree_on_a_first_fault(steps):
+    modes = [known.mode for known in watched(lost(0.5), until=120, steps=steps)]
+    assert modes.index(EffectivenessMode.LOSS) - 101 == steps - 1
 
 
 def test_off_there_is_no_estimator():
