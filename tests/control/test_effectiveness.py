@@ -6,6 +6,7 @@ from flights import components, step_by_step
 
 from hsv.control.effectiveness import (
     EffectivenessMode,
+    effectiveness_along,
     effectiveness_bounds,
     effectiveness_data,
     effectiveness_hold,
@@ -36,13 +37,7 @@ def active(effectiveness=0.9, **fault):
 def known_along(parts, flight):
     """Return what the estimator of ``parts`` knows after each step of a ``flight``."""
     data = parts.controller.kernel.effectiveness
-    memory = np.zeros(effectiveness_shape(data))
-    known = []
-    for step, (x, u) in enumerate(zip(flight.history.estimate, flight.history.command, strict=True)):
-        effectiveness_step(data, memory, step, x)
-        effectiveness_hold(data, memory, u)
-        known.append(effectiveness_in(memory))
-    return known
+    return effectiveness_along(data, flight.history.estimate, flight.history.command)
 
 
 def watched(effectiveness, disturbance=lambda k: 0.0, until=500, **parameters):

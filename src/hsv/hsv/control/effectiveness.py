@@ -348,3 +348,20 @@ def effectiveness_hold(data: Any, memory: Any, u: Any) -> None:
         return
     for i in range(len(u)):
         memory[_HELD, i] = u[i]
+
+
+def effectiveness_along(data: EffectivenessData, states: np.ndarray, inputs: np.ndarray) -> list[Effectiveness]:
+    """Return what the estimator knows after each step of a flight, from what it was given.
+
+    Args:
+        data: The estimator.
+        states: Measured or estimated states (steps, 9).
+        inputs: Commanded inputs (steps, 2).
+    """
+    memory = np.zeros(effectiveness_shape(data))
+    known = []
+    for step, (x, u) in enumerate(zip(states, inputs, strict=True)):
+        effectiveness_step(data, memory, step, x)
+        effectiveness_hold(data, memory, u)
+        known.append(effectiveness_in(memory))
+    return known
