@@ -8,6 +8,11 @@ import pytest
 from hsv.design.region import corners
 from hsv.errors import DesignError
 from hsv.simulation import comparison
+from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.comparison import settling_times
+from hsv.simulation.governed import governed
+from hsv.simulation.scenario import parse_scenario
 from hsv.study.limits import optimum
 from hsv.study.limits.optimum import (
     INPUT_SCALE,
@@ -28,7 +33,14 @@ from hsv.study.limits.recovery import (
     turning_limit,
 )
 from hsv.study.limits.replay import fly_optimum
-from hsv.study.limits.study import PERIODS, deepest_fault, fastest_transfer
+from hsv.study.limits.study import (
+    BLEND,
+    PERIODS,
+    deepest_fault,
+    fastest_transfer,
+    least_survived,
+    needed_effectiveness,
+)
 from hsv.study.limits.transfer import straight, time_bound, transfer
 from hsv.study.linear_loop import START, TARGET
 from hsv.study.sensitivity.catalogue import STUDIES, page
@@ -202,6 +214,18 @@ def test_the_comparison_has_the_least_time_of_the_page():
     page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
     assert f"{comparison.LEAST_TIME} s" in page_of_limits
     assert f"{comparison.LEAST_TIME} s" in (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+
+
+def test_the_page_has_what_the_controllers_reach():
+    page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
+    flown = fly(assemble_flight(parse_scenario(governed("case1", BLEND).text, "case1")))
+    assert f"settles in {max(settling_times(flown.data())):.1f} s." in page_of_limits
+    assert f"loses the nominal vehicle below {least_survived('case1'):.3f}," in page_of_limits
+
+
+def test_elevator_is_needed_to_turn_and_to_hold():
+    limits = np.array([[0.6, 0.4, 0.3, 0.5], [0.6, 0.2, 0.3, 0.1]])
+    assert needed_effectiveness(limits).tolist() == [[0.4, 0.5], [0.3, 0.2]]
 
 
 @pytest.mark.long

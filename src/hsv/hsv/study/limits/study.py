@@ -13,11 +13,12 @@ from matplotlib.axes import Axes
 
 from hsv.design.region import Corner, corners
 from hsv.progress import Progress
-from hsv.simulation.assembly import assemble, flight_parameters
+from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.comparison import settling_times
+from hsv.simulation.governed import governed
 from hsv.simulation.metrics import FlightData
-from hsv.simulation.scenario import load_scenario
+from hsv.simulation.scenario import load_scenario, parse_scenario
 from hsv.study.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv.study.limits.optimum import finer, solve
 from hsv.study.limits.recovery import (
@@ -37,6 +38,7 @@ from hsv.study.linear_loop import START, TARGET
 from hsv.study.sensitivity.study import Outcome, Study
 from hsv.units import to_paper
 from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.plant import FlightStatus
 from hsv.vehicle.vehicle import Vehicle, load_vehicle
 
 COUPLING = "paper_like"
@@ -66,6 +68,12 @@ CURVE = tuple(round(0.02 * i, 2) for i in range(16))
 """Delays (s) of the figure's curves."""
 
 TOLERANCE = 1e-5
+
+BLEND = 5.0
+"""Half the time (s) in which climb rate and acceleration of the governed reference change."""
+
+RESOLUTION = 1e-3
+"""To which the least effectiveness that a flight survives is bisected."""
 
 
 @dataclass(frozen=True)
@@ -97,9 +105,10 @@ class DeepestFault:
 class Limits:
     """Results: transfers in so many ``periods``, to rest and to 2 %, a bound of the former's time (s), and recoveries.
 
-    flights: By scenario. faults: Of the nominal vehicle. worst: Of some of the corners, by their number. corners:
-    (vehicles, 2 + delays), see :func:`corner_limits`; the first is the nominal vehicle. over: The changes of their
-    parameters.
+    flights: By scenario. governed: Case 1 along the reference of the governor. survived: The least effectiveness that
+    Case 1's controller survives. faults: Of the nominal vehicle. worst: Of some of the corners, by their number.
+    corners: (vehicles, 2 + delays), see :func:`corner_limits`; the first is the nominal vehicle. over: The changes of
+    their parameters.
     """
 
     periods: int
@@ -107,6 +116,8 @@ class Limits:
     settled: FastestTransfer
     bound: float
     flights: dict[str, FlightData]
+    governed: FlightData
+    survived: float
     faults: list[DeepestFault]
     worst: dict[int, list[DeepestFault]]
     over: Sequence[Corner]
@@ -158,6 +169,27 @@ def corner_limits(
     return np.array(rows)
 
 
+def needed_effectiveness(limits: np.ndarray) -> np.ndarray:
+    """Return the effectiveness (vehicles, delays) that is needed both to turn the vehicle and to hold it.
+
+    ``limits``: as :func:`corner_limits` returns them.
+    """
+    return np.maximum(limits[:, 2:], limits[:, 1:2])
+
+
+def least_survived(scenario: str) -> float:
+    """Return the least effectiveness that the nominal vehicle survives in a scenario, by bisection.
+
+    ``scenario``: One whose first fault is a loss of effectiveness.
+    """
+    lost, survived = 0.3, 1.0
+    while survived - lost > RESOLUTION:
+        middle = 0.5 * (lost + survived)
+        flight = fly(assemble_flight(load_scenario(scenario, {"fault[0].effectiveness": middle})))
+        lost, survived = (lost, middle) if flight.status is FlightStatus.FINISHED else (middle, survived)
+    return survived
+
+
 def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     """Solve both problems; ``coarseness`` above 1: half as many periods, few corners, and optima of none of them."""
     whole = coarseness <= 1.0
@@ -179,7 +211,10 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
     stage("bound of the time")
     bound = time_bound(vehicle)
     stage("flights of the controllers")
-    flights = {name: fly(assemble(flight_parameters(load_scenario(name)))).data() for name in SCENARIOS}
+    flights = {name: fly(assemble_flight(load_scenario(name))).data() for name in SCENARIOS}
+    along = parse_scenario(governed("case1", BLEND).text, "case1")
+    flown = fly(assemble_flight(along)).data()
+    survived = least_survived("case1")
     stage("corners")
     every = corners(envelope.uncertainty)
     over = every if whole else every[:: min(512, round(64 * coarseness))]
@@ -198,7 +233,7 @@ def run(coarseness: float, folder: Path, progress: Progress) -> Outcome:
                 at = vehicle.perturbed(over[index])
                 worst[index].append(deepest_fault(at, envelope, delay, HORIZON, refine=False))
     progress("done", total, total)
-    found = Limits(periods, rest, settled, bound, flights, faults, worst, over, limits)
+    found = Limits(periods, rest, settled, bound, flights, flown, survived, faults, worst, over, limits)
     return Outcome(_figure(found), _shows(found), _findings(found), _numbers(found))
 
 
@@ -218,28 +253,22 @@ def _rounded_down(value: float) -> float:
     return math.floor(100.0 * value) / 100.0
 
 
-def _within(limit: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """Return what is needed of the elevator both to turn the vehicle and to hold it."""
-    return np.maximum(limit, static)
-
-
 def _shows(found: Limits) -> str:
     rest, settled, limits = found.rest, found.settled, found.corners
+    needed = needed_effectiveness(limits)
     settling = [
         f"| {name} | {altitude:.1f} | {velocity:.1f} | {later / settled.time:.1f} |"
         for name, (altitude, velocity, later) in ((name, _settling(data)) for name, data in found.flights.items())
     ]
     rows = [_fault_row("nominal", fault) for fault in found.faults]
     rows += [_fault_row(f"corner {index}", fault) for index, solved in found.worst.items() for fault in solved]
-    slowest = [2 + CURVE.index(delay) for delay in DELAYS]
-    static = limits[:, 1]
     over_all = [
         "| trim at Case 1's target | " + _range(limits[:, 0]),
-        "| a trim in the envelope | " + _range(static),
+        "| a trim in the envelope | " + _range(limits[:, 1]),
         *(
             f"| nose turned and a trim in the envelope, known after {delay:g} s | "
-            + _range(_within(limits[:, column], static))
-            for delay, column in zip(DELAYS, slowest, strict=True)
+            + _range(needed[:, CURVE.index(delay)])
+            for delay in DELAYS
         ),
     ]
     named = [
@@ -258,6 +287,9 @@ def _shows(found: Limits) -> str:
         deviation=max(rest.flown.deviation(), settled.flown.deviation()),
         gap=100.0 * (rest.time / found.bound - 1.0),
         settling="\n".join(settling),
+        blend=BLEND,
+        governed=_settling(found.governed)[2],
+        survived=found.survived,
         margin=MARGIN,
         after=AFTER,
         faults="\n".join(rows),
@@ -331,13 +363,15 @@ def _numbers(found: Limits) -> dict[str, Any]:
     return {
         "transfer_s": {"rest": rest.time, "rest_half_mesh": rest.coarser, "bound": found.bound},
         "settling_s": {"least": settled.time, "least_half_mesh": settled.coarser}
-        | {name: _settling(data)[2] for name, data in found.flights.items()},
+        | {name: _settling(data)[2] for name, data in found.flights.items()}
+        | {"governed": _settling(found.governed)[2]},
         "replay_deviation": {"rest": rest.flown.deviation(), "settled": settled.flown.deviation()},
         "faults": [written(fault) for fault in found.faults],
         "worst_corners": {
             str(index): {"perturbation": dict(found.over[index]), "faults": [written(fault) for fault in solved]}
             for index, solved in found.worst.items()
         },
+        "least_survived": {"case1": found.survived},
         "corners": {
             "static_at_target": limits[:, 0].tolist(),
             "static_in_envelope": limits[:, 1].tolist(),
@@ -378,8 +412,7 @@ def _figure(found: Limits) -> Any:
     axis.set(xlim=(0.0, HORIZON), xlabel="time after the loss (s)", ylabel="elevator command (deg)")
     axis.legend(loc="center left")
     axis = axes[2, 1]
-    static, turning = limits[:, 1:2], limits[:, 2:]
-    needed = np.maximum(turning, static)
+    needed = needed_effectiveness(limits)
     axis.fill_between(CURVE, needed[1:].min(axis=0), needed[1:].max(axis=0), color=BLUE, alpha=0.2, linewidth=0)
     axis.plot(CURVE, needed[0], color=BLUE, label="nominal; shaded: corners")
     axis.axhline(limits[0, 0], color=GREY, linestyle=":", label="trim at the target")
@@ -424,8 +457,8 @@ within {deviation:.0e} of what was computed, in units of 100 m, 50 m/s and 0.03 
 | --- | ---: | ---: | ---: |
 {settling}
 
-The fastest reference of the [governor](../governor.md) for this step, `hsv govern case1 --blend "5 s"`, settles in
-20.4 s.
+The fastest reference of the [governor](../governor.md) for this step, `hsv govern case1 --blend "{blend:g} s"`,
+settles in {governed:.1f} s.
 
 ## The deepest loss of effectiveness
 The vehicle is in the trim of Case 1's target when the elevator's effectiveness falls to P, for good. Until it is known,
@@ -458,6 +491,7 @@ All vehicles, the nominal one and {count} corners of the parameter bounds:
 
 {named}
 
-The passive controllers lose the nominal vehicle below 0.54 (`case1`, [resilience](../resilience.md))."""
+Of the passive controllers, that of `case1` loses the nominal vehicle below {survived:.3f}, by bisection with the fault
+at 100 s; [resilience](../resilience.md) has the others, and faults in the manoeuvre."""
 
 STUDY = Study("limits", "Fastest transfer and deepest fault", run, kind="Physical limits")
