@@ -43,3 +43,4 @@ def test_node_in_process_and_replay_are_the_same(processes: Processes, tmp_path:
     ]
     assert said[0]["elevator"] == "HEALTHY" and said[-1]["elevator"] == "LOSS"
     assert float(said[-1]["effectiveness"]) == pytest.approx(0.5, abs=0.01)
+    assert all(0.0 < float(values["step_time_p99_ms"]) < 1e3 for values in said)

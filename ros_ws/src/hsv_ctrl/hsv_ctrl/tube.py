@@ -9,6 +9,7 @@ from hsv.control.tube_law import TubeResult, TubeStatusCode
 from hsv.errors import ParameterError
 from hsv.graph.description import NodeDescription
 from hsv.simulation.blocks import Signals
+from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode
 from hsv_node.parameters import given
 
@@ -26,14 +27,22 @@ class TubeNode(BlockNode):
             raise ParameterError(
                 f"parameter controller = {self.controller!r}: expected {role.name}, which this node is"
             )
-        self._outside = False
-        self._mode = EffectivenessMode.HEALTHY
+        self._begin()
 
     def start_run(self, run: Run) -> None:
         """Begin inside the tube."""
         super().start_run(run)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._times = StepTimes()
         self._outside = False
         self._mode = EffectivenessMode.HEALTHY
+
+    def advance(self, signals: Signals) -> None:
+        """Step the law and note how long it takes."""
+        with self._times:
+            super().advance(signals)
 
     def stepped(self, signals: Signals) -> None:
         """Tell of the tube; leaving it is a warning."""
@@ -65,5 +74,6 @@ class TubeNode(BlockNode):
                 saturated=bool(result.saturated.any()),
                 level=result.level,
                 component=result.component,
+                step_time_p99_ms=self._times,
                 **known,
             )
