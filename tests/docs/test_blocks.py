@@ -30,7 +30,11 @@ HERE = {
     "docs/explanation/certificates.md": (),
     "docs/governor.md": (),
     "docs/montecarlo.md": (),
-    "docs/python.md": (),
+    "docs/python.md": (
+        "cp -rL examples/lqr lqr",
+        "pip install --quiet --no-deps --no-index --no-build-isolation --target site ./lqr",
+        "export PYTHONPATH=$PWD/site:$PYTHONPATH",
+    ),
     "docs/replay.md": (
         "hsv run case1 --bag BAG --no-report",
         "cp offline_design/baseline.yaml new.yaml",

@@ -8,7 +8,7 @@ def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeyp
     def none(*_):
         raise DesignError("no set")
 
-    monkeypatch.setattr(verdict, "ellipsoid", none)
+    monkeypatch.setattr(verdict, "ellipsoid_set", none)
     assert verdict.verdict("x", subject.design, subject).said() == "no set"
 
 
