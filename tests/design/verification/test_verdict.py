@@ -1,6 +1,10 @@
 import numpy as np
+import pytest
 
+from hsv.control.design_file import find_design
 from hsv.design.verification import verdict
+from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.verifier import load_subject
 from hsv.errors import DesignError
 
 
@@ -20,3 +24,30 @@ def test_a_design_that_knows_actuators_is_judged_with_those_that_fly(realistic):
     # No lag: a smaller set, less feedback, more room, and no limits to say anything about.
     assert np.all(ideal.half_width < known.half_width) and np.all(ideal.feedback < known.feedback)
     assert ideal.shares.min() > known.shares.min() and not ideal.reaches
+
+
+def test_a_flight_may_start_where_both_ellipsoid_and_star_norms_allow_it():
+    found = certified_set(load_subject(find_design("tight")))
+    at_rest = np.zeros(5)
+    norms = found.star_norms.level_at_start(found.problem, found.centre)
+    assert verdict._start(found, at_rest) == max(norms, found.level(np.zeros(len(found.centre))))
+    # Such an error of the pitch angle is inside the ellipsoid; for star norms it is too far, if one channel takes it.
+    error = np.array([0.0, 0.0, 0.0, 0.1 * found.half_width[3], 0.0])
+    assert max(found.level(side * np.append(error, [0.0, 0.0])) for side in (1.0, -1.0)) < 1.0
+    assert verdict._start(found, error) > 1.0
+
+
+@pytest.mark.long
+def test_the_set_found_anew_is_that_of_the_certificate():
+    tight = load_subject(find_design("tight"))
+    (known,) = verdict.certified_with(tight, {})
+    assert known.certified and known.start <= 1.0
+    stated = tight.certificate["tube"]["invariant_set"]
+    assert np.allclose(known.half_width, stated["half_width"][:5], rtol=1e-5)
+    assert np.allclose(known.feedback, stated["feedback_half_range"] + _feedthrough(tight), rtol=1e-5)
+
+
+def _feedthrough(subject):
+    """Return the half-range (2) of the feedback to the filtered nominal pitch rate."""
+    problem = certified_set(subject).problem
+    return np.abs(problem.system.F_d) @ problem.disturbance.half_width
