@@ -1,6 +1,7 @@
 """Star norms and counter-examples: what a bound by row and channel promises, and what no bound can be below."""
 
 import dataclasses
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.star_norm import star_norms
 from hsv.design.sets.star_norms import StarNorms, output_rows
-from hsv.design.verification.invariant_set import certified_set
+from hsv.design.verification.checks import gathered
+from hsv.design.verification.invariant_set import certified_set, counter_example_checks, set_checks
 from hsv.design.verification.verifier import load_subject
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_RIGID
@@ -127,10 +129,108 @@ def test_a_channel_that_does_nothing_has_no_ellipsoid():
     assert norms.bounds(problem)[0] == pytest.approx(2.0, rel=0.02)
 
 
+def test_a_constant_channel_counts_at_the_start():
+    """It moves the centre but has no ellipsoid; from zero error, the centre is out of reach of the other channel."""
+    problem = problem_of([0.5 * np.eye(5)], [np.eye(5)[:, :2]], [-1.0, 1.0], [1.0, 1.0])
+    centre = problem.centre()
+    assert centre == pytest.approx([0.0, 2.0, 0.0, 0.0, 0.0])
+    norms = star_norms(problem, centre)
+    assert norms.level_at_start(problem, centre) > 1.0
+    assert norms.level_at_start(problem, centre, centre) < 1e-6
+    with pytest.raises(DesignError, match=r"star norms: level of e = 0 is .*, expected at most 1"):
+        norms.certify(problem, centre)
+
+
+def test_without_disturbances_only_the_centre_is_inside():
+    problem = problem_of([0.5 * np.eye(5)], [np.eye(5)[:, :1]], [1.0], [1.0])
+    centre = problem.centre()
+    norms = star_norms(problem, centre)
+    assert norms.level_at_start(problem, centre) == np.inf
+    assert norms.level_at_start(problem, centre, centre) == 0.0
+
+
 def test_an_unstable_system_has_none():
     problem = problem_of([1.01 * np.eye(5)], [np.eye(5)], -np.ones(5), np.ones(5))
     with pytest.raises(DesignError, match="star norms: a vertex is not stable"):
         star_norms(problem, np.zeros(5))
+    with pytest.raises(DesignError, match=r"counter-examples: spectral radius of a vertex = 1\.01, expected below 1"):
+        counter_examples(problem)
+
+
+def test_counter_examples_end_where_nothing_is_driven_and_where_a_pole_is_slow():
+    nothing = problem_of([0.5 * np.eye(5)], [np.eye(5)[:, :1]], [-1.0], [1.0])
+    assert np.array_equal(counter_examples(nothing).half_range > 0.0, [True, False, False, False, False, True, True])
+    slow = problem_of([0.999999 * np.eye(5)], [np.eye(5)], -np.ones(5), np.ones(5))
+    driven = counter_examples(slow)
+    assert np.all(driven.half_range[:N_RIGID] < 1e6) and np.all(driven.steps == driven.steps[0])
+
+
+def _row_of_contractions_dropped(norms):
+    norms["contraction"].pop()
+
+
+def _channel_of_contractions_dropped(norms):
+    norms["contraction"] = [row[:-1] for row in norms["contraction"]]
+
+
+def _entry_above_the_diagonal(norms):
+    norms["Q"][6][1][0][3] *= 0.5
+
+
+def _not_a_number(norms):
+    norms["Q"][3][1][0][3] = None
+
+
+def _row_too_short(norms):
+    norms["Q"][3][1].pop()
+
+
+def _deleted(norms):
+    del norms["Q"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_row_of_contractions_dropped, r"star_norms.contraction: shape \(6, 8\), expected finite .* \(7, 8\)"),
+        (_channel_of_contractions_dropped, r"star_norms.contraction: shape \(7, 7\), expected finite .* \(7, 8\)"),
+        (_entry_above_the_diagonal, r"star_norms.Q\[6, 1\]: expected a symmetric matrix"),
+        (_not_a_number, r"star_norms.Q: expected finite numbers of shape \(7, 8, 7, 7\)"),
+        (_row_too_short, r"star_norms.Q: expected finite numbers of shape \(7, 8, 7, 7\)"),
+        (_deleted, r"star_norms.Q: expected finite numbers of shape \(7, 8, 7, 7\)"),
+    ],
+)
+def test_what_is_checked_is_what_bounds(tight, change, said):
+    """A contraction less would leave an ellipsoid unchecked, and a factorisation reads one triangle only."""
+    report = tight.star_norms.as_dict()
+    change(report)
+    with pytest.raises(DesignError, match=said):
+        StarNorms.from_report(report, tight.problem)
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "named"),
+    [
+        (("counter_examples", "half_range", 3), 0.0139, "counter-examples[3]"),
+        (("counter_examples", "vertex", 3), 2, "counter-examples, vertex[3]"),
+        (("counter_examples", "steps", 3), 20, "counter-examples, steps[3]"),
+        (("counter_examples",), None, "counter-examples"),
+        (("star_norms",), None, "star norms"),
+        (("half_width", 3), 0.0169, "certified half-widths from Q[3]"),
+        (("feedback_half_range", 1), 0.258, "feedback half-ranges from Q[1]"),
+        (("certificate", "star_norms", "smallest_eigenvalue"), 0.5, "star norms, evidence as certified[0]"),
+        (("certificate", "lmi_smallest_eigenvalues", 3), 0.5, "invariance, smallest eigenvalues as certified[3]"),
+    ],
+)
+def test_everything_that_is_stated_is_recomputed(keys, value, named):
+    subject = load_subject(find_design("tight"))
+    stated = subject.certificate["tube"]["invariant_set"]
+    for key in keys[:-1]:
+        stated = stated[key]
+    stated[keys[-1]] = value
+    parts = {"invariant set": set_checks, "counter-examples": counter_example_checks}
+    checks = [check for name, part in parts.items() for check in gathered(name, partial(part, subject))]
+    assert named in [check.name for check in checks if not check.ok]
 
 
 def test_half_widths_are_the_lesser_ones_and_the_level_is_that_of_the_ellipsoid(tight):

@@ -7,11 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from hsv.design.lmi import spectral_radii
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.star_norms import output_rows
+from hsv.errors import DesignError
 
 _NEGLIGIBLE = 1e-6
 """Share of a row's sum below which the rest of its response, of steps far back, is left out."""
+
+_LONGEST = 10_000
+"""Steps of the longest sequence. Where a longer one would drive the error farther, this one is still attained."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +41,13 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
 
     At a constant vertex i, row e(m) = sum_k row A_i^(m-1-k) G_i d(k) is largest for the bound of each disturbance that
     has the sign of its factor. What changing vertices add to that is not sought.
+
+    Raises:
+        DesignError: A vertex that is not stable: there the error has no bound.
     """
+    radius = spectral_radii(problem.system.A).max()
+    if not radius < 1.0:
+        raise DesignError(f"counter-examples: spectral radius of a vertex = {radius:.6g}, expected below 1")
     rows = output_rows(problem)
     found = [_driven(problem, row) for row in rows]
     half_range, vertex, steps = (np.array(column) for column in zip(*found, strict=True))
@@ -47,14 +58,14 @@ def _driven(problem: TubeProblem, row: np.ndarray) -> tuple[float, int, int]:
     A, G, disturbance = problem.system.A, problem.system.G, problem.disturbance
     responses: list[np.ndarray] = []
     total, left = np.zeros(len(A)), np.broadcast_to(row, (len(A), len(row)))
-    while True:
+    while len(responses) < _LONGEST:
         response = np.einsum("in,ind->id", left, G)
         share = np.abs(response) @ disturbance.half_width
         total += share
         responses.append(response)
         left = np.einsum("in,inm->im", left, A)
         # The slow poles are real: what is left after a step falls no faster than it has.
-        if len(responses) % 100 == 0 and np.all(share < _NEGLIGIBLE * total):
+        if len(responses) % 100 == 0 and np.all(share <= _NEGLIGIBLE * total):
             break
     vertex = int(np.argmax(total))
     signs = np.sign(np.array(responses)[::-1, vertex])

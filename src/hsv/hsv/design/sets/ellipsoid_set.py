@@ -97,7 +97,11 @@ def from_shape(
 
 
 def from_report(problem: TubeProblem, report: Mapping[str, Any]) -> EllipsoidSet:
-    """Return the set that ``report``, the invariant set in a certificate, describes for ``problem``."""
+    """Return the set that ``report``, the invariant set in a certificate, describes for ``problem``.
+
+    Raises:
+        DesignError: Star norms that are not those of such a problem.
+    """
     found = from_shape(
         problem,
         np.array(report["centre"]),
@@ -107,7 +111,7 @@ def from_report(problem: TubeProblem, report: Mapping[str, Any]) -> EllipsoidSet
         SolverReport(**report["solver"], time=0.0),
     )
     stored = report.get("star_norms")
-    return found.narrowed(StarNorms.from_report(stored)) if stored else found
+    return found if stored is None else found.narrowed(StarNorms.from_report(stored, problem))
 
 
 def vertex_residuals(
@@ -118,8 +122,11 @@ def vertex_residuals(
     By its Schur complement, with Q and the diagonal scaled to the identity.
 
     Raises:
-        DesignError: Q is not positive definite, or multipliers that are negative or sum to more than 1 - lam.
+        DesignError: Q is not symmetric or not positive definite, or multipliers that are negative or sum to more than
+            1 - lam.
     """
+    if not np.array_equal(Q, Q.T):
+        raise DesignError("ellipsoid: Q is not symmetric")
     try:
         factor = np.linalg.cholesky(Q)
     except np.linalg.LinAlgError as error:

@@ -20,7 +20,6 @@ _INFLATION = 1.002
 _REGULAR = 1e-9
 """Share of the unit matrix in the coordinates of the search: a channel that excites few states makes them singular."""
 
-
 _SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 """What is tried: 1 - lam as a share of 1 - rho^2, rho the largest spectral radius of a vertex; at 1 there is no Q."""
 

@@ -77,14 +77,17 @@ class StarNorms:
         """Return the largest level of terms whose sum is an ``error`` (n), by default none: at most 1, it is inside.
 
         Zero error is the sum of what the mid-point of each channel makes of the mean vertex in the long run, with the
-        opposite sign: no mid-point is farther from zero than the half-width of its channel. The error is added to the
-        term of one channel, for each row the one that suits.
+        opposite sign: no mid-point is farther from zero than the half-width of its channel. The last channel takes what
+        is left, that of constant channels too, which have no ellipsoid. The error is added to the term of one channel,
+        for each row the one that suits. Infinite where no channel does anything and the sum is not zero.
         """
         mean = problem.system.A.mean(axis=0)
-        G, columns = problem.system.G.mean(axis=0), problem.columns(centre)
+        G, acting = problem.system.G.mean(axis=0), np.flatnonzero(problem.columns(centre).any(axis=(0, 1)))
+        if not acting.size:
+            return float("inf") if np.any(centre if error is None else centre - error) else 0.0
         terms = np.linalg.solve(mean - np.eye(len(mean)), G * problem.disturbance.centre).T
-        terms = np.vstack((terms, -centre - terms.sum(axis=0)))
-        acting = np.flatnonzero(columns.any(axis=(0, 1)))
+        terms = np.vstack((terms, np.zeros(len(mean))))
+        terms[acting[-1]] = -centre - terms[acting[:-1]].sum(axis=0)
         worst = 0.0
         for Q in self.Q:
             levels = np.array([_level(Q[j], terms[j]) for j in acting])
@@ -117,9 +120,34 @@ class StarNorms:
         return {"contraction": self.contraction.tolist(), "Q": self.Q.tolist()}
 
     @classmethod
-    def from_report(cls, report: Mapping[str, Any]) -> StarNorms:
-        """Return the ellipsoids that :meth:`as_dict` wrote."""
-        return cls(np.array(report["Q"], float), np.array(report["contraction"], float))
+    def from_report(cls, report: Mapping[str, Any], problem: TubeProblem) -> StarNorms:
+        """Return the ellipsoids that :meth:`as_dict` wrote, of as many rows, channels and states as ``problem`` has.
+
+        Raises:
+            DesignError: Something is missing, or is not a finite number, or there are more or fewer; or a Q is not
+                symmetric: its inequality and its bounds would not be of the same ellipsoid.
+        """
+        _, n, d = problem.system.G.shape
+        shape = (len(output_rows(problem)), d + 1)
+        Q, contraction = _stored(report, "Q", (*shape, n, n)), _stored(report, "contraction", shape)
+        crooked = np.argwhere(np.swapaxes(Q, 2, 3) != Q)
+        if crooked.size:
+            row, channel = crooked[0, :2]
+            raise DesignError(f"star_norms.Q[{row}, {channel}]: expected a symmetric matrix")
+        return cls(Q, contraction)
+
+
+def _stored(report: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    expected = f"expected finite numbers of shape {shape}"
+    try:
+        values = np.array(report[name], float)
+    except (LookupError, TypeError, ValueError) as error:
+        raise DesignError(f"star_norms.{name}: {expected}") from error
+    if values.shape != shape:
+        raise DesignError(f"star_norms.{name}: shape {values.shape}, {expected}")
+    if not np.all(np.isfinite(values)):
+        raise DesignError(f"star_norms.{name}: {expected}")
+    return values
 
 
 def _level(Q: np.ndarray, v: np.ndarray) -> float:

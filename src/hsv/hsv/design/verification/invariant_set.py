@@ -59,11 +59,23 @@ def set_checks(subject: Subject) -> Iterable[Check]:
     residuals = vertex_residuals(found.problem, found.centre, found.Q, found.contraction, found.multipliers)
     yield required(above("invariance, smallest eigenvalue over the vertices", residuals.min(), 0.0))
     yield required(at_most("level of e = 0", float(found.level(np.zeros(len(found.Q)))), 1.0))
+    yield same(
+        "invariance, smallest eigenvalues as certified",
+        s["certificate"]["lmi_smallest_eigenvalues"],
+        residuals,
+        "eigenvalues",
+    )
+    declared = subject.certificate["inputs"]["invariant_set"]["method"] == "star_norms"
+    carried = found.star_norms is not None
+    yield Check("star norms", str(carried), str(declared), carried == declared)
     if found.star_norms:
         least = found.star_norms.residuals(found.problem, found.centre).min()
         yield required(above("invariance of the star norms, smallest eigenvalue", least, 0.0))
         start = found.star_norms.level_at_start(found.problem, found.centre)
         yield required(at_most("level of e = 0 in the star norms", start, 1.0))
+        kept = s["certificate"]["star_norms"]
+        evidence = (kept["smallest_eigenvalue"], kept["level_of_zero_error"])
+        yield same("star norms, evidence as certified", evidence, (least, start), "eigenvalues")
     kept = stored["tightening"]
     bounds = tighten(found, design.input_minimum, design.input_maximum, lag_feedback(kept))
     yield same("tightened bounds, lower", kept["lower"], bounds.lower, "tightened bounds")
@@ -84,10 +96,13 @@ def set_checks(subject: Subject) -> Iterable[Check]:
 def counter_example_checks(subject: Subject) -> Iterable[Check]:
     """Fly the sequences of disturbances that drive the error far: they show what the half-widths cannot be below."""
     stored = subject.certificate["tube"]["invariant_set"]
-    if "counter_examples" not in stored:
+    if "star_norms" not in stored:
         return
     found = certified_set(subject)
-    driven = counter_examples(found.problem).half_range
-    yield same("counter-examples", stored["counter_examples"]["half_range"], driven, "half-widths")
+    kept, driven = stored["counter_examples"], counter_examples(found.problem)
+    yield same("counter-examples", kept["half_range"], driven.half_range, "half-widths")
+    yield same("counter-examples, vertex", kept["vertex"], driven.vertex, "copied")
+    yield same("counter-examples, steps", kept["steps"], driven.steps, "copied")
     certified = np.concatenate((found.half_width[:N_RIGID], found.feedback))
-    yield required(at_most("counter-examples, largest share of a half-width", (driven / certified).max(), 1.0))
+    share = (driven.half_range / certified).max()
+    yield required(at_most("counter-examples, largest share of a half-width", share, 1.0))
