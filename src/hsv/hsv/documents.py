@@ -40,7 +40,7 @@ else:
 
 
 MOST_BYTES = 2**22
-"""Size of the largest text that is read; designs and certificates have less than a fiftieth of it."""
+"""Size of the largest text that is read; designs and certificates have less than a thirtieth of it."""
 
 MOST_LEVELS = 64
 """Tables and lists in each other."""
