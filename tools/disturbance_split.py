@@ -60,6 +60,17 @@ def slow_and_fast(subject: Subject, channels: list[int]) -> tuple[np.ndarray, np
     return half[0], half[1]
 
 
+def lost_by_the_plan(subject: Subject) -> float:
+    """Return the elevator, rad, that the nominal plan loses to the fault at most, inflated as W is.
+
+    It is what remains of this disturbance if the effectiveness belongs to the vertices, and what the feedback adds to
+    the plan is lost in the model. Effectiveness may change at any step there, too.
+    """
+    inputs = subject.inputs.disturbance
+    highest = subject.certificate["tube"]["tightening"]["plan"]["highest"][1]
+    return float(inputs.inflation * (1.0 - inputs.elevator_effectiveness) * highest)
+
+
 def main() -> None:
     """Print a table of the designs named, by default of :data:`DESIGNS`."""
     names = [channel.name for channel in CHANNELS]
@@ -71,6 +82,8 @@ def main() -> None:
         slow, fast = slow_and_fast(subject, split)
         shares = ", ".join(f"{w:.0%}" for w in fast / half[split])
         print(f"{name}: fast shares of {' and '.join(SPLIT)} are {shares} of the bounds")
+        of_plan = lost_by_the_plan(subject) / abs(problem.disturbance.lower[fault])
+        print(f"  the plan alone loses {of_plan:.0%} of the bound of the lost elevator")
         decay = np.exp(-subject.design.period / SLOW)
         for title, row, certified in (
             ("pitch angle", output_rows(problem)[PITCH_ANGLE], found.half_width[PITCH_ANGLE]),
@@ -79,6 +92,8 @@ def main() -> None:
             h = responses(problem, row)
             free = np.abs(h).sum(axis=1) * half
             sums = np.cumsum(h, axis=1)
+            vertices = free.copy()
+            vertices[:, fault] *= of_plan
             once = free.copy()
             ends = np.maximum(sums[:, :, fault].max(axis=1), 0.0) - np.minimum(sums[:, :, fault].min(axis=1), 0.0)
             once[:, fault] = ends * half[fault]
@@ -89,6 +104,7 @@ def main() -> None:
             numbers = {
                 "certified": certified,
                 "anything": free.sum(axis=1).max(),
+                "the fault at the vertices": vertices.sum(axis=1).max(),
                 "the fault once and for good": once.sum(axis=1).max(),
                 "and slow apart from fast": divided.sum(axis=1).max(),
                 "constant": held.sum(axis=1).max(),
