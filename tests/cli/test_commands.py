@@ -271,6 +271,7 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
         (("vehicles", "--show", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
         (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
         (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_active"),
+        (("simulate", "case1", "--units", "feet"), "Invalid value for '--units': 'feet' is not one of 'metric', 'si'"),
         (("simulate", "absent.toml"), "scenario 'absent.toml': cannot be read (No such file or directory)"),
         (("simulate", "case1", "--out", "absent/x.npz"), "out = 'absent/x.npz': cannot be written, expected a file"),
         (("design", "absent"), "design = 'absent': no such file, expected the path of a .toml file"),

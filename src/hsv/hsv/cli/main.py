@@ -175,7 +175,9 @@ def main() -> None:
 
 
 def _usage(error: Any) -> str:
-    return f"{error.format_message()} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)"
+    # Of a choice, typer reports the type of its own exception, too.
+    message = error.format_message().replace(": Value error, ", ": ")
+    return f"{message} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)"
 
 
 def _fail(problem: object, code: int) -> None:
