@@ -15,7 +15,7 @@ from scipy.signal import lfilter
 from hsv.control.design_file import find_design
 from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Region, incomplete_share, record
-from hsv.design.sets.invariant_set import TubeProblem
+from hsv.design.sets.counter_example import responses
 from hsv.design.sets.star_norms import output_rows
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.checks import Subject
@@ -29,18 +29,6 @@ SPLIT = ("angle_of_attack_rate", "pitch_acceleration")
 PITCH_ANGLE = STATE_NAMES.index("pitch_angle")
 SLOW = 2.0
 """Time constant, s, of the filter that divides what is slow from what is fast."""
-STEPS = 4000
-"""Steps of the responses, 80 s: the slowest pole is 0.2 rad/s."""
-
-
-def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
-    """Return (r, STEPS, d) what each disturbance, so many steps ago, moves the output by at each vertex."""
-    A, G = problem.system.A, problem.system.G
-    left, found = np.broadcast_to(row, (len(A), len(row))), []
-    for _ in range(STEPS):
-        found.append(np.einsum("in,ind->id", left, G))
-        left = np.einsum("in,inm->im", left, A)
-    return np.stack(found, axis=1)
 
 
 def slow_and_fast(subject: Subject, channels: list[int]) -> tuple[np.ndarray, np.ndarray]:
@@ -89,7 +77,7 @@ def main() -> None:
             ("pitch angle", output_rows(problem)[PITCH_ANGLE], found.half_width[PITCH_ANGLE]),
             ("elevator feedback", output_rows(problem)[N_RIGID + 1], found.feedback[1]),
         ):
-            h = responses(problem, row)
+            h = np.swapaxes(responses(problem, row), 0, 1)
             free = np.abs(h).sum(axis=1) * half
             sums = np.cumsum(h, axis=1)
             vertices = free.copy()

@@ -11,7 +11,7 @@ from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.design.sets.star_norm import star_norms
+from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.star_norms import StarNorms, output_rows
 from hsv.design.verification.checks import gathered
 from hsv.design.verification.invariant_set import certified_set, counter_example_checks, set_checks

@@ -21,7 +21,7 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.design.sets.modal import modal_box
 from hsv.design.sets.sampling import sample
-from hsv.design.sets.star_norm import star_norms
+from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem

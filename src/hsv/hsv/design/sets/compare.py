@@ -19,7 +19,7 @@ from hsv.design.sets.ellipsoid import ellipsoid
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem, mean_size
 from hsv.design.sets.modal import modal_box
-from hsv.design.sets.star_norm import star_norms
+from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import tighten
 from hsv.errors import DesignError

@@ -54,21 +54,30 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
     return CounterExamples(half_range, vertex, steps)
 
 
-def _driven(problem: TubeProblem, row: np.ndarray) -> tuple[float, int, int]:
-    A, G, disturbance = problem.system.A, problem.system.G, problem.disturbance
-    responses: list[np.ndarray] = []
+def responses(problem: TubeProblem, row: np.ndarray) -> np.ndarray:
+    """Return (steps, r, d) what each disturbance, so many steps ago, moves an output ``row`` (n) by at each vertex.
+
+    As many steps as count, all vertices stable.
+    """
+    A, G, half_width = problem.system.A, problem.system.G, problem.disturbance.half_width
+    found: list[np.ndarray] = []
     total, left = np.zeros(len(A)), np.broadcast_to(row, (len(A), len(row)))
-    while len(responses) < _LONGEST:
-        response = np.einsum("in,ind->id", left, G)
-        share = np.abs(response) @ disturbance.half_width
+    while len(found) < _LONGEST:
+        found.append(np.einsum("in,ind->id", left, G))
+        share = np.abs(found[-1]) @ half_width
         total += share
-        responses.append(response)
         left = np.einsum("in,inm->im", left, A)
         # The slow poles are real: what is left after a step falls no faster than it has.
-        if len(responses) % 100 == 0 and np.all(share <= _NEGLIGIBLE * total):
+        if len(found) % 100 == 0 and np.all(share <= _NEGLIGIBLE * total):
             break
-    vertex = int(np.argmax(total))
-    signs = np.sign(np.array(responses)[::-1, vertex])
+    return np.array(found)
+
+
+def _driven(problem: TubeProblem, row: np.ndarray) -> tuple[float, int, int]:
+    A, G, disturbance = problem.system.A, problem.system.G, problem.disturbance
+    found = responses(problem, row)
+    vertex = int(np.argmax(np.abs(found).sum(axis=0) @ disturbance.half_width))
+    signs = np.sign(found[::-1, vertex])
     ends = []
     for side in (1.0, -1.0):
         e = np.zeros(len(row))
