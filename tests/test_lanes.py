@@ -10,7 +10,19 @@ from numba.core.errors import TypingError
 
 from hsv import lanes
 from hsv.elementary import exponential, sine_cosine
-from hsv.lanes import WIDTH, LaneArray, LaneRecord, choose, every, lane, least, most, with_lane
+from hsv.lanes import (
+    WIDTH,
+    LaneArray,
+    LaneRecord,
+    choose,
+    every,
+    lane,
+    lane_numbers,
+    least,
+    most,
+    weighted_sum,
+    with_lane,
+)
 
 VALUES = [0.0, -0.0, 1.0, -3.5, 0.1, 0.7, -0.8, 30.0, 1e-310, 1e308, -709.0, 701.0, math.inf, -math.inf, math.nan]
 
@@ -87,7 +99,7 @@ def test_a_condition_of_all_lanes_and_the_ends_of_a_value():
         out[0, 1], out[0, 2] = least(x[0]), most(x[0])
         out[1, 1] = lane(x[0], 2)
         out[1, 2] = lane(with_lane(x[0], 1, 99.0), 1)
-        lane(x, 3)[0] = -7.0
+        lane_numbers(x, 3)[0] = -7.0
 
     x = LaneArray(np.arange(float(WIDTH))[None].copy())
     out = np.zeros((2, 3))
@@ -139,3 +151,30 @@ def test_lanes_do_not_decide_a_branch():
 def test_of_a_number_the_functions_are_what_they_say():
     assert every(True) and choose(False, 1, 2) == 2 and least(3.0) == most(3.0) == lane(3.0, 0) == 3.0
     assert lanes.lanes_in(1.0) == 1 and with_lane(1.0, 0, 2.0) == 2.0 and lanes.power_of_two(-3.0) == 0.125
+
+
+@njit
+def _sum(weights, rows, total):
+    weighted_sum(weights, rows, total)
+
+
+@pytest.mark.parametrize("blocks", [0, 1, 3])
+def test_a_weighted_sum_has_the_bits_of_sums_in_the_order_of_the_rows(blocks):
+    drawn = np.random.default_rng(5)
+    rows = drawn.standard_normal((7, blocks * WIDTH)) * 10.0 ** drawn.integers(-9, 9, (7, blocks * WIDTH))
+    weights = drawn.standard_normal((7, WIDTH))
+    rows[:, :1], weights[:, 0] = -0.0, 1.0  # the sum of zeros below zero is zero
+    expected = np.empty((rows.shape[1], WIDTH))
+    for flight in range(WIDTH):
+        lanes.weighted_sum(weights[:, flight], rows, expected[:, flight])
+        alone = np.empty(rows.shape[1])
+        _sum(np.ascontiguousarray(weights[:, flight]), rows, alone)
+        assert alone.tobytes() == expected[:, flight].tobytes()
+    together = LaneArray.zeros(rows.shape[1])
+    _sum(LaneArray(weights), rows, together)
+    assert together.array.tobytes() == expected.tobytes()
+
+
+def test_an_array_of_lanes_is_no_number():
+    with pytest.raises(TypingError):
+        njit(lambda x: lane(x, 0))(LaneArray.zeros(1))

@@ -20,7 +20,17 @@ SOURCES = Path(hsv.__file__).parent
 EXACT = {"floor", "ceil", "rint", "trunc", "fabs", "fmod", "sqrt", "memcpy", "memmove", "memset"}
 """Functions of the C library whose result IEEE 754 or their purpose leaves no choice about."""
 
-PYTHON = ("NRT_", "Py", "_Py", "numba_gil_", "numba_unpickle", "numba_do_raise", "numba_runtime_", "numba_complex_")
+PYTHON = (
+    "NRT_",
+    "Py",
+    "_Py",
+    "numba_adapt_ndarray",
+    "numba_gil_",
+    "numba_unpickle",
+    "numba_do_raise",
+    "numba_runtime_",
+    "numba_complex_",
+)
 """Beginnings of the names by which compiled functions take arguments from Python, raise its errors, get memory."""
 
 ON_THE_PATH = (
@@ -121,6 +131,7 @@ EXEMPT = {
     "simulation/fingerprint.py": "a digest",
     "documents.py": "reads files",
     "threads.py": "runs flights in threads",
+    "compiled.py": "says how functions are compiled",
     "control/design_file.py": "the same",
     "control/design_parameters.py": "takes arrays from files as they are",
     "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",

@@ -16,8 +16,8 @@ from math import factorial
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.lanes import choose, every, lane, lanes_in, power_of_two, with_lane
 
 ANGLE_RANGE = 1e5
@@ -60,7 +60,7 @@ _ARCTANGENT = tuple((-1) ** k / (2 * k + 1) for k in range(1, 23))
 _ARCSINE = tuple(factorial(2 * k) / (4**k * factorial(k) * factorial(k) * (2 * k + 1)) for k in range(1, 26))
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _two_sum(a: float, b: float) -> tuple[float, float]:
     """Return a + b as its rounded value and the rounding error (Knuth)."""
     total = a + b
@@ -68,7 +68,7 @@ def _two_sum(a: float, b: float) -> tuple[float, float]:
     return total, (a - (total - shadow)) + (b - shadow)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _two_product(a: float, b: float) -> tuple[float, float]:
     """Return a b as its rounded value and the rounding error (Dekker 1971)."""
     product = a * b
@@ -81,7 +81,7 @@ def _two_product(a: float, b: float) -> tuple[float, float]:
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _quotient(high: float, low: float, by_high: float, by_low: float) -> tuple[float, float]:
     """Return (high + low) / (by_high + by_low) as the sum of two numbers."""
     quotient = high / by_high
@@ -89,7 +89,7 @@ def _quotient(high: float, low: float, by_high: float, by_low: float) -> tuple[f
     return quotient, (((high - product) - error) + low - quotient * by_low) / by_high
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _polynomial(coefficients: Any, z: float) -> float:
     total = 0.0
     for k in range(len(coefficients) - 1, -1, -1):
@@ -97,7 +97,7 @@ def _polynomial(coefficients: Any, z: float) -> float:
     return total
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _reduced(x: float) -> tuple[int, float, float]:
     """Return n and y as the sum of two numbers, with x = n pi / 2 + y and |y| at most about pi / 4."""
     whole = (x * _TWO_OVER_PI + _TO_WHOLE) - _TO_WHOLE
@@ -107,7 +107,7 @@ def _reduced(x: float) -> tuple[int, float, float]:
     return int(whole), y, (high - y) + low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _sine_terms(y: float) -> tuple[float, float]:
     """Return sin y, |y| at most pi / 4, as the sum of y and another number; the series is summed in pairs."""
     z = y * y
@@ -117,7 +117,7 @@ def _sine_terms(y: float) -> tuple[float, float]:
     return y, z * y * series
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _cosine_terms(y: float) -> tuple[float, float]:
     """Return cos y, |y| at most pi / 4, as the sum of 1 - y^2 / 2 and another number."""
     z = y * y
@@ -129,7 +129,7 @@ def _cosine_terms(y: float) -> tuple[float, float]:
     return high, ((1.0 - high) - half) + w * series
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _turned_terms(x: float) -> tuple[float, float, float, float]:
     """Return sin x and cos x, each as the sum of two numbers, for any |x| up to 1e5."""
     turns, y, rest = _reduced(x)
@@ -144,7 +144,7 @@ def _turned_terms(x: float) -> tuple[float, float, float, float]:
     return s, s_low, c, c_low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _any_sine_cosine(x: float) -> tuple[float, float]:
     if not abs(x) <= ANGLE_RANGE:
         return np.nan, np.nan
@@ -152,14 +152,14 @@ def _any_sine_cosine(x: float) -> tuple[float, float]:
     return s + s_low, c + c_low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _small_sine_cosine(x: float) -> tuple[float, float]:
     s, s_low = _sine_terms(x)
     c, c_low = _cosine_terms(x)
     return s + s_low, c + c_low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _lane_by_lane(x: Any) -> Any:
     sin, cos = x, x
     for i in range(lanes_in(x)):
@@ -169,7 +169,7 @@ def _lane_by_lane(x: Any) -> Any:
     return sin, cos
 
 
-@njit(cache=True)
+@njit_in_flight()
 def sine_cosine(x: Any) -> Any:
     """Return the sine and the cosine of ``x`` (rad), real with |x| up to 1e5, or complex as the module says."""
     a = x.real
@@ -183,19 +183,19 @@ def sine_cosine(x: Any) -> Any:
     return sin + cos * step, cos - sin * step
 
 
-@njit(cache=True)
+@njit_in_flight()
 def sine(x: float) -> float:
     """Return the sine of ``x`` (rad), real, up to 1e5 in magnitude."""
     return sine_cosine(x)[0]
 
 
-@njit(cache=True)
+@njit_in_flight()
 def cosine(x: float) -> float:
     """Return the cosine of ``x`` (rad), real, up to 1e5 in magnitude."""
     return sine_cosine(x)[1]
 
 
-@njit(cache=True)
+@njit_in_flight()
 def tangent(x: float) -> float:
     """Return the tangent of ``x`` (rad), real, up to 1e5 in magnitude."""
     if not abs(x) <= ANGLE_RANGE:
@@ -207,7 +207,7 @@ def tangent(x: float) -> float:
     return high + low
 
 
-@njit(cache=True)
+@njit_in_flight()
 def arcsine(x: float) -> float:
     """Return the angle (rad) from -pi / 2 to pi / 2 whose sine is ``x``, from -1 to 1."""
     a = abs(x)
@@ -228,7 +228,7 @@ def arcsine(x: float) -> float:
     return -angle if x < 0.0 else angle
 
 
-@njit(cache=True)
+@njit_in_flight()
 def arctangent2(y: float, x: float) -> float:
     """Return the angle (rad) from -pi to pi of the point (``x``, ``y``); each zero or of magnitude 1e-140 to 1e140.
 
@@ -262,7 +262,7 @@ def arctangent2(y: float, x: float) -> float:
     return -angle if y < 0.0 else angle
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _exponential(x: Any) -> Any:
     whole = (x * _LOG_2_INVERSE + _TO_WHOLE) - _TO_WHOLE
     high, low = x - whole * _LOG_2_HIGH, whole * _LOG_2_LOW
@@ -276,7 +276,7 @@ def _exponential(x: Any) -> Any:
     return (1.0 + (r + (z * series + rest))) * power_of_two(whole)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def exponential(x: Any) -> Any:
     """Return e to the power ``x``, real with |x| up to 700, or complex as the module says."""
     a = x.real
@@ -285,7 +285,7 @@ def exponential(x: Any) -> Any:
     return value * (1.0 + (x - a))  # the last factor is one where x is real
 
 
-@njit(cache=True)
+@njit_in_flight()
 def logarithm(x: float) -> float:
     """Return the natural logarithm of ``x``, a normal positive number."""
     if not np.finfo(np.float64).tiny <= x <= np.finfo(np.float64).max:

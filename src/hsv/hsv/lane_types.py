@@ -43,9 +43,9 @@ class LaneArray:
         self.stride = array.strides[0] // array.itemsize if split else 1
 
     @classmethod
-    def zeros(cls, *shape: int) -> LaneArray:
+    def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
         """Return :data:`WIDTH` lanes of zeros."""
-        return cls(np.zeros((*shape, WIDTH)))
+        return cls(np.zeros((*((shape,) if isinstance(shape, int) else shape), WIDTH)))
 
     @classmethod
     def of(cls, arrays: Sequence[np.ndarray]) -> LaneArray:
@@ -462,9 +462,41 @@ def with_lane(typing_context: Any, value: Any, index: Any, number: Any) -> Any:
     return value(value, types.intp, types.float64), generate
 
 
+def _beginning(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
+    """Return the address of :data:`WIDTH` numbers of a contiguous array, from the flat index ``start`` on."""
+    data = builder.gep(context.make_array(kind)(context, builder, array).data, [start])
+    return builder.bitcast(data, _vector(_DOUBLE, WIDTH).as_pointer())
+
+
+@_intrinsic
+def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
+    """Return :data:`WIDTH` numbers of a contiguous array of float64 as lanes, from the flat index ``start`` on."""
+
+    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
+        load = builder.load(_beginning(context, builder, called.args[0], *arguments))
+        load.align = 8
+        return load
+
+    return LanesType(WIDTH)(array, types.intp), generate
+
+
+@_intrinsic
+def write_neighbours(typing_context: Any, array: Any, start: Any, value: Any) -> Any:
+    """Write lanes to :data:`WIDTH` numbers of a contiguous array of float64, from the flat index ``start`` on."""
+
+    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
+        given, place, lanes = arguments
+        builder.store(lanes, _beginning(context, builder, called.args[0], given, place)).align = 8
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, LanesType(WIDTH)), generate
+
+
 @_intrinsic
 def lane_numbers(typing_context: Any, array: Any, index: Any) -> Any:
-    """Return one lane of a :class:`LaneArray` of one axis as an array of numbers, in place."""
+    """Return one lane of a :class:`LaneArray` of one axis as an array of numbers, in place; of an array itself."""
+    if isinstance(array, types.Array):
+        return array(array, types.intp), lambda context, builder, called, arguments: arguments[0]
     view = types.Array(types.float64, 1, "A")
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
+from hsv.compiled import njit_in_flight
 from hsv.lane_types import (
     WIDTH,
     LaneArray,
@@ -25,9 +25,11 @@ from hsv.lane_types import (
     MaskType,
     all_of,
     lane_numbers,
+    neighbours,
     one_lane,
     powers_of_two,
     select,
+    write_neighbours,
 )
 from hsv.lane_types import with_lane as inserted
 
@@ -38,11 +40,12 @@ __all__ = [
     "choose",
     "every",
     "lane",
+    "lane_numbers",
     "lanes_in",
     "least",
     "most",
     "power_of_two",
-    "room",
+    "weighted_sum",
     "with_lane",
 ]
 
@@ -83,7 +86,7 @@ def _lanes_in(value: Any) -> Any:
 
 
 def lane(value: Any, index: int) -> Any:
-    """Return what ``value``, a number, a condition or an array of one axis, is in a lane."""
+    """Return what ``value``, a number or a condition, is in a lane."""
     return value
 
 
@@ -91,9 +94,7 @@ def lane(value: Any, index: int) -> Any:
 def _lane_of(value: Any, index: Any) -> Any:
     if isinstance(value, LanesType | MaskType):
         return lambda value, index: one_lane(value, index)
-    if isinstance(value, LaneArrayType):
-        return lambda value, index: lane_numbers(value, index)
-    return lambda value, index: value
+    return None if isinstance(value, LaneArrayType) else lambda value, index: value
 
 
 def least(value: Any) -> Any:
@@ -139,19 +140,47 @@ def _with(value: Any, index: Any, number: Any) -> Any:
     return lambda value, index, number: number
 
 
-def room(given: LaneArray | None, size: int) -> Any:
-    """Return ``given``, or, where none is, a new array of so many zeros."""
-    return np.zeros(size) if given is None else given
+def weighted_sum(weights: Any, rows: Any, total: Any) -> None:
+    """Write into ``total`` (e) the sum of the ``rows`` (r, e) by their ``weights`` (r), added in their order.
+
+    ``rows`` are contiguous, and e is a multiple of :data:`WIDTH`: of numbers as many neighbours are computed at once.
+    """
+    for e in range(rows.shape[1]):
+        total[e] = 0.0
+        for r in range(len(rows)):
+            total[e] += weights[r] * rows[r, e]
 
 
-@overload(room, strict=False)
-def _room(given: Any, size: Any) -> Any:
-    if isinstance(given, LaneArrayType):
-        return lambda given, size: given
-    return lambda given, size: np.zeros(size)
+@overload(weighted_sum)
+def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
+    if not isinstance(total, LaneArrayType):
+
+        def of_numbers(weights: Any, rows: Any, total: Any) -> None:
+            size = rows.shape[1]
+            for e in range(0, size, WIDTH):
+                some = 0.0
+                for r in range(len(rows)):
+                    some += weights[r] * neighbours(rows, r * size + e)
+                write_neighbours(total, e, some)
+
+        return of_numbers
+
+    def of_lanes(weights: Any, rows: Any, total: Any) -> None:
+        # Four sums at a time: an addition waits for the one before it in its sum.
+        for e in range(0, rows.shape[1], 4):
+            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+            for r in range(len(rows)):
+                weight = weights[r]
+                a += weight * rows[r, e]
+                b += weight * rows[r, e + 1]
+                c += weight * rows[r, e + 2]
+                d += weight * rows[r, e + 3]
+            total[e], total[e + 1], total[e + 2], total[e + 3] = a, b, c, d
+
+    return of_lanes
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _power_of_two(whole: float) -> float:
     return np.int64((int(whole) + 1023) << 52).view(np.float64)
 

@@ -19,8 +19,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 
+from hsv.compiled import njit_in_flight
 from hsv.errors import ParameterError
 from hsv.noise import STREAMS, uniforms
 from hsv.parameters import Parameter, check_all
@@ -143,7 +144,7 @@ def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> n
     return state
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def _begin(state: np.ndarray, payload: np.ndarray) -> None:
     """Fill a link with one ``payload``."""
     n = len(payload)
@@ -153,7 +154,7 @@ def _begin(state: np.ndarray, payload: np.ndarray) -> None:
     state[BEGUN] = 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def receive(link: Any, state: np.ndarray, step: int, seed: int, payload: np.ndarray) -> None:
     """Replace the ``payload`` (n) that is sent in ``step`` by the one that the receiver then has.
 
@@ -194,7 +195,7 @@ def receive(link: Any, state: np.ndarray, step: int, seed: int, payload: np.ndar
         payload[i] = state[GIVEN + i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def _passes(link: Any, state: np.ndarray, come: int, n: int, step: int, seed: int) -> bool:
     """Corrupt the payload at ``come``, if that is drawn; tell whether the receiver takes it."""
     drawn, place = uniforms(seed, step, _CORRUPTION + link.channel)

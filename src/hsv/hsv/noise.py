@@ -14,8 +14,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit, uint64
+from numba import uint64
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import logarithm, sine_cosine
 from hsv.parameters import Parameter
 
@@ -55,7 +56,7 @@ LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
 """No normal number is larger: Box and Muller take the logarithm of 2^-53 at least. 8.57."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def _product(a: Any, b: Any) -> Any:
     """Return the high and the low word of the product of two unsigned words of 64 bits."""
     half, shift = uint64(_HALF_WORD), uint64(32)
@@ -67,7 +68,7 @@ def _product(a: Any, b: Any) -> Any:
     return a_high * b_high + (middle >> shift) + (other >> shift), a * b
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def philox(c_0: Any, c_1: Any, c_2: Any, c_3: Any, k_0: Any, k_1: Any) -> Any:
     """Return the four words of the counter (``c_0`` ... ``c_3``) under the key (``k_0``, ``k_1``), all uint64."""
     a, b, c, d = uint64(c_0), uint64(c_1), uint64(c_2), uint64(c_3)
@@ -81,14 +82,14 @@ def philox(c_0: Any, c_1: Any, c_2: Any, c_3: Any, k_0: Any, k_1: Any) -> Any:
     return a, b, c, d
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def uniforms(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
     """Return two independent numbers, each uniform on the multiples of 2^-53 in [0, 1)."""
     a, b, _, _ = philox(step, stream, draw, 0, seed, 0)
     return (a >> uint64(11)) * _TO_UNIT, (b >> uint64(11)) * _TO_UNIT
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def normals(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
     """Return two independent standard normal numbers (Box and Muller 1958), at most 8.6 in magnitude."""
     first, second = uniforms(seed, step, stream, draw)

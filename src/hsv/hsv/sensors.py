@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import exponential
 from hsv.errors import ParameterError
 from hsv.faults.laws import ACTING, CHANNEL, CODE, KEPT, ONSET, PARAMETER, START, begin_faults
@@ -232,7 +232,7 @@ def sensor_state() -> np.ndarray:
     return np.zeros((N_STATES, SENSOR_STATE))
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def measure(
     data: Any,
     state: np.ndarray,
@@ -277,7 +277,7 @@ def measure(
         state[i, GIVEN] = measurement[i]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _error(data: Any, state: np.ndarray, i: int, step: int, seed: int) -> float:
     """Return bias and noise of a step; draw what is drawn once in step 0."""
     if step == 0:
@@ -303,7 +303,7 @@ def _error(data: Any, state: np.ndarray, i: int, step: int, seed: int) -> float:
     return error + state[i, WALK]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: float, error: float) -> float:
     """Return the measurement of a sensor that works."""
     true = (1.0 + state[i, SCALE]) * x
@@ -326,7 +326,7 @@ def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: floa
     return state[i, HELD]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _failed(rows: Any, memory: np.ndarray, j: int, step: int, seed: int, value: float, given: float) -> float:
     """Return what becomes of a measurement; ``given`` is the one of the step before."""
     code, first = int(rows.table[j, CODE]), rows.table[j, PARAMETER]

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import filter_step, rest
 from hsv.control.tube_law import TubeLaw
@@ -20,7 +20,7 @@ from hsv.simulation.side_by_side import FlightsSideBySide
 from hsv.vehicle.dynamics import PITCH_RATE
 
 
-@njit(cache=True, nogil=True)
+@njit_in_flight(nogil=True)
 def _worst(
     notch: Any,
     shape: np.ndarray,

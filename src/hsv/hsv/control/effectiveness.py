@@ -26,8 +26,8 @@ from enum import IntEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.effectiveness_parameters import EFFECTIVENESS_ENABLED, EFFECTIVENESS_PARAMETERS
 from hsv.lanes import choose
 from hsv.parameters import check_all
@@ -174,7 +174,7 @@ def effectiveness_in(memory: np.ndarray) -> Effectiveness:
     return Effectiveness(float(row[_ESTIMATE]), float(row[_LOW]), float(row[_HIGH]), mode)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _begin(data: Any, memory: Any) -> None:
     for i in range(N_STATES):
         memory[_BEFORE, i] = data.start[i]
@@ -183,7 +183,7 @@ def _begin(data: Any, memory: Any) -> None:
         memory[_KNOWN, column] = 1.0
 
 
-@njit(cache=True)
+@njit_in_flight()
 def effectiveness_bounds(data: Any, y: Any, e: Any, turn: Any, disturbance: Any, effect: Any) -> Any:
     """Return the interval of P that a step leaves, before it is cut to the range of P, and that of an offset (rad/s).
 
@@ -206,24 +206,24 @@ def effectiveness_bounds(data: Any, y: Any, e: Any, turn: Any, disturbance: Any,
     return min(strong, weak) - reach, max(strong, weak) + reach, offset - wide, offset + wide
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _limited(value: Any, most: Any) -> Any:
     return min(max(value, -most), most)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _kept(holds: Any, low: Any, high: Any) -> Any:
     """Return the interval where it ``holds``, elsewhere an empty one, which no widening brings back."""
     return choose(holds, low, _EMPTY_LOW), choose(holds, high, _EMPTY_HIGH)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _in_range(data: Any, low: Any, high: Any) -> Any:
     """Return an interval cut to the range of P, below which it is no loss that a division could make up for."""
     return _kept(high >= data.least, min(max(low, data.least), 1.0), min(high, 1.0))
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _mode_after(mode: Any, loss: Any, whole: Any, sound: Any, waiting: Any) -> Any:
     """Return the mode after a step.
 
@@ -238,12 +238,12 @@ def _mode_after(mode: Any, loss: Any, whole: Any, sound: Any, waiting: Any) -> A
     return choose((mode == _HEALTHY) & sound, _HEALTHY, choose(waiting, _PENDING, explained))
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _store(known: Any, usable: Any, column: int, value: Any) -> None:
     known[column] = choose(usable, value, known[column])
 
 
-@njit(cache=True)
+@njit_in_flight()
 def _judge(data: Any, known: Any, usable: Any, first: bool, y: Any, e: Any, turn: Any) -> None:
     """Bring the row ``known`` (9) of the memory up to what a step says, where it is ``usable``."""
     mode = known[_MODE]
@@ -292,7 +292,7 @@ def _judge(data: Any, known: Any, usable: Any, first: bool, y: Any, e: Any, turn
     _store(known, usable, _COUNT, count)
 
 
-@njit(cache=True)
+@njit_in_flight()
 def effectiveness_step(data: Any, memory: Any, step: int, x: Any) -> Any:
     """Return the effectiveness by which the elevator command of ``step`` is divided, 1 where there is no estimator.
 
@@ -341,7 +341,7 @@ def effectiveness_step(data: Any, memory: Any, step: int, x: Any) -> Any:
     return memory[_KNOWN, _ESTIMATE]
 
 
-@njit(cache=True)
+@njit_in_flight()
 def effectiveness_hold(data: Any, memory: Any, u: Any) -> None:
     """Keep the commanded input ``u`` (2) of a step for the next one; without an estimator nothing is done."""
     if data is None:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.estimator_parameters import (
     ESTIMATOR_ENABLED,
     ESTIMATOR_PARAMETERS,
@@ -186,7 +187,7 @@ def steady_gain(
     return gain, _MOST_ITERATIONS
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def estimate_step(
     data: Any,
     state: np.ndarray,

@@ -336,7 +336,7 @@ def _plan(nominal: Any, reference: Any, first: int, start: np.ndarray, plan: np.
     """
     n, m = deviation.shape[1], plan.shape[1]
     x_n, u_n, defect = start.copy(), np.empty(m), np.empty(n)
-    weights, S, new = np.empty(len(nominal.polytope.S)), np.empty(n * (n + m)), np.empty(n)
+    weights, S, new = np.empty(len(nominal.polytope.S)), np.empty(nominal.polytope.S.shape[1]), np.empty(n)
     last = len(reference.state) - 1
     held = True
     for k in range(len(plan)):

@@ -7,8 +7,8 @@ from enum import IntFlag
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.lanes import choose, every, lanes_in, least, most
 from hsv.lpv.polytope import PolytopeData
 
@@ -67,7 +67,7 @@ class NominalLaw(Protocol):
         """Return the nominal input for x_n (9), ``deviation``."""
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def level(ellipsoid: np.ndarray, x: Any) -> Any:
     """Return x' P x over the first states, as many as P (s, s) has rows."""
     total = 0.0
@@ -79,7 +79,7 @@ def level(ellipsoid: np.ndarray, x: Any) -> Any:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def nominal_input(data: Any, deviation: Any, u_n: Any) -> Any:
     """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one.
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.errors import ParameterError
-from hsv.lpv.polytope import AxisWeights, PolytopeData, schedule
+from hsv.lanes import weighted_sum
+from hsv.lpv.polytope import AxisWeights, PolytopeData, vertex_weights
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.actuators import ACTUATOR_PARAMETERS
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
@@ -28,7 +29,7 @@ NOMINAL_PARAMETERS = (
 )
 
 
-@njit(cache=True)
+@njit_in_flight()
 def nominal_advance(
     polytope: Any,
     altitude: Any,
@@ -43,17 +44,18 @@ def nominal_advance(
     """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20, eq. 46), p the measured h and V.
 
     ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``weights`` (r),
-    ``S`` (n (n + m)) and ``new`` (n) are scratch. Returns whether p lay inside the envelope.
+    ``S`` (e) and ``new`` (n) are scratch. Returns whether p lay inside the envelope.
     """
-    inside = schedule(polytope, altitude, velocity, weights, S)
+    inside = vertex_weights(polytope, altitude, velocity, weights)
+    weighted_sum(weights, polytope.S, S)
     n, m = len(deviation), len(u_n)
+    entries, starts = polytope.entries, polytope.starts
     for i in range(n):
-        row = i * (n + m)
         total = 0.0
-        for j in range(n):
-            total += S[row + j] * deviation[j]
-        for j in range(m):
-            total += S[row + n + j] * u_n[j]
+        for e in range(starts[2 * i], starts[2 * i + 1]):
+            total += S[e] * deviation[entries[e] - i * (n + m)]
+        for e in range(starts[2 * i + 1], starts[2 * i + 2]):
+            total += S[e] * u_n[entries[e] - i * (n + m) - n]
         new[i] = total + defect[i]
     for i in range(n):
         deviation[i] = new[i]
@@ -91,9 +93,9 @@ class NominalTrajectory:
         self.reference = reference
         self.data = nominal_data(design) if design else NO_NOMINAL
         self.law = law or FamilyLaw(self.data)
-        n, m = N_STATES, N_INPUTS
-        self._deviation = np.zeros(n)
-        self._scratch = np.empty(len(self.data.polytope.S)), np.empty(n * (n + m)), np.empty(n)
+        self._deviation = np.zeros(N_STATES)
+        vertices, entries = self.data.polytope.S.shape
+        self._scratch = np.empty(vertices), np.empty(entries), np.empty(N_STATES)
         self._step = 0
         self._planned = reference
         # Compile now: a cold cache must not stall a flight.
@@ -172,7 +174,7 @@ class NominalTrajectory:
 _FLAT = AxisWeights(np.array([0.0, 1.0]), np.zeros((4, 1, 0)))
 
 NO_NOMINAL = NominalData(
-    PolytopeData(np.zeros((0, N_STATES * (N_STATES + N_INPUTS))), np.zeros(0, np.int64), _FLAT, _FLAT),
+    PolytopeData(np.zeros((0, 0)), np.zeros(0, np.int64), np.zeros(2 * N_STATES + 1, np.int64), _FLAT, _FLAT),
     np.zeros((0, N_INPUTS, N_STATES)),
     np.zeros((0, N_RIGID, N_RIGID)),
     False,

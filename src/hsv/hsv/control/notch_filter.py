@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.estimator import Estimator
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.elementary import tangent
@@ -171,7 +171,7 @@ def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     return A, B, C, D
 
 
-@njit(cache=True)
+@njit_in_flight()
 def rest(data: Any, value: Any, state: Any) -> None:
     """Write into ``state`` (2 n) the equilibrium of all sections for a constant input ``value``."""
     for i in range(len(data.D)):
@@ -179,7 +179,7 @@ def rest(data: Any, value: Any, state: Any) -> None:
         state[2 * i + 1] = data.G[i, 1] * value
 
 
-@njit(cache=True)
+@njit_in_flight()
 def filter_step(data: Any, state: Any, value: Any) -> Any:
     """Return the filtered ``value`` from ``state`` (2 n), then update ``state``: y = C s + D v, s = A s + B v."""
     for i in range(len(data.D)):

@@ -15,8 +15,8 @@ from enum import IntEnum
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
@@ -114,8 +114,8 @@ def no_tube(vehicle: VehicleParameters) -> TubeData:
 
 
 def memory_of(data: TubeData) -> np.ndarray:
-    """Return the room of :func:`tube_step`: s_n (2 s) of the plan's filter, integral (2), scratch for the error (9)."""
-    return np.zeros(2 * len(data.notch.D) + _N_INTEGRATED + N_STATES)
+    """Return the room of :func:`tube_step`: s_n (2 s) of the plan's filter, integral (2)."""
+    return np.zeros(2 * len(data.notch.D) + _N_INTEGRATED)
 
 
 def watch_of(data: TubeData) -> np.ndarray:
@@ -123,7 +123,7 @@ def watch_of(data: TubeData) -> np.ndarray:
     return np.zeros(effectiveness_shape(data.effectiveness))
 
 
-@njit(cache=True)
+@njit_in_flight()
 def active_gain(data: Any, step: int) -> int:
     """Return the index of the gain that holds in ``step``."""
     index = 0
@@ -133,7 +133,7 @@ def active_gain(data: Any, step: int) -> int:
 
 
 # Inlined where it is called: the arrays of a call cost as much as its arithmetic.
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def tube_step(
     data: Any,
     memory: Any,
@@ -171,16 +171,14 @@ def tube_step(
         planned_rate = filter_step(data.notch, memory, x_r[PITCH_RATE] + x_n[PITCH_RATE])
         if data.filtered:
             pitch_rate_error = q_f - planned_rate
-    errors = size + _N_INTEGRATED
-    for j in range(len(x)):
-        memory[errors + j] = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
-    memory[errors + PITCH_RATE] = pitch_rate_error
     effectiveness = effectiveness_step(data.effectiveness, watch, step, x)
     limited = False
     for i in range(len(u)):
         feedback, integral = 0.0, 0.0
+        # The error is computed once for each input: kept in an array, it would have to be read back from there.
         for j in range(len(x)):
-            feedback += data.gains[active, i, j] * memory[errors + j]
+            error = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
+            feedback += data.gains[active, i, j] * (pitch_rate_error if j == PITCH_RATE else error)
         u_plan = u_n[i] if data.planned else 0.0
         if data.integral_rate > 0.0:
             for j in range(_N_INTEGRATED):

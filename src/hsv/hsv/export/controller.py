@@ -58,7 +58,7 @@ def controller_source(design: ControlDesign, notch: Sequence[NotchSection] = ())
         "altitude_weights": polytope.altitude.coefficients,
         "velocity_breakpoints": polytope.velocity.breakpoints,
         "velocity_weights": polytope.velocity.coefficients,
-        "vertices": polytope.S.reshape(-1, N_STATES, N_STATES + N_INPUTS),
+        "vertices": np.concatenate((design.polytope.A, design.polytope.B), axis=2),
         "nominal_gains": design.nominal_gains,
         "nominal_ellipsoids": design.nominal_ellipsoids,
         "feedback_gain": design.feedback_gain,

@@ -10,8 +10,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import sine
 from hsv.faults.laws import ACTING, CHANNEL, CODE, KEPT, ONSET, PARAMETER, START, begin_faults
 from hsv.faults.table import (
@@ -34,7 +34,7 @@ from hsv.vehicle.integration import advance
 _TWO_PI = 6.283185307179586
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def move_effectors(
     data: Any,
     state: np.ndarray,
@@ -112,7 +112,7 @@ def move_effectors(
         effector[channel] = position
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _deflected(rows: Any, memory: np.ndarray, i: int, step: int, middle: float, alpha: float, position: float) -> float:
     """Return what the effector does, ``position`` without this fault, ``middle`` s after the beginning of ``step``."""
     code = int(rows.table[i, CODE])
@@ -140,7 +140,7 @@ def _deflected(rows: Any, memory: np.ndarray, i: int, step: int, middle: float, 
     return position
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def advance_equipped(
     x: Any,
     command: np.ndarray,

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.faults.table import (
     BACKLASH,
     DEAD_ZONE,
@@ -131,7 +131,7 @@ def _identity(rows: FaultRows, i: int) -> tuple[Any, ...]:
     return tuple(value for column, value in enumerate(rows.table[i].tolist()) if column != STOP)
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
     """Note in ``memory`` (n, :data:`MEMORY`) which ``rows`` act in ``step``; return how many do."""
     acting = 0
@@ -161,7 +161,7 @@ def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
     return acting
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def apply_command_faults(
     rows: Any, memory: np.ndarray, step: int, seed: int, command: np.ndarray, actuator: np.ndarray
 ) -> None:
@@ -179,7 +179,7 @@ def apply_command_faults(
             actuator[channel] = _commanded(rows, memory, i, step, actuator[channel])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _commanded(rows: Any, memory: np.ndarray, i: int, step: int, command: float) -> float:
     code, value = int(rows.table[i, CODE]), rows.table[i, PARAMETER]
     fresh = memory[i, ONSET] == step
@@ -210,7 +210,7 @@ def _commanded(rows: Any, memory: np.ndarray, i: int, step: int, command: float)
     return command
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def apply_engine_faults(
     rows: Any,
     memory: np.ndarray,
@@ -250,7 +250,7 @@ def apply_engine_faults(
                 engine[3] = rows.table[i, PARAMETER + 3] + rows.table[i, PARAMETER + 4] * angle_of_attack
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _unstarted(rows: Any, memory: np.ndarray, i: int, step: int, alpha: float, mach: float, fuel: float) -> bool:
     """Tell whether the inlet is unstarted; KEPT says that it was, SINCE from which step on."""
     if memory[i, ONSET] == step:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elimination import solve
 from hsv.errors import DesignError
-from hsv.lanes import choose, lanes_in, least, most
+from hsv.lanes import WIDTH, choose, lanes_in, least, most
 
 INTERPOLATIONS = ("linear", "cubic")
 
@@ -95,13 +95,16 @@ def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
 
 
 class PolytopeData(NamedTuple):
-    """A polytopic model as compiled functions take it: ``S`` (r, n * (n + m)) holds [A_i, B_i] row by row.
+    """A polytopic model as compiled functions take it.
 
-    ``entries``: those that are not zero in all vertices.
+    ``S`` (r, e) holds what is not zero in all vertices of [A_i, B_i] row by row, then zeros up to a multiple of
+    :data:`hsv.lanes.WIDTH`. ``entries``: the places of these numbers in the flattened [A_i, B_i] (n (n + m)).
+    ``starts`` (2 n + 1): where those of the rows of A and of B begin, in turn.
     """
 
     S: np.ndarray
     entries: np.ndarray
+    starts: np.ndarray
     altitude: AxisWeights
     velocity: AxisWeights
 
@@ -127,8 +130,14 @@ class Polytope:
 
     def data(self) -> PolytopeData:
         """Return the form that compiled functions take."""
-        S = np.ascontiguousarray(np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1))
-        return PolytopeData(S, np.flatnonzero(S.any(axis=0)), self.altitude, self.velocity)
+        n, m = self.B.shape[1:]
+        S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
+        entries = np.flatnonzero(S.any(axis=0))
+        packed = np.zeros((len(S), -(-len(entries) // WIDTH) * WIDTH))
+        packed[:, : len(entries)] = S[:, entries]
+        firsts = [row * (n + m) + column for row in range(n) for column in (0, n)]
+        starts = np.searchsorted(entries, [*firsts, n * (n + m)])
+        return PolytopeData(packed, entries, starts, self.altitude, self.velocity)
 
     def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
@@ -139,13 +148,13 @@ class Polytope:
         return S[:, :n], S[:, n:]
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def _clamp(value: Any, low: float, high: float) -> Any:
     # Written so that a NaN (a diverged flight) becomes ``low`` and never an index.
     return choose(value > low, choose(value > high, high, value), low)
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def _piece(breakpoints: np.ndarray, value: float) -> int:
     i = 0
     while i < len(breakpoints) - 2 and value >= breakpoints[i + 1]:
@@ -153,14 +162,14 @@ def _piece(breakpoints: np.ndarray, value: float) -> int:
     return i
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def _pieces(breakpoints: np.ndarray, value: Any) -> tuple[int, int]:
     """Return the pieces of the least lane and of the largest."""
     first = _piece(breakpoints, least(value))
     return first, first if lanes_in(value) == 1 else _piece(breakpoints, most(value))
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def _cubic(axis: Any, piece: int, value: Any, vertex: int) -> Any:
     c = axis.coefficients
     local = value - axis.breakpoints[piece]
@@ -169,7 +178,7 @@ def _cubic(axis: Any, piece: int, value: Any, vertex: int) -> Any:
     ]
 
 
-@njit(cache=True, inline="always")
+@njit_in_flight(inline="always")
 def _weight(axis: Any, first: int, last: int, value: Any, vertex: int) -> Any:
     """Return the weight of a vertex; ``first`` and ``last``: see :func:`_pieces`."""
     weight = _cubic(axis, first, value, vertex)
@@ -178,12 +187,9 @@ def _weight(axis: Any, first: int, last: int, value: Any, vertex: int) -> Any:
     return weight
 
 
-@njit(cache=True, inline="always")
-def schedule(polytope: Any, altitude: Any, velocity: Any, weights: Any, S: Any) -> Any:
-    """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope.
-
-    ``weights`` (r): scratch.
-    """
+@njit_in_flight(inline="always")
+def vertex_weights(polytope: Any, altitude: Any, velocity: Any, weights: Any) -> Any:
+    """Write the ``weights`` (r) of the vertices (paper eq. 11); tell whether p lay inside the envelope."""
     h_axis, v_axis = polytope.altitude, polytope.velocity
     h = _clamp(altitude, h_axis.breakpoints[0], h_axis.breakpoints[-1])
     v = _clamp(velocity, v_axis.breakpoints[0], v_axis.breakpoints[-1])
@@ -191,25 +197,28 @@ def schedule(polytope: Any, altitude: Any, velocity: Any, weights: Any, S: Any) 
     v_first, v_last = _pieces(v_axis.breakpoints, v)
     n_h = h_axis.coefficients.shape[2]
     n_v = v_axis.coefficients.shape[2]
-    for e in range(len(S)):
-        S[e] = 0.0
-    for i in range(n_h):
+    # Those along the velocity stand in the first places until these are multiplied, last of all.
+    for j in range(n_v):
+        weights[j] = _weight(v_axis, v_first, v_last, v, j)
+    for i in range(n_h - 1, -1, -1):
         h_weight = _weight(h_axis, h_first, h_last, h, i)
         for j in range(n_v):
-            r = i * n_v + j
-            weight = h_weight * _weight(v_axis, v_first, v_last, v, j)
-            if lanes_in(h) == 1:
-                vertex = polytope.S[r]
-                for e in range(len(S)):
-                    S[e] += weight * vertex[e]
-            else:
-                weights[r] = weight
-    # The same sums in the same order: of one flight a register holds several entries, of lanes one. The weights are
-    # finite, so that what is zero in all vertices stays it.
-    if lanes_in(h) > 1:
-        for e in polytope.entries:
-            total = S[e]
-            for r in range(n_h * n_v):
-                total += weights[r] * polytope.S[r, e]
-            S[e] = total
+            weights[i * n_v + j] = h_weight * weights[j]
     return (h == altitude) & (v == velocity)
+
+
+@njit_in_flight()
+def schedule(polytope: Any, altitude: Any, velocity: Any, weights: Any, S: Any) -> Any:
+    """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope.
+
+    ``weights`` (r): scratch.
+    """
+    inside = vertex_weights(polytope, altitude, velocity, weights)
+    for e in range(len(S)):
+        S[e] = 0.0
+    for e in range(len(polytope.entries)):
+        total = 0.0
+        for r in range(len(weights)):
+            total += weights[r] * polytope.S[r, e]
+        S[polytope.entries[e]] = total
+    return inside

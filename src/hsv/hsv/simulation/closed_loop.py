@@ -12,20 +12,20 @@ from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
 from hsv.control.estimator import estimate_step
-from hsv.control.nominal_law import NominalLaw, nominal_input
+from hsv.control.nominal_law import NominalData, NominalLaw, nominal_input
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_advance
-from hsv.control.notch_filter import NotchFilter, filter_step, rest
+from hsv.control.notch_filter import NotchData, NotchFilter, filter_step, rest
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.control.tube_law import memory_of, no_tube, tube_step, watch_of
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
 from hsv.faults.laws import START, FaultRows, apply_command_faults, fault_memory
 from hsv.faults.table import COMMAND
-from hsv.lanes import LaneArray, every, lane, room
+from hsv.lanes import every, lane, lane_numbers
 from hsv.links import receive
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
@@ -86,24 +86,28 @@ class LoopArrays(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Arrays that the compiled loop writes to beside; of a flight alone they are its own, which makes it faster."""
+    """Arrays that the compiled loop writes to beside."""
 
-    measurement: LaneArray | None = None
-    filter_state: LaneArray | None = None
-    defect: LaneArray | None = None
-    weights: LaneArray | None = None
-    schedule: LaneArray | None = None
-    advanced: LaneArray | None = None
-    feedback: LaneArray | None = None
-    total: LaneArray | None = None
-    command: LaneArray | None = None
-    actuator: LaneArray | None = None
+    measurement: np.ndarray
+    filter_state: np.ndarray
+    defect: np.ndarray
+    weights: np.ndarray
+    schedule: np.ndarray
+    advanced: np.ndarray
+    feedback: np.ndarray
+    total: np.ndarray
+    command: np.ndarray
+    actuator: np.ndarray
+    estimator_state: np.ndarray
+    estimator: np.ndarray
 
     @classmethod
-    def of_lanes(cls, filter_states: int, vertices: int) -> Workspace:
-        """Return those of flights side by side, with 2 s ``filter_states`` and r ``vertices``."""
+    def of(cls, zeros: Callable[..., Any], notch: NotchData, nominal: NominalData) -> Workspace:
+        """Return those of a flight with this filter and nominal system, made by ``zeros``, which takes a shape."""
         n, m = N_STATES, N_INPUTS
-        return cls(*map(LaneArray.zeros, (n, filter_states, n, vertices, n * (n + m), n, m, m, m, m)))
+        vertices, entries = nominal.polytope.S.shape
+        sizes = (n, 2 * len(notch.D), n, vertices, entries, n, m, m, m, m, n + m)
+        return cls._make([*map(zeros, sizes), zeros((4, n))])
 
 
 class CommandFaults(NamedTuple):
@@ -139,7 +143,7 @@ def _loop_arrays(
     return given, cuts, LoopArrays._make((*views, np.zeros(N_INPUTS), np.zeros(1), np.zeros(1), memory, watch))
 
 
-@njit(cache=True, nogil=True)
+@njit_in_flight(nogil=True)
 def fly_loop(
     x: Any,
     plant: Any,
@@ -175,12 +179,7 @@ def fly_loop(
     """
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory, watch = arrays
     n, m = len(x), len(u_n)
-    measurement, filter_state, defect = room(work.measurement, n), room(work.filter_state, len(s)), room(work.defect, n)
-    weights, S = room(work.weights, len(nominal.polytope.S)), room(work.schedule, n * (n + m))
-    new = room(work.advanced, n)
-    u_feedback, total = room(work.feedback, m), room(work.total, m)
-    u, actuator = room(work.command, m), room(work.actuator, m)
-    estimator_state, estimator_work = np.zeros(n + m), np.empty((4, n))
+    measurement, filter_state, defect, weights, S, new, u_feedback, total, u, actuator, x_e, estimator_work = work
     if plant_faults is None:
         for i in range(n):
             measurement[i] = x[i]
@@ -213,7 +212,7 @@ def fly_loop(
             flown[k, X + i] = x[i]
             estimate[i] = measurement[i]
         if estimator is not None:
-            estimate_step(estimator, estimator_state, k, measurement, u, estimator_work, estimate)
+            estimate_step(estimator, x_e, k, measurement, u, estimator_work, estimate)
             if k == 0:
                 rest(notch, estimate[PITCH_RATE], filter_state)
         if plant_faults is not None:
@@ -272,7 +271,7 @@ def fly_loop(
             receive(link, link_state, k, plant.seed, actuator)
         if k >= first_fault:
             for i in range(len(ended)):
-                own = lane(actuator, i)
+                own = lane_numbers(actuator, i)
                 apply_command_faults(faults[i].rows, faults[i].memory, k, faults[i].seed, own, own)
         for i in range(m):
             flown[k, ACTUATOR + i] = actuator[i]
@@ -442,7 +441,7 @@ def fly_into(history: History, components: Components) -> int:
             faults.first,
             nominal.reference.data,
             arrays,
-            Workspace(),
+            Workspace.of(np.zeros, notch.data, nominal.data),
             history._replace(estimated=None) if ideal else history,
             np.full(1, len(history.flown)),
         )

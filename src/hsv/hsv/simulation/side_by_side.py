@@ -67,14 +67,14 @@ class FlightGroup:
         zeros: Any = LaneArray.zeros
         vehicle: Any = LaneRecord([plant.vehicle for plant in plants])
         sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
-        memories = (zeros(len(memory_of(tube))), zeros(*watch_of(tube).shape))
+        memories = (zeros(len(memory_of(tube))), zeros(watch_of(tube).shape))
         arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
         flown, beside, _ = self._history
         lanes_flown = LaneArray(flown, split=True)
         fly_loop(
             LaneArray.of([plant.initial.state for plant in plants]),
             plants[0].data._replace(vehicle=vehicle),
-            memory._replace(effector=zeros(m), work=zeros(*memory.work.shape)),
+            memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
             None,
             None,
             notch,
@@ -88,7 +88,7 @@ class FlightGroup:
             min(own.first for own in faults),
             _reference(lanes, self._rows),
             LoopArrays(*arrays),
-            Workspace.of_lanes(s, len(nominal.data.polytope.S)),
+            Workspace.of(zeros, notch, nominal.data),
             (lanes_flown, LaneArray(beside, split=True), None),
             ended,
         )

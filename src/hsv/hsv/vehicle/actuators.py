@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import exponential, sine_cosine
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
@@ -126,7 +126,7 @@ class ActuatorData(NamedTuple):
     ideal: bool
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
     """Return F11, F12, F21, F22 of position less command and rate over ``h`` (s), the command held: exact.
 
@@ -150,7 +150,7 @@ def actuator_map(order: int, frequency: float, damping: float, h: float) -> tupl
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def actuator_step(
     order: int,
     map: Any,

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import exponential, sine
 from hsv.errors import ParameterError
 from hsv.noise import STREAMS, normals
@@ -126,7 +126,7 @@ def atmosphere_state(data: AtmosphereData) -> np.ndarray:
     return np.zeros(DISTANCE + len(data.gust_start))
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def dryden_cross_map(r: float) -> tuple[float, float, float, float, float, float, float]:
     """Return F (2, 2) and the lower factor of I - F F' (three entries) of H_w over the distance ``r`` L.
 
@@ -141,7 +141,7 @@ def dryden_cross_map(r: float) -> tuple[float, float, float, float, float, float
     return decay * (1.0 + r), decay * r, -decay * r, decay * (1.0 - r), first, lower, second
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def _gust_integral(x: float, length: float, stays: bool) -> float:
     """Return the integral from 0 to ``x`` (m) of (1 - cos(pi x / length)) / 2, which ends or stays where it says."""
     end = length if stays else 2.0 * length
@@ -150,13 +150,13 @@ def _gust_integral(x: float, length: float, stays: bool) -> float:
     return area + (x - end) if stays and x > end else area
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def gust_mean(begin: float, end: float, length: float, stays: bool) -> float:
     """Return the mean between two distances (m) flown into a gust, for its largest velocity, by its closed form."""
     return (_gust_integral(end, length, stays) - _gust_integral(begin, length, stays)) / (end - begin)
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def atmosphere_step(
     data: Any, state: np.ndarray, step: int, seed: int, altitude: float, speed: float, air: np.ndarray
 ) -> None:
@@ -200,7 +200,7 @@ def atmosphere_step(
             state[DISTANCE + i] = begin + way
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def _advance_markov(state: np.ndarray, place: int, r: float, step: int, seed: int, stream: int) -> None:
     """Advance a standard Gauss-Markov process by ``r`` of its scale; step 0 draws where it begins."""
     drawn, _ = normals(seed, step, stream)
@@ -211,7 +211,7 @@ def _advance_markov(state: np.ndarray, place: int, r: float, step: int, seed: in
         state[place] = decay * state[place] + np.sqrt(max(1.0 - decay * decay, 0.0)) * drawn
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def speed_of_sound(altitude: float) -> float:
     """Return the speed of sound (m/s) of the US Standard Atmosphere 1976 at a geometric altitude of 11 to 32 km."""
     geopotential = 6356766.0 * altitude / (6356766.0 + altitude)

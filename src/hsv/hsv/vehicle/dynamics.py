@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.elementary import arctangent2, exponential, sine_cosine
 from hsv.vehicle.parameters import VehicleParameters
 
@@ -37,7 +38,7 @@ N_RIGID = 5
 PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def forces(x: Any, u: Any, p: Any) -> Any:
     """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa (paper eq. 2, eq. 3).
 
@@ -72,7 +73,7 @@ def forces(x: Any, u: Any, p: Any) -> Any:
     return lift, drag, thrust, moment, pressure
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def air_relative(velocity: Any, path_angle: Any, wind_x: float, wind_z: float) -> Any:
     """Return speed (m/s) relative to moving air, turn (rad) of its path from the inertial one, its sine and cosine.
 
@@ -85,7 +86,7 @@ def air_relative(velocity: Any, path_angle: Any, wind_x: float, wind_z: float) -
     return speed, arctangent2(across, along), across / speed, along / speed
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
     """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa, and angle of attack rad of the air.
 
@@ -118,7 +119,7 @@ def forces_in(conditions: Any, x: Any, u: Any, p: Any) -> Any:
 
 
 # Inlined, as is all that is called in every step: a call takes a reference to each array, a tenth of the step's time.
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def derivative(x: Any, u: Any, p: Any, out: Any, conditions: Any = None) -> None:
     """Write dx/dt into ``out`` (9): the coupled model (paper eq. 1), decoupled (eq. 4) where both couplings are zero.
 

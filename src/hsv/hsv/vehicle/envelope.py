@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
+from hsv.compiled import njit_in_flight
 
 FOOT = 0.3048
 """Metres in a foot, by definition."""
 
 
-@njit(cache=True)
+@njit_in_flight()
 def in_model_range(x: Any, angle_limit: Any) -> Any:
     """Tell whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
     inside = (abs(x[2]) <= angle_limit) & (abs(x[3]) <= angle_limit) & (x[1] > 0.0)

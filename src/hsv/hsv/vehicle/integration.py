@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.vehicle.dynamics import N_STATES, derivative
 
 
@@ -15,7 +15,7 @@ def workspace() -> np.ndarray:
     return np.empty((3, N_STATES))
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def advance(x: Any, u: Any, p: Any, period: float, substeps: int, work: Any, conditions: Any = None) -> None:
     """Replace ``x`` (9) by the state one ``period`` (s) later, input ``u`` (2) held, by ``substeps`` steps of RK4.
 

@@ -9,8 +9,8 @@ from enum import IntEnum
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit_in_flight
 from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
@@ -149,7 +149,7 @@ class PlantFaults(NamedTuple):
         return cls(*found)
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, faults: Any, step: int) -> None:
     """Replace ``x`` (9) in ``step`` by the state one period later.
 
@@ -178,13 +178,13 @@ def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, f
     _hold(actuator, before)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit_in_flight(error_model="numpy", inline="always")
 def _hold(actuator: np.ndarray, before: np.ndarray) -> None:
     for i in range(len(before)):
         before[i] = actuator[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit_in_flight(error_model="numpy")
 def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measurement: np.ndarray) -> None:
     """Write into ``measurement`` (9) what comes of what sensors say of ``x`` (9); see :func:`advance_plant`."""
     if data.sensors.ideal and len(faults.sensor.table) == 0:
