@@ -111,6 +111,8 @@ def test_a_campaign_flies_its_samples_as_each_alone():
     runner = SampleRunner(campaign)
     flights = range(16)
     samples, _ = runner.sampler.draw(flights)
-    for flight, sample, (flown, level) in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
+    for flight, sample, flown in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
         alone = runner.fly(flight, sample)
-        assert flown.fingerprint == alone.fingerprint and level == runner.level(alone.data())
+        assert flown.fingerprint == flown.flight.fingerprint == alone.fingerprint
+        assert flown.level == runner.level(alone.data())
+        assert flown.flight.metrics == alone.metrics

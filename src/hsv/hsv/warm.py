@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from hsv.sha256_lanes import digests
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
@@ -17,7 +18,8 @@ def warm() -> None:
         for _ in steps(components):
             pass
     both = [assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1}) for _ in range(2)]
-    FlightGroup(both[0].plant.steps).fly(both)
+    flown = FlightGroup(both[0].plant.steps).fly(both).flights
+    digests([flight.history.flown for flight in flown])
 
 
 if __name__ == "__main__":

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +18,25 @@ from hsv.control.controller import Controller
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
 from hsv.lanes import WIDTH
+from hsv.sha256_lanes import LANES, WORTHWHILE
 from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import FlightData, flight_metrics
-from hsv.simulation.side_by_side import FlightGroup
+from hsv.simulation.side_by_side import FlightGroup, FlightsSideBySide
 from hsv.vehicle.envelope import in_model_range
 
 Outcome = dict[str, float | bool | str | None]
+
+_GROUPS = max(1, LANES // WIDTH) if WORTHWHILE else 1
+"""Groups of flights side by side whose fingerprints are computed at a time."""
+
+
+class Flown(NamedTuple):
+    """A flight of a campaign, its worst level in the tube, where there is one, and its fingerprint."""
+
+    flight: Flight
+    level: float | None
+    fingerprint: str
 
 
 class SampleRunner:
@@ -40,6 +54,7 @@ class SampleRunner:
         self._variants = FlightVariants(self.scenario, campaign.design)
         parts = self._variants.unchanged
         self._levels = TubeLevels(parts)
+        self._groups: list[FlightGroup] = []
         self.period = parts.plant.period
         """Control period, s."""
         self.steps = parts.plant.steps
@@ -59,35 +74,45 @@ class SampleRunner:
         """
         return fly(self._components(flight, sample))
 
-    def fly_all(
-        self, flights: Sequence[int], samples: np.ndarray
-    ) -> Iterator[tuple[Flight, float | None] | ControllerError]:
+    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[Flown | ControllerError]:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side where that can be.
 
-        With each, which is valid until the next one, comes its worst level in the tube, where there is one.
-
-        In place of a flight that its controller ended comes what it said.
+        Each is valid until the next one. In place of a flight that its controller ended comes what it said.
 
         Raises:
             ScenarioError: As above.
         """
+        flown: list[FlightsSideBySide] = []
         for start in range(0, len(flights), WIDTH):
             drawn = zip(flights[start : start + WIDTH], samples[start : start + WIDTH], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
-            if FlightGroup.takes(components):
-                group = self._group.fly(components)
-                yield from zip(group.flights, self._levels.worst_of(group), strict=True)
-                continue
-            for own in components:
-                try:
-                    flown = fly(own)
-                    yield flown, self.level(flown.data())
-                except ControllerError as error:
-                    yield error
+            together = FlightGroup.takes(components)
+            if together:
+                flown.append(self._group(len(flown)).fly(components))
+            if len(flown) == _GROUPS or not together:
+                yield from self._told(flown)
+                flown = []
+            if not together:
+                yield from map(self._flown_alone, components)
+        yield from self._told(flown)
 
-    @cached_property
-    def _group(self) -> FlightGroup:
-        return FlightGroup(self.steps)
+    def _group(self, number: int) -> FlightGroup:
+        """Return one of the groups, whose memory is kept."""
+        if number == len(self._groups):
+            self._groups.append(FlightGroup(self.steps))
+        return self._groups[number]
+
+    def _told(self, groups: Sequence[FlightsSideBySide]) -> Iterator[Flown]:
+        flights = [flight for group in groups for flight in group.flights]
+        levels = [level for group in groups for level in self._levels.worst_of(group)]
+        return map(Flown, flights, levels, fingerprints([flight.history.flown for flight in flights]))
+
+    def _flown_alone(self, components: Components) -> Flown | ControllerError:
+        try:
+            flight = fly(components)
+            return Flown(flight, self.level(flight.data()), flight.fingerprint)
+        except ControllerError as error:
+            return error
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
         try:
@@ -109,7 +134,7 @@ class SampleRunner:
     @property
     def at_once(self) -> int:
         """How many flights of the scenario are flown at once."""
-        return WIDTH if FlightGroup.takes([self._variants.unchanged] * 2) else 1
+        return _GROUPS * WIDTH if FlightGroup.takes([self._variants.unchanged] * 2) else 1
 
     @property
     def controller(self) -> Controller:

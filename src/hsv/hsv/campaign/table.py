@@ -126,10 +126,9 @@ def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], E
         if isinstance(flown, ControllerError):
             outcome = runner.crashed(flown)
         else:
-            own, level = flown
-            data = own.data()
+            data = flown.flight.data()
             envelope.add(data, runner.steps)
-            outcome = runner.outcome(data, level, own.fingerprint)
+            outcome = runner.outcome(data, flown.level, flown.fingerprint)
         rows.append(row(sample, flight, int(seed), campaign, outcome))
     return rows, envelope
 
