@@ -1,12 +1,18 @@
+import math
+from itertools import accumulate
+
 import numpy as np
 import pytest
+from flights import components
 
 from hsv.campaign.campaign import plan
+from hsv.campaign.envelope import Envelope, signals, window_starts
 from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.page import render
 from hsv.campaign.run import run_campaign
 from hsv.campaign.store import ResultStore
 from hsv.campaign.summary import Results, clopper_pearson, distributions, shares, worst_flights
+from hsv.simulation.closed_loop import fly
 
 
 def test_clopper_pearson_of_the_textbook():
@@ -61,7 +67,6 @@ def test_flights_that_diverge_are_within_no_limit_and_come_first(lost):
 
 
 def test_envelopes_hold_every_flight(results, planned):
-    from hsv.campaign.envelope import signals
     from hsv.campaign.sample_runner import SampleRunner
 
     runner, envelope = SampleRunner(planned()), results.envelope
@@ -71,6 +76,24 @@ def test_envelopes_hold_every_flight(results, planned):
     assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=1) for c in curves], axis=0))
     assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=1) for c in curves], axis=0))
     assert np.all(envelope.count[:151] == len(curves))
+
+
+def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
+    flown = fly(components("case1", duration=3.0)).data()
+    flown.state[140:, 6] = np.nan
+    envelope = Envelope.empty(50)
+    envelope.add(flown, 150)
+    envelope.add(flown, 150)
+    starts = window_starts(150, 50)
+    for window, (start, stop) in enumerate(zip(starts, (*starts[1:], 151), strict=True)):
+        for i, curve in enumerate(signals(flown)[:, start:stop].tolist()):
+            finite = [value for value in curve if math.isfinite(value)]
+            assert envelope.low[window, i] == min(finite, default=math.inf)
+            assert envelope.high[window, i] == max(finite, default=-math.inf)
+            if stop <= 140:
+                mean = list(accumulate(curve))[-1] / (stop - start)
+                assert envelope.total[window, i] == mean + mean
+        assert envelope.count[window] == (2.0 if stop <= 140 else 0.0)
 
 
 def test_the_page_is_complete_in_itself(results):

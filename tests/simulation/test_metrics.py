@@ -1,9 +1,12 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from flights import components
 from numpy.testing import assert_allclose
 
+from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import METRICS, FlightData, flight_metrics
 
 PERIOD = 0.02
@@ -158,3 +161,29 @@ def test_one_row_is_a_flight_too():
 def test_order_and_names_are_those_of_the_table():
     m = flight_metrics(flight(fault=50.0, altitude=lambda t: -np.exp(-t), velocity=lambda t: -np.exp(-t)))
     assert list(m) == list(METRICS)
+
+
+def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit():
+    flown = fly(components("case1", duration=110.0)).data()
+    columns = ("state", "reference", "deviation", "command", "saturated")
+    recorded = replace(flown, **{name: np.ascontiguousarray(getattr(flown, name)) for name in columns})
+    assert np.array_equal(flown.curves, recorded.curves)
+    assert flight_metrics(flown) == flight_metrics(recorded)
+
+
+def test_sums_and_extremes_are_those_of_numpy_over_whole_columns():
+    flown = fly(components("case1", duration=110.0)).data()
+    m = flight_metrics(flown)
+    before, after = flown.time < 100.0 - 1e-9, flown.time >= 100.0 - 1e-9
+    for axis, column in (("altitude", 0), ("velocity", 1)):
+        error = np.abs(flown.state[:, column] - flown.reference[:, column])
+        integral = np.sum(0.5 * (error[1:] + error[:-1]) * np.diff(flown.time))
+        assert m[f"{axis}_integral_absolute_error"] == integral
+        assert m[f"{axis}_error_maximum"] == error.max()
+    attitude = flown.state[:, 2:4]
+    nominal = np.abs(attitude - flown.reference[:, 2:4] - flown.deviation[:, 2:4])
+    assert m["attitude_from_nominal"] == nominal.max()
+    assert m["post_fault_attitude_from_nominal"] == nominal[after].max()
+    mean = attitude[before & (flown.time >= 95.0 - 1e-9)].mean(axis=0)
+    assert m["post_fault_attitude_deviation"] == np.abs(attitude[after] - mean).max()
+    assert m["saturated_steps"] == np.any(flown.saturated, axis=1).sum()

@@ -5,11 +5,13 @@ from __future__ import annotations
 import base64
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Self
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numba import njit
 
+from hsv.lanes import LaneArray, choose, every
 from hsv.simulation.metrics import FlightData
 
 WINDOWS = 400
@@ -37,39 +39,33 @@ SIGNALS = (
 
 def signals(flight: FlightData) -> np.ndarray:
     """Return the curves of a flight (signals, steps)."""
-    curves = np.empty((len(SIGNALS), len(flight.state)))
-    for i, column in enumerate((0, 1, 2, 3, 6, 8)):
-        curves[i] = flight.state[:, column]
-    curves[:2] -= flight.reference[:, :2].T
-    curves[6:] = flight.command.T
-    return curves
+    return flight.curves[: len(SIGNALS)]
 
 
 @njit(cache=True)
-def _add(
-    curves: np.ndarray, starts: np.ndarray, low: np.ndarray, high: np.ndarray, total: np.ndarray, count: np.ndarray
-) -> None:
-    """Take ``curves`` (signals, steps) into least and largest value, and, of whole windows, into sum and number."""
-    sums = np.empty(len(curves))
-    steps = curves.shape[1]
+def _add(curves: Any, starts: np.ndarray, low: Any, high: Any, total: Any, count: np.ndarray) -> None:
+    """Take ``curves`` (steps) into least and largest value, and, of whole windows, into sum and number (windows).
+
+    Each signal has a lane.
+    """
+    steps = len(curves)
     for window in range(len(starts)):
         start, stop = starts[window], steps
         if window + 1 < len(starts):
             stop = min(starts[window + 1], steps)
         if start >= stop:
             return
-        whole = True
-        for i in range(len(curves)):
-            sums[i] = 0.0
-            for k in range(start, stop):
-                value = curves[i, k]
-                sums[i] += value
-                if math.isfinite(value):
-                    low[window, i], high[window, i] = min(low[window, i], value), max(high[window, i], value)
-            whole = whole and math.isfinite(sums[i])
-        if whole:
-            for i in range(len(curves)):
-                total[window, i] += sums[i] / (stop - start)
+        least, largest = low[window], high[window]
+        sums = 0.0
+        for k in range(start, stop):
+            value = curves[k]
+            sums += value
+            finite = math.isfinite(value)
+            least = choose(finite, min(least, value), least)
+            largest = choose(finite, max(largest, value), largest)
+        low[window], high[window] = least, largest
+        if every(math.isfinite(sums)):
+            total[window] += sums / (stop - start)
             count[window] += 1.0
 
 
@@ -91,7 +87,8 @@ class Envelope:
     def add(self, flight: FlightData, steps: int) -> None:
         """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
         starts = window_starts(steps, len(self.count))
-        _add(signals(flight), starts, self.low, self.high, self.total, self.count)
+        lanes = LaneArray(self.low), LaneArray(self.high), LaneArray(self.total)
+        _add(LaneArray(signals(flight), split=True), starts, *lanes, self.count)
 
     def merge(self, other: Envelope) -> None:
         """Take in all flights of ``other``."""
@@ -122,6 +119,9 @@ class Envelope:
         return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])
 
 
+@lru_cache(maxsize=8)
 def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:
     """Return the first step of each window of a flight of ``steps`` steps, at most ``windows`` of them."""
-    return np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))
+    starts = np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))
+    starts.setflags(write=False)
+    return starts

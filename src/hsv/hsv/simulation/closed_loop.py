@@ -338,7 +338,7 @@ class Flight:
             reference=self.reference,
             deviation=h.deviation,
             command=h.command,
-            saturated=h.command != h.u_unsaturated,
+            saturated=h.saturated,
             gain_index=h.gain_index,
             fault_start=self.fault_start,
         )

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
+from numba import njit
 
 SETTLING_BAND = 0.02
 """Share of the step within which a response counts as settled."""
@@ -149,45 +151,66 @@ class FlightData:
     fault_start: float | None
     """Time of the first fault (s), ``None`` without one."""
 
+    @cached_property
+    def curves(self) -> np.ndarray:
+        """What is read of a flight many times, each on its own (10, n + 1).
+
+        Altitude and velocity less their references; angle of attack and pitch angle; the two elastic rates; the
+        commands; the magnitudes of what angle of attack and pitch angle differ by from reference + nominal.
+        """
+        return _curves(self.state, self.reference, self.deviation, self.command)
+
+
+@njit(cache=True, nogil=True)
+def _curves(state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """Return :attr:`FlightData.curves`, in one pass: a row of a flight is wider than a line of the cache."""
+    curves = np.empty((10, len(state)))
+    for k in range(len(state)):
+        curves[0, k] = state[k, 0] - reference[k, 0]
+        curves[1, k] = state[k, 1] - reference[k, 1]
+        curves[2, k], curves[3, k] = state[k, 2], state[k, 3]
+        curves[4, k], curves[5, k] = state[k, 6], state[k, 8]
+        curves[6, k], curves[7, k] = command[k, 0], command[k, 1]
+        curves[8, k] = abs(state[k, 2] - reference[k, 2] - deviation[k, 2])
+        curves[9, k] = abs(state[k, 3] - reference[k, 3] - deviation[k, 3])
+    return curves
+
 
 def flight_metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
     values: dict[str, float] = {}
-    time = flight.time
+    time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)
-    for axis, column in (("altitude", 0), ("velocity", 1)):
-        error = flight.state[:, column] - flight.reference[:, column]
+    periods = np.diff(time)
+    for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
-        values[f"{axis}_integral_absolute_error"] = _integral(np.abs(error), time)
-        values[f"{axis}_error_maximum"] = float(np.max(np.abs(error)))
+        magnitude = np.abs(error)
+        values[f"{axis}_integral_absolute_error"] = _integral(magnitude, periods)
+        values[f"{axis}_error_maximum"] = float(np.max(magnitude))
         values[f"{axis}_end_error"] = float(error[-1])
-    angles = slice(2, 4)
-    tube_error = np.abs(flight.state[:, angles] - flight.reference[:, angles] - flight.deviation[:, angles])
+    tube_error = curves[8:10]
     values["attitude_from_nominal"] = float(np.max(tube_error))
     if 0 < faultless < len(time):
         start = time[faultless]
         window = slice(int(np.searchsorted(time, start - PRE_FAULT_WINDOW - 1e-9)), faultless)
-        attitude = flight.state[:, angles]
         if window.start < faultless:  # of a recording with a gap before the fault there is no mean
-            deviation = attitude[after] - attitude[window].mean(axis=0)
-            values["post_fault_attitude_deviation"] = float(np.max(np.abs(deviation)))
-        values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[after]))
-        for mode, column in ((1, 6), (2, 8)):
-            values[f"elastic_rate_{mode}_decay_time"] = _decay_time(
-                time[after] - start, np.abs(flight.state[after, column])
-            )
+            mean = flight.state[window, 2:4].mean(axis=0)
+            values["post_fault_attitude_deviation"] = float(np.max(np.abs(curves[2:4, after] - mean[:, None])))
+        values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[:, after]))
+        for mode, rate in enumerate(curves[4:6], 1):
+            values[f"elastic_rate_{mode}_decay_time"] = _decay_time(time[after], np.abs(rate[after]))
         values["elastic_decay_time"] = max(values["elastic_rate_1_decay_time"], values["elastic_rate_2_decay_time"])
-    for name, column in (("fuel_equivalence_ratio", 0), ("elevator_deflection", 1)):
-        values[f"{name}_minimum"] = float(np.min(flight.command[:, column]))
-        values[f"{name}_maximum"] = float(np.max(flight.command[:, column]))
+    for name, command in zip(("fuel_equivalence_ratio", "elevator_deflection"), curves[6:8], strict=True):
+        values[f"{name}_minimum"] = float(np.min(command))
+        values[f"{name}_maximum"] = float(np.max(command))
     values["saturated_steps"] = float(np.count_nonzero(flight.saturated[:, 0] | flight.saturated[:, 1]))
     return {name: values[name] for name in METRICS if name in values}
 
 
-def _integral(values: np.ndarray, time: np.ndarray) -> float:
-    """Return the integral of ``values`` over ``time`` by the trapezoidal rule; numpy 1.26 has no trapezoid()."""
-    return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(time)))
+def _integral(values: np.ndarray, periods: np.ndarray) -> float:
+    """Return the integral of ``values``, ``periods`` apart, by the trapezoidal rule; numpy 1.26 has no trapezoid()."""
+    return float(np.sum(0.5 * (values[1:] + values[:-1]) * periods))
 
 
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
@@ -196,8 +219,9 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
         return {}
     done = 1.0 - error / error[0]
     values = {"overshoot": max(0.0, float(np.max(done) - 1.0))}
-    if np.any(done >= 0.9):
-        values["rise_time"] = float(time[np.argmax(done >= 0.9)] - time[np.argmax(done >= 0.1)])
+    risen = done >= 0.9
+    if risen.any():
+        values["rise_time"] = float(time[risen.argmax()] - time[np.argmax(done >= 0.1)])
     off = np.nonzero(np.abs(done - 1.0) > SETTLING_BAND)[0]
     if off[-1] + 1 < len(time):
         values["settling_time"] = float(time[off[-1] + 1])
@@ -205,6 +229,6 @@ def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
-    """Return the last time at which ``magnitude`` exceeds the decay level of its own peak; what is no number, too."""
+    """Return after what time ``magnitude`` last exceeds the decay level of its own peak; what is no number, too."""
     above = np.nonzero(~(magnitude <= DECAY_LEVEL * np.max(magnitude)))[0]
-    return float(time[above[-1]]) if len(above) else 0.0
+    return float(time[above[-1]] - time[0]) if len(above) else 0.0
