@@ -62,6 +62,12 @@ class Campaign:
         """The scenario without any change, distributions at their means."""
         return scenario_at_means(self.table, self.scenario_name)[0]
 
+    @cached_property
+    def perturbed(self) -> tuple[str, ...]:
+        """The uncertain parameters of the vehicle that vary, one a factor; empty where anything else varies, too."""
+        names = tuple(factor.name for factor in self.factors)
+        return names if all(factor.is_perturbation for factor in self.factors) else ()
+
     def flown(self, flight: int, sample: Sequence[float]) -> Scenario:
         """Return the scenario of a flight with its sample (one value a factor).
 
@@ -80,10 +86,12 @@ class Campaign:
         """
         return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
 
+    def flight_seed(self, flight: int) -> int:
+        """Return the seed of what is random in a flight; flights of other campaigns have others."""
+        return (self.seed * MOST_SAMPLES + int(flight)) % _SEEDS
+
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
-        # A seed of its own for every flight, as the generator's key; flights of other campaigns have others.
-        seed = (self.seed * MOST_SAMPLES + int(flight)) % _SEEDS
-        return flown_table(self.table, self.scenario_name, self.factors, sample, seed)
+        return flown_table(self.table, self.scenario_name, self.factors, sample, self.flight_seed(flight))
 
     @property
     def batch(self) -> int:

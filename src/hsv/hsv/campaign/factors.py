@@ -24,9 +24,14 @@ class Factor(Distribution):
     """Name of an uncertain parameter, or the field."""
 
     @property
+    def is_perturbation(self) -> bool:
+        """Whether it is an uncertain parameter of the vehicle."""
+        return self.name in COEFFICIENT_UNITS
+
+    @property
     def field(self) -> str:
         """The field of the scenario."""
-        return _PERTURBATION + self.name if self.name in COEFFICIENT_UNITS else self.name
+        return _PERTURBATION + self.name if self.is_perturbation else self.name
 
 
 def with_factors(table: dict[str, Any], name: str, ranges: Mapping[str, tuple[object, object]]) -> dict[str, Any]:
@@ -98,8 +103,8 @@ def flown_table(
     flown = copy.deepcopy(dict(table)) | {"seed": seed}
     starts = {}
     for factor, value in zip(factors, sample, strict=True):
-        change = factor.field.startswith(_PERTURBATION)
-        set_field(flown, factor.field, percent(float(value)) if change else written(float(value), factor.unit), name)
+        text = percent(float(value)) if factor.is_perturbation else written(float(value), factor.unit)
+        set_field(flown, factor.field, text, name)
         if factor.field.startswith("initial."):
             starts[factor.field.removeprefix("initial.")] = float(value)
     if starts:

@@ -115,6 +115,11 @@ class SampleRunner:
             return error
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
+        if names := self.campaign.perturbed:
+            drawn = dict(zip(names, map(float, sample), strict=True))
+            perturbation = {**self.scenario.vehicle.perturbation, **drawn}
+            if components := self._variants.perturbed(perturbation, self.campaign.flight_seed(flight)):
+                return components
         try:
             return self._variants.components(self.campaign.flown(flight, sample))
         except ScenarioError as error:

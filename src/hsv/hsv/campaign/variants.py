@@ -11,7 +11,6 @@ from hsv.control.design import design_of
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.faults.injector import FaultInjector
 from hsv.noise import SEED_PARAMETER
-from hsv.parameters import check_all
 from hsv.simulation.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.simulation.closed_loop import Components
 from hsv.simulation.scenario import Scenario
@@ -23,8 +22,8 @@ _NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
 
 _PERTURBATION = "vehicle.perturbation."
 
-_VARIED = (*(p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)), SEED_PARAMETER)
-"""What most campaigns vary: cheap, as nothing else depends on it."""
+_CHANGES = {p.name.removeprefix(_PERTURBATION): p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)}
+"""Relative changes of the vehicle's parameters, by theirs."""
 
 
 class FlightVariants:
@@ -60,7 +59,9 @@ class FlightVariants:
         if not all(name.startswith(self._kept_for) for name in changed):
             return assemble(values)
         if all(name.startswith(_PERTURBATION) or name == SEED_PARAMETER.name for name in changed):
-            return self._varied(values)
+            found = self.perturbed(scenario.vehicle.perturbation, scenario.seed)
+            if found is not None:
+                return found
         trajectory = self.unchanged.nominal_trajectory
         if any(name.startswith("reference.") for name in changed):
             trajectory = NominalTrajectory.from_parameters(values, self._design)
@@ -71,11 +72,19 @@ class FlightVariants:
             fault_injector=FaultInjector.from_parameters(values),
         )
 
-    def _varied(self, values: Mapping[str, Any]) -> Components:
-        """Return the components of a flight that differs in its perturbation and its seed alone."""
-        checked = check_all(_VARIED, values)
-        seed = checked.pop(SEED_PARAMETER.name)
-        vehicle = self._vehicle.perturbed({name.removeprefix(_PERTURBATION): v for name, v in checked.items()})
+    def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
+        """Return the components of a flight that differs in its perturbation and its seed alone.
+
+        That is what most campaigns vary; it is cheap, as nothing else depends on it. ``None`` where a change is none
+        that its parameter admits: who reads such a scenario, or builds its plant, is told which.
+
+        Args:
+            perturbation: Relative changes of the nominal vehicle's parameters, by name.
+            seed: Of what is random in the flight.
+        """
+        if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
+            return None
+        vehicle = self._vehicle.perturbed(perturbation)
         return replace(
             self.unchanged,
             plant=self.unchanged.plant.varied(vehicle, seed),
