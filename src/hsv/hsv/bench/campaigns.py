@@ -36,7 +36,7 @@ def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure
             tuple(paces[workers]),
             one,
             "least",
-            0.9,
+            0.95,
         )
     ]
 

@@ -23,7 +23,7 @@ def against_c(repeats: int) -> list[Figure]:
     """Return Case 1 in process against the C build, for any processor and for this one."""
     components = assemble(flight_parameters(load_scenario("case1")))
     figures = []
-    for name, flags, limit in (("in_process", FLAGS, 1.5), ("in_process_native", (*FLAGS, "-march=native"), None)):
+    for name, flags, limit in (("in_process", FLAGS, 1.1), ("in_process_native", (*FLAGS, "-march=native"), None)):
         other = CFlight(components, flags)
         ours, theirs = interleaved(lambda: fly(components), other.fly, repeats)
         difference = largest_difference(fly(components).history, other.fly())
@@ -38,8 +38,7 @@ def against_c(repeats: int) -> list[Figure]:
                 theirs,
                 "most" if limit else "",
                 limit,
-                1.3 if limit else None,
-                note,
+                note=note,
             )
         )
     return figures
