@@ -30,6 +30,14 @@ OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, m
 WRITTEN: dict[str, Any] = {"compression": "zstd", "write_page_checksum": True}
 """Options for writing results: with checksums, which detect damage that can be decompressed without an error."""
 
+_BATCH_WRITTEN: dict[str, Any] = {
+    "compression": "none",
+    "use_dictionary": False,
+    "write_statistics": False,
+    "write_page_checksum": True,
+}
+"""The same of a batch, which is soon read once and removed: to make it small takes longer than to write it."""
+
 _SLOW = 2.0
 """Seconds from which on a flight is flown whole once at most to see how long it takes, not sample by sample."""
 
@@ -143,5 +151,5 @@ def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -
     """Return rows and envelope as a Parquet file."""
     table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
     stream = BytesIO()
-    pq.write_table(table, stream, **WRITTEN)
+    pq.write_table(table, stream, **_BATCH_WRITTEN)
     return stream.getvalue()
