@@ -51,7 +51,7 @@ def flight(altitude, attitude):
     state, zeros = np.zeros((n, 9)), np.zeros((n, 9))
     state[:, 0], state[:, 3] = altitude, attitude
     two = np.zeros((n, 2))
-    return FlightData(np.arange(float(n)), state, zeros, zeros, two, two.astype(bool), np.zeros(n), 2.0)
+    return FlightData(np.arange(float(n)), state, zeros, zeros, two, two, np.zeros(n), 2.0)
 
 
 def test_recovery_is_the_last_exit_from_the_band():

@@ -36,8 +36,9 @@ def flight(duration=100.0, fault=None, **columns):
     for name, function in columns.items():
         array, column = places[name]
         array[:, column] = array[:, column] + function(time)
+    unlimited = np.where(saturated, np.nan, command)
     return FlightData(
-        time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, saturated, np.zeros(len(time)), fault
+        time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, unlimited, np.zeros(len(time)), fault
     )
 
 
@@ -163,10 +164,13 @@ def test_order_and_names_are_those_of_the_table():
     assert list(m) == list(METRICS)
 
 
-def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit():
-    flown = fly(components("case1", duration=110.0)).data()
-    columns = ("state", "reference", "deviation", "command", "saturated")
-    recorded = replace(flown, **{name: np.ascontiguousarray(getattr(flown, name)) for name in columns})
+@pytest.mark.parametrize(("scenario", "limited"), [("case1", False), ("case1_derived_no_notch", True)])
+def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, limited):
+    flown = fly(components(scenario, duration=110.0)).data()
+    columns = {name: getattr(flown, name).copy() for name in ("state", "reference", "deviation", "command")}
+    recorded = replace(flown, **columns, unlimited=np.where(flown.saturated, np.nan, flown.command))
+    assert flown.saturated.any() == limited
+    assert np.array_equal(flown.saturated, recorded.saturated)
     assert np.array_equal(flown.curves, recorded.curves)
     assert flight_metrics(flown) == flight_metrics(recorded)
 

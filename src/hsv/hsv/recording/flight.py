@@ -57,13 +57,14 @@ def flight_data(bag: Bag) -> FlightData:
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
     status = bag.columns(fault_topic(bag))
     acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
+    u = input_columns(command)
     return FlightData(
         time=state["header.stamp"] * 1e-9,
         state=state_columns(state),
         reference=state_columns(nominal, "reference."),
         deviation=state_columns(nominal, "deviation."),
-        command=input_columns(command),
-        saturated=rows[limited]["saturated"],
+        command=u,
+        unlimited=np.where(rows[limited]["saturated"], np.nan, u),
         gain_index=nominal["gain_index"],
         fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )

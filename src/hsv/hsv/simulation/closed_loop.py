@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
@@ -289,6 +289,13 @@ def fly_loop(
     return rows
 
 
+@lru_cache(maxsize=8)
+def _times(rows: int, period: float) -> np.ndarray:
+    times = np.arange(rows) * period
+    times.setflags(write=False)
+    return times
+
+
 @dataclass(frozen=True)
 class Flight:
     """A flight: ``period`` (s), what happened at each step, along which reference, time of the first fault."""
@@ -301,8 +308,8 @@ class Flight:
 
     @property
     def time(self) -> np.ndarray:
-        """Simulated time (n + 1), s."""
-        return np.arange(len(self.history.state)) * self.period
+        """Simulated time (n + 1), s; all flights of so many steps share it."""
+        return _times(len(self.history.state), self.period)
 
     @property
     def reference(self) -> np.ndarray:
@@ -338,7 +345,7 @@ class Flight:
             reference=self.reference,
             deviation=h.deviation,
             command=h.command,
-            saturated=h.saturated,
+            unlimited=h.u_unsaturated,
             gain_index=h.gain_index,
             fault_start=self.fault_start,
         )

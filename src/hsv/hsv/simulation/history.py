@@ -88,15 +88,6 @@ class History(NamedTuple):
         return self.flown[:, U:ACTUATOR]
 
     @property
-    def saturated(self) -> np.ndarray:
-        """Whether each command was limited (n + 1, 2)."""
-        limited = np.empty(self.command.shape, bool)
-        # One column after the other: row by row, numpy would begin anew after every two numbers.
-        for i in range(N_INPUTS):
-            limited[:, i] = self.command[:, i] != self.u_unsaturated[:, i]
-        return limited
-
-    @property
     def actuator(self) -> np.ndarray:
         """(n + 1, 2)."""
         return self.flown[:, ACTUATOR:FLOWN]

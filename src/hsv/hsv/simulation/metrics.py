@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
@@ -136,9 +137,10 @@ def is_share(name: str) -> bool:
 
 @dataclass(frozen=True)
 class FlightData:
-    """Data for metrics, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands (2); limited or not (2).
+    """Data for metrics, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands, limited and unlimited (2 each).
 
-    ``gain_index`` is the nominal gain in use, counted from the outermost of the family.
+    ``unlimited`` is not a number where no more is known than that the command was limited. ``gain_index`` is the
+    nominal gain in use, counted from the outermost of the family.
     """
 
     time: np.ndarray
@@ -146,25 +148,36 @@ class FlightData:
     reference: np.ndarray
     deviation: np.ndarray
     command: np.ndarray
-    saturated: np.ndarray
+    unlimited: np.ndarray
     gain_index: np.ndarray
     fault_start: float | None
     """Time of the first fault (s), ``None`` without one."""
 
-    @cached_property
+    @property
     def curves(self) -> np.ndarray:
         """What is read of a flight many times, each on its own (10, n + 1).
 
         Altitude and velocity less their references; angle of attack and pitch angle; the two elastic rates; the
         commands; the magnitudes of what angle of attack and pitch angle differ by from reference + nominal.
         """
-        return _curves(self.state, self.reference, self.deviation, self.command)
+        return self._read[0]
+
+    @property
+    def saturated(self) -> np.ndarray:
+        """Whether each command was limited (n + 1, 2)."""
+        return self._read[1]
+
+    @cached_property
+    def _read(self) -> tuple[np.ndarray, np.ndarray]:
+        return _read(self.state, self.reference, self.deviation, self.command, self.unlimited)
 
 
 @njit(cache=True, nogil=True)
-def _curves(state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, command: np.ndarray) -> np.ndarray:
-    """Return :attr:`FlightData.curves`, in one pass: a row of a flight is wider than a line of the cache."""
-    curves = np.empty((10, len(state)))
+def _read(
+    state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, command: np.ndarray, unlimited: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return curves and saturation of :class:`FlightData` in one pass over all rows, which no cache near holds."""
+    curves, saturated = np.empty((10, len(state))), np.empty(command.shape, np.bool_)
     for k in range(len(state)):
         curves[0, k] = state[k, 0] - reference[k, 0]
         curves[1, k] = state[k, 1] - reference[k, 1]
@@ -173,7 +186,8 @@ def _curves(state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, com
         curves[6, k], curves[7, k] = command[k, 0], command[k, 1]
         curves[8, k] = abs(state[k, 2] - reference[k, 2] - deviation[k, 2])
         curves[9, k] = abs(state[k, 3] - reference[k, 3] - deviation[k, 3])
-    return curves
+        saturated[k, 0], saturated[k, 1] = command[k, 0] != unlimited[k, 0], command[k, 1] != unlimited[k, 1]
+    return curves, saturated
 
 
 def flight_metrics(flight: FlightData) -> dict[str, float]:
@@ -182,11 +196,10 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)
-    periods = np.diff(time)
     for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
         magnitude = np.abs(error)
-        values[f"{axis}_integral_absolute_error"] = _integral(magnitude, periods)
+        values[f"{axis}_integral_absolute_error"] = float(np.sum(_trapezoids(magnitude, time)))
         values[f"{axis}_error_maximum"] = float(np.max(magnitude))
         values[f"{axis}_end_error"] = float(error[-1])
     tube_error = curves[8:10]
@@ -208,24 +221,46 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     return {name: values[name] for name in METRICS if name in values}
 
 
-def _integral(values: np.ndarray, periods: np.ndarray) -> float:
-    """Return the integral of ``values``, ``periods`` apart, by the trapezoidal rule; numpy 1.26 has no trapezoid()."""
-    return float(np.sum(0.5 * (values[1:] + values[:-1]) * periods))
+@njit(cache=True, nogil=True)
+def _trapezoids(values: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return the integrals (n) of ``values`` (n + 1) from each time to the next by the trapezoidal rule."""
+    integrals = np.empty(len(values) - 1)
+    for k in range(len(integrals)):
+        integrals[k] = 0.5 * (values[k + 1] + values[k]) * (time[k + 1] - time[k])
+    return integrals
 
 
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time, settling time and overshoot of a step whose size is the first error."""
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}
-    done = 1.0 - error / error[0]
-    values = {"overshoot": max(0.0, float(np.max(done) - 1.0))}
-    risen = done >= 0.9
-    if risen.any():
-        values["rise_time"] = float(time[risen.argmax()] - time[np.argmax(done >= 0.1)])
-    off = np.nonzero(np.abs(done - 1.0) > SETTLING_BAND)[0]
-    if off[-1] + 1 < len(time):
-        values["settling_time"] = float(time[off[-1] + 1])
+    most, begun, risen, off = _step_marks(error)
+    values = {"overshoot": max(0.0, most - 1.0)}
+    if risen >= 0:
+        values["rise_time"] = float(time[risen] - time[begun])
+    if off + 1 < len(time):
+        values["settling_time"] = float(time[off + 1])
     return values
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _step_marks(error: np.ndarray) -> tuple[float, int, int, int]:
+    """Return the largest share of a step that is done, and where 10 % and 90 % are first, or -1, and it is last off.
+
+    The share is not a number where any is none.
+    """
+    most, begun, risen, off = -np.inf, -1, -1, -1
+    for k in range(len(error)):
+        done = 1.0 - error[k] / error[0]
+        if not done <= most and not math.isnan(most):
+            most = done
+        if begun < 0 and done >= 0.1:
+            begun = k
+        if risen < 0 and done >= 0.9:
+            risen = k
+        if abs(done - 1.0) > SETTLING_BAND:
+            off = k
+    return most, begun, risen, off
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
