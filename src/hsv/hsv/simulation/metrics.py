@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 SETTLING_BAND = 0.02
 """Share of the step within which a response counts as settled."""
@@ -169,29 +167,16 @@ class FlightData:
 
     @cached_property
     def _read(self) -> tuple[np.ndarray, np.ndarray]:
-        return _read(self.state, self.reference, self.deviation, self.command, self.unlimited)
+        # Here, as most that name metrics compute none: what is compiled takes a while to load.
+        from hsv.simulation.curves import read_flight
 
-
-@njit(cache=True, nogil=True)
-def _read(
-    state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, command: np.ndarray, unlimited: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return curves and saturation of :class:`FlightData` in one pass over all rows, which no cache near holds."""
-    curves, saturated = np.empty((10, len(state))), np.empty(command.shape, np.bool_)
-    for k in range(len(state)):
-        curves[0, k] = state[k, 0] - reference[k, 0]
-        curves[1, k] = state[k, 1] - reference[k, 1]
-        curves[2, k], curves[3, k] = state[k, 2], state[k, 3]
-        curves[4, k], curves[5, k] = state[k, 6], state[k, 8]
-        curves[6, k], curves[7, k] = command[k, 0], command[k, 1]
-        curves[8, k] = abs(state[k, 2] - reference[k, 2] - deviation[k, 2])
-        curves[9, k] = abs(state[k, 3] - reference[k, 3] - deviation[k, 3])
-        saturated[k, 0], saturated[k, 1] = command[k, 0] != unlimited[k, 0], command[k, 1] != unlimited[k, 1]
-    return curves, saturated
+        return read_flight(self.state, self.reference, self.deviation, self.command, self.unlimited)
 
 
 def flight_metrics(flight: FlightData) -> dict[str, float]:
     """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
+    from hsv.simulation.curves import trapezoids
+
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
@@ -199,7 +184,7 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
         magnitude = np.abs(error)
-        values[f"{axis}_integral_absolute_error"] = float(np.sum(_trapezoids(magnitude, time)))
+        values[f"{axis}_integral_absolute_error"] = float(np.sum(trapezoids(magnitude, time)))
         values[f"{axis}_error_maximum"] = float(np.max(magnitude))
         values[f"{axis}_end_error"] = float(error[-1])
     tube_error = curves[8:10]
@@ -221,46 +206,19 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
     return {name: values[name] for name in METRICS if name in values}
 
 
-@njit(cache=True, nogil=True)
-def _trapezoids(values: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return the integrals (n) of ``values`` (n + 1) from each time to the next by the trapezoidal rule."""
-    integrals = np.empty(len(values) - 1)
-    for k in range(len(integrals)):
-        integrals[k] = 0.5 * (values[k + 1] + values[k]) * (time[k + 1] - time[k])
-    return integrals
-
-
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time, settling time and overshoot of a step whose size is the first error."""
+    from hsv.simulation.curves import step_marks
+
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}
-    most, begun, risen, off = _step_marks(error)
+    most, begun, risen, off = step_marks(error)
     values = {"overshoot": max(0.0, most - 1.0)}
     if risen >= 0:
         values["rise_time"] = float(time[risen] - time[begun])
     if off + 1 < len(time):
         values["settling_time"] = float(time[off + 1])
     return values
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _step_marks(error: np.ndarray) -> tuple[float, int, int, int]:
-    """Return the largest share of a step that is done, and where 10 % and 90 % are first, or -1, and it is last off.
-
-    The share is not a number where any is none.
-    """
-    most, begun, risen, off = -np.inf, -1, -1, -1
-    for k in range(len(error)):
-        done = 1.0 - error[k] / error[0]
-        if not done <= most and not math.isnan(most):
-            most = done
-        if begun < 0 and done >= 0.1:
-            begun = k
-        if risen < 0 and done >= 0.9:
-            risen = k
-        if abs(done - 1.0) > SETTLING_BAND:
-            off = k
-    return most, begun, risen, off
 
 
 def _decay_time(time: np.ndarray, magnitude: np.ndarray) -> float:
