@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from hsv.sha256_lanes import digests
+from hsv.sha256_lanes import LANES
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
+from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario
 from hsv.simulation.side_by_side import FlightGroup
@@ -30,7 +31,7 @@ def warm() -> None:
             pass
     both = [assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1}) for _ in range(2)]
     group = FlightGroup(both[0].plant.steps).fly(both)
-    digests([flight.history.flown for flight in group.flights])
+    fingerprints([group.flights[0].history.flown] * LANES)
 
 
 if __name__ == "__main__":
