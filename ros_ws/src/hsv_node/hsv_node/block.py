@@ -8,11 +8,10 @@ from typing import Any
 from hsv_msgs.msg import Run
 
 from hsv.errors import RunError
-from hsv.graph.description import TOPICS, NodeDescription
-from hsv.graph.exchange import FILL, READ
+from hsv.graph.description import NodeDescription
 from hsv.simulation.blocks import Signals
-from hsv_node.codec import plain_class
 from hsv_node.lockstep import PeerNode
+from hsv_node.wire import STEP_PLACE, TAKE, Values, giver
 
 
 class BlockNode(PeerNode):
@@ -26,11 +25,10 @@ class BlockNode(PeerNode):
         assert role.block is not None
         self._step = role.block.step
         self.signals = Signals()
-        self._given: dict[str, Any] = {}
+        self._given: dict[str, Values] = {}
         # In the order of the role: others wait for the first, and work on it while the rest is published.
-        self._answers = [
-            (FILL[topic], plain_class(TOPICS[topic])(), self.create_step_publisher(topic)) for topic in role.publishes
-        ]
+        self._answers = [(giver(topic), self.create_step_publisher(topic)) for topic in role.publishes]
+        self._take = {topic: TAKE[topic]() for topic in self.role.subscribes}
         delayed = self.role.delayed
         self._delays = {topic: int(topic in delayed) for topic in self.role.subscribes}
         for topic in self.role.subscribes:
@@ -44,21 +42,23 @@ class BlockNode(PeerNode):
     def stepped(self, signals: Signals) -> None:
         """Called after each step; overridden to tell of it."""
 
-    def on_message(self, topic: str, message: Any) -> None:
+    def on_message(self, topic: str, values: Values) -> None:
         """Step as soon as all messages of a step have arrived."""
-        given, delays = self._given, self._delays
-        given[topic] = message
-        step = message.step + delays[topic]
-        due = []
-        for name, delay in delays.items():
-            # Before the first step there is none.
-            if step > 0 or not delay:
-                if name not in given or given[name].step + delay != step:
-                    return
-                due.append(name)
-        signals = self.signals
-        for name in due:
-            READ[name](given[name], signals)
+        given, delays, signals, take = self._given, self._delays, self.signals, self._take
+        if len(delays) == 1:
+            take[topic](values, signals)
+        else:
+            given[topic] = values
+            step = values[STEP_PLACE] + delays[topic]
+            due = []
+            for name, delay in delays.items():
+                # Before the first step there is none.
+                if step > 0 or not delay:
+                    if name not in given or given[name][STEP_PLACE] + delay != step:
+                        return
+                    due.append(name)
+            for name in due:
+                take[name](given[name], signals)
         try:
             self.advance(signals)
         except RunError as error:
@@ -66,9 +66,8 @@ class BlockNode(PeerNode):
             self.get_logger().fatal(str(error))
             self.finish(1)
             return
-        for fill, answer, publish in self._answers:
-            fill(signals, answer, plain_class)
-            publish(answer)
+        for give, publish in self._answers:
+            publish(give(signals))
         self.stepped(signals)
 
     def advance(self, signals: Signals) -> None:

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import field, make_dataclass
 from functools import cache
+from operator import itemgetter
 from typing import Any, Protocol
 
 from hsv.errors import RunError
@@ -164,11 +165,11 @@ def _text(value: str, lengths: list[int]) -> tuple[int, bytes]:
 class _Layout:
     """Offsets of all fields in a message whose texts and sequences have given lengths.
 
-    ``length_at`` gives the length that stands at an offset. ``padding`` is what DDS sends behind the message; it is
-    there without DDS, too, so that bags of nodes in one process have the same bytes.
+    ``length_at`` gives the length that stands at an offset and a place among the values. ``pack`` pads the message as
+    DDS does; it does without DDS, too, so that bags of nodes in one process have the same bytes.
     """
 
-    def __init__(self, kind: _Kind, length_at: Callable[[int], int]) -> None:
+    def __init__(self, kind: _Kind, length_at: Callable[[int, int], int]) -> None:
         self._length_at = length_at
         self._formats = ["<4s"]
         self._offset, self._values = 0, 1
@@ -178,8 +179,11 @@ class _Layout:
         made = kind.lay(self)
         self.made: Callable[[tuple[Any, ...]], Any] = eval(f"lambda values: {made}", self.classes)
         self.struct = struct.Struct("".join(self._formats))
-        self.padding = bytes(-self.struct.size % WIRE_ALIGNMENT)
+        self.pack = struct.Struct(f"{self.struct.format}{-self.struct.size % WIRE_ALIGNMENT}x").pack
         self.lengths = tuple(self._lengths)
+        # Of a tuple, and of a tuple of one: both are there for a first place of two.
+        self._lengths_in = itemgetter(*self._places, *self._places) if self._places else lambda values: ()
+        self._twice = (*self.lengths, *self.lengths)
 
     def put(self, code: str, count: int = 1) -> int:
         """Append so many numbers, or a text of so many bytes, aligned; return the place of the first value."""
@@ -195,7 +199,8 @@ class _Layout:
     def length(self) -> int:
         """Append a length and return it."""
         self._places.append(self.put(_LENGTH))
-        self._lengths.append(self._length_at(len(_LITTLE_ENDIAN) + self._offset - struct.calcsize(_LENGTH)))
+        offset = len(_LITTLE_ENDIAN) + self._offset - struct.calcsize(_LENGTH)
+        self._lengths.append(self._length_at(offset, self._places[-1]))
         return self._lengths[-1]
 
     def unpack(self, data: bytes) -> tuple[Any, ...] | None:
@@ -206,10 +211,11 @@ class _Layout:
         values = self.struct.unpack_from(data)
         if values[0][:2] != _LITTLE_ENDIAN[:2]:
             return None
-        for place, length in zip(self._places, self.lengths, strict=True):
-            if values[place] != length:
-                return None
-        return values
+        return values if self._lengths_in(values) == self._twice else None
+
+    def fits(self, values: tuple[Any, ...]) -> bool:
+        """Return whether these are so many values, with these lengths."""
+        return len(values) == self._values and self._lengths_in(values) == self._twice
 
 
 class Codec:
@@ -231,6 +237,8 @@ class Codec:
         )
         self._layouts: dict[tuple[int, ...], _Layout] = {}
         self._last: _Layout | None = None
+        """The layout of what was read last, and of what was packed last."""
+        self._packed: _Layout | None = None
 
     def encode(self, message: Any) -> bytes:
         """Return ``message`` as CDR bytes.
@@ -243,8 +251,20 @@ class Codec:
         layout = self._layouts.get(tuple(lengths))
         if layout is None:
             known = iter(lengths)
-            layout = self._keep(_Layout(self._kind, lambda _: next(known)))
-        return layout.struct.pack(_LITTLE_ENDIAN, *values) + layout.padding
+            layout = self._keep(_Layout(self._kind, lambda *_: next(known)))
+        return layout.pack(_LITTLE_ENDIAN, *values)
+
+    def pack(self, values: tuple[Any, ...]) -> bytes:
+        """Return as CDR bytes a message that is given as :meth:`unpack` does, but for the encapsulation.
+
+        Raises:
+            struct.error: A value is no number of its type, or there are not as many as the lengths among them say.
+        """
+        whole = (_LITTLE_ENDIAN, *values)
+        layout = self._packed
+        if layout is None or not layout.fits(whole):
+            layout = self._packed = self._keep(_Layout(self._kind, lambda _, place: whole[place]))
+        return layout.pack(*whole)
 
     def decode(self, data: bytes) -> Any:
         """Return the message that CDR bytes are.
@@ -252,18 +272,30 @@ class Codec:
         Raises:
             RunError: They are no little-endian CDR of this type.
         """
+        values = self.unpack(data)
+        assert self._last is not None
+        return self._last.made(values)
+
+    def unpack(self, data: bytes) -> tuple[Any, ...]:
+        """Return all that stands in CDR bytes: the encapsulation, and the fields in order as numbers and bytes.
+
+        A text or sequence is preceded by its length.
+
+        Raises:
+            RunError: They are no little-endian CDR of this type.
+        """
         layout = self._last
         values = layout.unpack(data) if layout else None
-        if layout is None or values is None:
+        if values is None:
             layout = self._last = self._measure(data)
             values = layout.struct.unpack_from(data)
-        return layout.made(values)
+        return values
 
     def _measure(self, data: bytes) -> _Layout:
         if data[:2] != _LITTLE_ENDIAN[:2]:
             raise RunError(f"{self.type}: CDR that begins with {data[:2].hex()}, expected 0001, little-endian")
 
-        def length(offset: int) -> int:
+        def length(offset: int, _: int) -> int:
             found: int = struct.unpack_from("<" + _LENGTH, data, offset)[0]
             if found > len(data):
                 raise struct.error(f"length {found} at byte {offset}")

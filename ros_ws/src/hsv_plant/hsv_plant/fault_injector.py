@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
@@ -18,6 +17,7 @@ from hsv.timing import NEVER, first_step
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle
+from hsv_node.wire import STEP_PLACE, Values, head_of
 
 
 class FaultInjectorNode(BlockNode):
@@ -43,17 +43,17 @@ class FaultInjectorNode(BlockNode):
         super().start_run(run)
         self._due = 0
 
-    def on_message(self, topic: str, message: Any) -> None:
+    def on_message(self, topic: str, values: Values) -> None:
         """Step; in a run, a step or time other than the expected one ends it."""
         if self.exit_code is not None:
             return  # the run has ended, and why is said
         if self.announced is not None:
-            stamp = message.header.stamp
-            if (message.step, stamp.sec, stamp.nanosec) != (self._due, *stamp_of(self._due, self.announced.period)):
-                self._refuse(topic, message)
+            step, stamp = values[STEP_PLACE], head_of(values)
+            if step != self._due or stamp[:2] != stamp_of(step, self.announced.period):
+                self._refuse(topic, step, stamp.sec + 1e-9 * stamp.nanosec)
                 return
             self._due += 1
-        super().on_message(topic, message)
+        super().on_message(topic, values)
 
     def missing(self) -> list[str]:
         """Wait for the links; two controllers in them end the run before it begins."""
@@ -62,16 +62,15 @@ class FaultInjectorNode(BlockNode):
             self._end_for_two(names)
         return missing
 
-    def _refuse(self, topic: str, message: Any) -> None:
+    def _refuse(self, topic: str, step: int, time: float) -> None:
         names = self.publishers_of(topic)
         if len(names) > 1:
             self._end_for_two(names)
             return
-        name, stamp = names[0] if names else self._controller.name, message.header.stamp
-        time = stamp.sec + 1e-9 * stamp.nanosec
+        name = names[0] if names else self._controller.name
         due = self._due * self._period
         self.get_logger().fatal(
-            f"{name} answered step {message.step} at {time:.2f} s on {self.resolve_topic_name(topic)}, expected step "
+            f"{name} answered step {step} at {time:.2f} s on {self.resolve_topic_name(topic)}, expected step "
             f"{self._due} at {due:.2f} s"
         )
         self.finish(1)

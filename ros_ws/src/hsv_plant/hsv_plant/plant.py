@@ -7,9 +7,7 @@ import signal
 import time
 import uuid
 from collections.abc import Sequence
-from typing import Any
 
-import numpy as np
 from hsv_msgs.msg import Ready, RecorderProgress, Run, VehicleState
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -26,22 +24,20 @@ from hsv.graph.description import (
     RECORDER_PROGRESS,
     RUN,
     STATE,
-    TOPICS,
     NodeDescription,
     controller_node,
     peers,
 )
-from hsv.graph.exchange import FILL, READ
 from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
 from hsv.graph.standstill import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
 from hsv.vehicle.dynamics import INPUT_NAMES
 from hsv.vehicle.plant import FlightStatus, Plant
-from hsv_node.codec import codec, plain_class
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
+from hsv_node.wire import STEP_PLACE, TAKE, Head, Values, giver
 from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
@@ -67,12 +63,9 @@ class PlantNode(LockstepNode):
         self._foreign_controller = ""
         """Full name of the controller where it is a node that is not of this bench."""
         self._ready: set[str] = set()
-        messages = {topic: plain_class(TOPICS[topic])() for topic in PLANT.publishes}
-        self._state_message = messages[STATE]
         # The measurement first: the other nodes work on it while the rest is published.
-        self._answers = [
-            (FILL[topic], message, self.create_step_publisher(topic)) for topic, message in messages.items()
-        ]
+        self._answers = [(giver(topic), self.create_step_publisher(topic)) for topic in PLANT.publishes]
+        self._take_actuator = TAKE[ACTUATOR]()
         self.create_step_subscription(ACTUATOR, self._on_actuator)
         self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
         self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
@@ -122,15 +115,16 @@ class PlantNode(LockstepNode):
         self._messages += 1
         self._continue()
 
-    def _on_actuator(self, message: Any) -> None:
+    def _on_actuator(self, values: Values) -> None:
         signals = self._signals
-        if not self._started or message.step != signals.step:
-            self.say_foreign(ACTUATOR, message.step, signals.step)
+        step = values[STEP_PLACE]
+        if not self._started or step != signals.step:
+            self.say_foreign(ACTUATOR, step, signals.step)
             return
         self._messages += 1
         if signals.status is FlightStatus.RUNNING:
-            READ[ACTUATOR](message, signals)
-            if not np.isfinite(signals.actuator).all():
+            self._take_actuator(values, signals)
+            if not all(map(math.isfinite, signals.actuator.tolist())):
                 self._refuse_answer(signals)
                 return
             self._answered = True
@@ -156,7 +150,9 @@ class PlantNode(LockstepNode):
             self._publish()
 
     def _advance(self) -> None:
-        VEHICLE.step(self.plant, self._signals)
+        signals = self._signals
+        VEHICLE.step(self.plant, signals)
+        signals.header = Head.at(signals.step, signals.period)
 
     def _room(self) -> bool:
         return not self.recorded or self._signals.step < self._recorded_step + MAX_AHEAD
@@ -171,13 +167,12 @@ class PlantNode(LockstepNode):
 
     def _publish(self) -> None:
         signals = self._signals
-        for fill, message, publish in self._answers:
-            fill(signals, message, plain_class)
-            publish(message)
+        for give, publish in self._answers:
+            publish(give(signals))
         status = FlightStatus(signals.status)
         if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
             print(f"step {signals.step} of {self.plant.steps}", flush=True)
-        if self.diagnosis_due(stamp := self._state_message.header.stamp):
+        if self.diagnosis_due(stamp := signals.header.stamp):
             self.diagnose(stamp, step=signals.step, status=status.name)
 
     def poll(self) -> None:
@@ -215,13 +210,13 @@ class PlantNode(LockstepNode):
         """Say how the run ended, here and to the other nodes."""
         if not self._started:
             return
-        run, where = f"run {short_id(self._run)}", step_in_words(self._state_message)
+        run, where = f"run {short_id(self._run)}", step_in_words(self._signals)
         match self._signals.status:
             case FlightStatus.RUNNING:
                 self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
             case FlightStatus.FINISHED:
                 self.get_logger().info(f"{run} finished at {where}")
-        self._last_state.publish(codec(TOPICS[STATE]).encode(self._state_message))
+        self._last_state.publish(giver(STATE)(self._signals))
         self._last_state.wait_for_all_acked(Duration(seconds=LAST_WORDS))
 
     def _try_start(self) -> None:
