@@ -34,6 +34,7 @@ PYTHON = (
 """Beginnings of the names by which compiled functions take arguments from Python, raise its errors, get memory."""
 
 ON_THE_PATH = (
+    "bound.py",
     "elementary.py",
     "elimination.py",
     "inheritance.py",

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from hsv.bound import bound
 from hsv.compiled import njit_in_flight
 from hsv.lanes import choose, every, lanes_in, least, most
 from hsv.lpv.polytope import PolytopeData
@@ -128,6 +129,8 @@ class FamilyLaw:
 
     def __init__(self, data: NominalData) -> None:
         self.data = data
+        n, m = data.gains.shape[2], data.gains.shape[1]
+        self._nominal_input = bound(nominal_input, data, np.empty(n), np.empty(m))
 
     def reset(self) -> None:
         """Nothing to forget."""
@@ -135,7 +138,7 @@ class FamilyLaw:
     def step(self, deviation: np.ndarray) -> LawResult:
         """Return the nominal input for x_n (9)."""
         u_n = np.empty(self.data.gains.shape[1])
-        found, inside = nominal_input(self.data, deviation, u_n)
+        found, inside = self._nominal_input(self.data, np.ascontiguousarray(deviation, float), u_n)
         index = int(found)
         status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
         gain = self.data.gains[index] if len(self.data.gains) else np.empty(0)

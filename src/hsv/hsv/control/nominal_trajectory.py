@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.bound import bound
 from hsv.compiled import njit_in_flight
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
@@ -62,8 +62,7 @@ def nominal_advance(
     return inside
 
 
-@dataclass(frozen=True)
-class NominalResult:
+class NominalResult(NamedTuple):
     """One step: x_r (9), u_r (2), x_n (9), u_n (2), the gain K (2, 9) used, its index (0 = outermost), status."""
 
     reference: np.ndarray
@@ -98,10 +97,11 @@ class NominalTrajectory:
         self._scratch = np.empty(vertices), np.empty(entries), np.empty(N_STATES)
         self._step = 0
         self._planned = reference
+        self._input = np.zeros(N_INPUTS)
         # Compile now: a cold cache must not stall a flight.
-        rest = FamilyLaw(self.data).step(self._deviation).input
-        weights, S, new = self._scratch
-        nominal_advance(self.data.polytope, 0.0, 0.0, self._deviation, rest, reference.data.defect[0], weights, S, new)
+        FamilyLaw(self.data).step(self._deviation)
+        own, defect = (self._deviation, self._input), reference.data.defect[0]
+        self._nominal_advance = bound(nominal_advance, self.data.polytope, 0.0, 0.0, *own, defect, *self._scratch)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
@@ -155,9 +155,10 @@ class NominalTrajectory:
         self._step += 1
         deviation = self._deviation.copy()
         chosen = self.law.step(deviation)
-        weights, S, new = self._scratch
-        in_envelope = not len(self.data.gains) or nominal_advance(
-            self.data.polytope, state[0], state[1], self._deviation, chosen.input, defects[row], weights, S, new
+        own = self._deviation, self._input
+        self._input[:] = chosen.input
+        in_envelope = not len(self.data.gains) or self._nominal_advance(
+            self.data.polytope, state[0], state[1], *own, defects[row], *self._scratch
         )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
         return NominalResult(

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.bound import bound
 from hsv.compiled import njit_in_flight
 from hsv.control.estimator import Estimator
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
@@ -213,8 +214,7 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     return tuple(NotchSection(*row) for row in zip(*columns, strict=True))
 
 
-@dataclass(frozen=True)
-class NotchResult:
+class NotchResult(NamedTuple):
     """``filtered_pitch_rate`` (rad/s) and the filter states (2 n) before the update of this step."""
 
     filtered_pitch_rate: float
@@ -234,8 +234,9 @@ class NotchFilter:
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
-        self.step(0.0)  # compile now: a cold cache must not stall a flight
-        self.reset()
+        # Compile now: a cold cache must not stall a flight.
+        self._filter = bound(filter_step, self.data, self._state, 0.0)
+        rest(self.data, 0.0, self._state)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
@@ -261,4 +262,4 @@ class NotchFilter:
             rest(self.data, pitch_rate, self._state)
             self._started = True
         before = self._state.copy()
-        return NotchResult(filter_step(self.data, self._state, pitch_rate), before)
+        return NotchResult(self._filter(self.data, self._state, pitch_rate), before)

@@ -304,6 +304,7 @@ class TubeLaw(Controller):
 
     def _arrange(self, factors: list[tuple[int, np.ndarray]]) -> None:
         self.factors = factors
+        self._compact = [compact(tau) for _, tau in factors]
         design = self.design
         self.kernel = TubeData(
             np.stack([design.adjusted_gain(tau) for _, tau in factors]),
@@ -354,7 +355,7 @@ class TubeLaw(Controller):
             component=tube.farthest(error) if tube and not inside else "",
             u_feedback=u_feedback,
             u_nominal=inputs.nominal_input,
-            tau=compact(self.factors[active][1]),
+            tau=self._compact[active],
             status=status,
             effectiveness=effectiveness_in(self._watch) if self._effectiveness else None,
         )

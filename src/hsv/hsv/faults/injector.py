@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -37,8 +36,7 @@ NEVER_TIME = 1e9
 """Stop (s) of a fault that does not end, where others do."""
 
 
-@dataclass(frozen=True)
-class FaultResult:
+class FaultResult(NamedTuple):
     """Input that reaches the actuators (2), and the active faults.
 
     Those of command, actuators, effectors and engine are due in this step, those of sensors in the next: its

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.bound import bound
 from hsv.compiled import njit_in_flight
 from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
@@ -91,6 +91,8 @@ def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, pe
 
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
 """Conditions of :func:`hsv.vehicle.dynamics.forces_in` in still air, with an engine that works."""
+
+_CALM = CALM.tolist()
 
 
 class PlantData(NamedTuple):
@@ -195,8 +197,7 @@ def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measure
     receive(data.link, memory.link, step, data.seed, measurement)
 
 
-@dataclass(frozen=True)
-class PlantResult:
+class PlantResult(NamedTuple):
     """The state x (9) of a step, what is measured of it (9), and what has led to it.
 
     Lift N, drag N, thrust N, pitching moment N m and dynamic pressure Pa there; where the effectors (2) were last; wind
@@ -255,6 +256,9 @@ class Plant:
             SUBSTEPS * computation(values, period)[1],
             check_all((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
+        state, held, work = initial.state.copy(), initial.input.copy(), workspace()
+        self._advance_ideal = bound(advance, state, held, vehicle, period, substeps, work, None)
+        self._forces_in_calm = bound(forces, state, held, vehicle)
         self.reset()
         # Compile now, also what a fault in flight would need: a cold cache must not stall a flight.
         self.step(initial.input)
@@ -337,9 +341,10 @@ class Plant:
             advance_plant(self._state, actuator, data, memory, self._faults, self._step)
             return
         # What advance_plant would do as well; but to hand it all its data takes longer than the step.
-        memory.effector[:] = np.minimum(np.maximum(actuator, data.actuators.minimum), data.actuators.maximum)
-        memory.actuators[:, 0], memory.actuators[:, 1] = memory.effector, 0.0
-        advance(self._state, memory.effector, self.vehicle, self.period, data.substeps, memory.work)
+        effector = memory.effector
+        np.minimum(np.maximum(actuator, data.actuators.minimum), data.actuators.maximum, out=effector)
+        memory.actuators[:, 0], memory.actuators[:, 1] = effector, 0.0
+        self._advance_ideal(self._state, effector, self.vehicle, self.period, data.substeps, memory.work, None)
 
     def _result(self) -> PlantResult:
         if not in_model_range(self._state, self.vehicle.angle_limit):
@@ -349,13 +354,11 @@ class Plant:
         else:
             status = FlightStatus.RUNNING
         effector, conditions = self._memory.effector.copy(), self._memory.conditions.copy()
-        if np.array_equal(conditions, CALM):
-            felt = forces(self._state, effector, self.vehicle)
+        if conditions.tolist() == _CALM:
+            felt = self._forces_in_calm(self._state, effector, self.vehicle)
         else:
             *felt, _ = forces_in(conditions, self._state, effector, self.vehicle)
-        measurement = np.empty_like(self._state)
-        if self._ideal:
-            measurement[:] = self._state
-        else:
+        measurement = self._state.copy()
+        if not self._ideal:
             sense(self._state, self.data, self._memory, self._faults, self._step, measurement)
         return PlantResult(self._step, self._state.copy(), measurement, tuple(felt), effector, conditions[:3], status)
