@@ -37,6 +37,7 @@ from hsv.recording.definitions import definition, type_hash
 from hsv.recording.roles import naming
 from hsv.recording.topic import Qos, Topic
 from hsv.recording.writer import BagWriter
+from hsv_bringup.flow_executor import BatchExecutor
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
 from hsv_node.codec import codec
 from hsv_node.lockstep import SAID_EVERY, PeerNode
@@ -219,4 +220,4 @@ class RecorderNode(PeerNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the recorder node."""
-    return run_node(RecorderNode, "recorder", args)
+    return run_node(RecorderNode, "recorder", args, BatchExecutor)
