@@ -9,6 +9,7 @@ setup(
     name="hsv_node",
     version=manifest.findtext("version"),
     packages=["hsv_node"],
+    package_data={"hsv_node": ["fastdds.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/hsv_node"]),
         ("share/hsv_node", ["package.xml"]),

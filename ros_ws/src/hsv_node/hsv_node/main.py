@@ -17,6 +17,7 @@ from rclpy.utilities import remove_ros_args
 
 from hsv.errors import HsvError, ParameterError
 from hsv_node.arguments import check_names, shared_parameters
+from hsv_node.middleware import prefer_profiles
 from hsv_node.process import ProcessNode
 
 
@@ -53,6 +54,7 @@ def run_nodes(
         others = remove_ros_args(words)[1:]
         if others and not own_arguments:
             raise ParameterError(f"argument {others[0]!r}: expected only those that follow --ros-args")
+        prefer_profiles()
         rclpy.init(args=words, signal_handler_options=rclpy.SignalHandlerOptions.NO)
     except rclpy_implementation.UnknownROSArgsError as error:
         return _refuse(name, ParameterError(f"unknown ROS arguments {error}"))
