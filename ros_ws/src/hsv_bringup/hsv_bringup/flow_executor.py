@@ -8,6 +8,7 @@ from typing import Any
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy
 
 SWEEPS = 128
 """Sweeps over all subscriptions between two looks at everything else (services, timers, a wish to stop)."""
@@ -18,9 +19,14 @@ BATCH = 0.005
 LOOKS = 8
 """Batches between two looks at everything else."""
 
+_Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
+"""What takes a message, with which arguments, and what is called with it."""
+
 
 class FlowExecutor(SingleThreadedExecutor):
     """Takes messages subscription by subscription, node by node in the order they were added; waits if none came.
+
+    Announcements that a node hears once a run are left to the wait set.
 
     With the nodes in the order of the data flow, one sweep is a step of the loop, and nothing is ever waited for: a
     message published in the same process is there when its reader's turn comes. Where it is not (another middleware),
@@ -29,14 +35,18 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def __init__(self) -> None:
         super().__init__()
-        self._subscriptions: list[tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]] = []
+        self._subscriptions: list[_Subscription] = []
+        self._flowing: list[_Subscription] = []
+        """Those that are swept."""
 
     def add_node(self, node: Node) -> bool:
         """Add a node with the subscriptions that it has now; later ones are left to the base class."""
-        self._subscriptions += [
-            (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
-            for subscription in node.subscriptions
-        ]
+        for subscription in node.subscriptions:
+            taken = (subscription.handle.take_message, subscription.msg_type, subscription.raw, subscription.callback)
+            self._subscriptions.append(taken)
+            # What a node is told once a run is not looked for in every step; what is recorded is, for its time is then.
+            if subscription.raw or subscription.qos_profile.durability is not DurabilityPolicy.TRANSIENT_LOCAL:
+                self._flowing.append(taken)
         return bool(super().add_node(node))
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
@@ -64,7 +74,7 @@ class FlowExecutor(SingleThreadedExecutor):
 
     def _sweep(self) -> bool:
         came = False
-        for take, kind, raw, callback in self._subscriptions:
+        for take, kind, raw, callback in self._flowing:
             taken = take(kind, raw)
             if taken is not None:
                 came = True

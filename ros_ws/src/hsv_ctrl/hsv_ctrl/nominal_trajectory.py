@@ -20,6 +20,8 @@ from hsv_node.main import run_node
 from hsv_node.parameters import declare_vehicle
 from hsv_node.qos import LATCHED
 
+_SOLVER_FAILED = int(NominalStatus.SOLVER_FAILED)
+
 
 class NominalTrajectoryNode(BlockNode):
     """Turns the measurement into reference and nominal state, and takes commands in flight."""
@@ -47,10 +49,10 @@ class NominalTrajectoryNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Tell how the law fares; a solver that begins to fail is a warning."""
-        status = NominalStatus(signals.nominal_status)
-        failed = NominalStatus.SOLVER_FAILED in status
+        failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
         fails, self._failed = failed and not self._failed, failed
         if fails or self.diagnosis_due(signals.header.stamp):
+            status = NominalStatus(signals.nominal_status)
             self.diagnose(
                 signals.header.stamp,
                 "running" if status is NominalStatus.OK else str(status.name),

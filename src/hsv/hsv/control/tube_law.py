@@ -16,6 +16,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.bound import bound
 from hsv.compiled import njit_in_flight
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
@@ -198,6 +199,11 @@ def tube_step(
     return active
 
 
+def _plain(array: Any) -> np.ndarray:
+    """Return ``array`` as float64 one after the other in memory: itself, in a flight."""
+    return np.ascontiguousarray(array, float)
+
+
 @dataclass(frozen=True)
 class TubeResult(ControllerResult):
     """The input (2) to apply and how it came about; see the message TubeStatus for the fields.
@@ -262,7 +268,9 @@ class TubeLaw(Controller):
         self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
-        self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown))))
+        given = ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown)))
+        self._step = bound(tube_step, self.kernel, self._memory, self._watch, 0, True, *given[1:], u, u, u)
+        self.step(given)
         self.reset()
 
     @classmethod
@@ -321,12 +329,14 @@ class TubeLaw(Controller):
 
     def step(self, inputs: ControllerInput) -> TubeResult:
         """Return the input of this step; the first of a run is step 0."""
-        k, x, _, reference, _, deviation, _, filter_state = inputs
+        k, estimate, q_f, *others = inputs
+        # As the bound function takes them for granted, whoever made them.
+        x, reference, _, deviation, _, filter_state = given = [_plain(array) for array in (estimate, *others)]
         memory, size = self._memory, len(filter_state)
         in_loop = 0 < size == 2 * len(self._notch.D)
         planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        active = tube_step(self.kernel, memory, self._watch, k, True, *inputs[1:], u_feedback, total, u)
+        active = self._step(self.kernel, memory, self._watch, k, True, x, q_f, *given[1:], u_feedback, total, u)
         self._next = k + 1
         error, tube = (x - reference - deviation)[:N_RIGID], None
         if in_loop:
