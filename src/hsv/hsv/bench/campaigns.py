@@ -8,14 +8,17 @@ from functools import cache
 from pathlib import Path
 
 from hsv.bench.c_flight import FLAGS, CFlight
-from hsv.bench.figure import Figure
+from hsv.bench.figure import Figure, interleaved
 from hsv.campaign.campaign import plan
 from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
 from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
 from hsv.lanes import WIDTH
+from hsv.sha256_lanes import LANES
 from hsv.simulation.assembly import assemble_flight
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.fingerprint import fingerprint, fingerprints
 from hsv.simulation.scenario import load_scenario
 
 
@@ -41,6 +44,17 @@ def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure
     ]
 
 
+def digests(repeats: int) -> list[Figure]:
+    """Return the fingerprints of as many flights as are digested at a time against those of one after the other."""
+    flight = fly(assemble_flight(load_scenario("case1"))).history.flown
+    flights = [flight.copy() for _ in range(LANES)]
+    ours, theirs = interleaved(
+        lambda: fingerprints(flights), lambda: [fingerprint(flown) for flown in flights], repeats
+    )
+    what = f"fingerprints of {LANES} flights of Case 1"
+    return [Figure("digests", what, "one after the other, hashlib", "s", ours, theirs, "most", 1.05)]
+
+
 def corners(repeats: int, workers: int) -> list[Figure]:
     """Return the wall time of the 1024 corners of Case 1, alone and against as many flights of the C build.
 
@@ -51,17 +65,17 @@ def corners(repeats: int, workers: int) -> list[Figure]:
     ours, theirs = [], []
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
 
-        def fly(name: str) -> None:
+        def fly_corners(name: str) -> None:
             run_campaign(campaign, ResultStore(Path(folder, name), campaign), flying)
 
         started = time.perf_counter()
         with make_executor(workers) as flying:
-            fly("first.parquet")
+            fly_corners("first.parquet")
             first = time.perf_counter() - started
             list(flying.fly(_build_c, campaign.text, range(workers)))
             for repeat in range(repeats):
                 started = time.perf_counter()
-                fly(f"{repeat}.parquet")
+                fly_corners(f"{repeat}.parquet")
                 ours.append(time.perf_counter() - started)
                 started = time.perf_counter()
                 list(flying.fly(_fly_c, campaign.text, range(campaign.batches)))

@@ -50,9 +50,18 @@ def against_rings(repeats: int, duration: float = 60.0) -> list[Figure]:
     ours, together = tuple(separate), tuple(composed)
     what, one = "lap of the graph, separate processes, recorded", "lap of the graph, composed, recorded"
     return [
-        Figure("graph", what, "bare ring, EventsExecutor, same recorder", "s", ours, tuple(events), "most", 1.5, 1.2),
+        Figure("graph", what, "bare ring, EventsExecutor, same recorder", "s", ours, tuple(events), "most", 1.0, 0.8),
         Figure("graph_wait_set", what, "bare ring, raw WaitSet, same recorder", "s", ours, tuple(wait_set)),
-        Figure("composed", one, "bare loop in one process, ordered take, same recorder", "s", together, tuple(ordered)),
+        Figure(
+            "composed",
+            one,
+            "bare loop in one process, ordered take, same recorder",
+            "s",
+            together,
+            tuple(ordered),
+            "most",
+            1.1,
+        ),
         _pace("separate processes", ours, 6.0, 8.0),
         _pace("composed", together, 25.0, 40.0),
     ]

@@ -27,6 +27,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "montecarlo": lambda: [
             *campaigns.over_workers(times(3), max(cores, 2)),
             *campaigns.corners(times(3), max(cores, 2)),
+            *campaigns.digests(times(10)),
         ],
         "offline": offline.design_and_verify,
     }
