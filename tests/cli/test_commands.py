@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import hsv as library
-from hsv.cli.main import EXIT_CODES, app
+from hsv.cli.all_commands import app
+from hsv.cli.main import EXIT_CODES
 from hsv.cli.output import UNIT_KEYS
 from hsv.control.design_file import find_design
 from hsv.simulation.metrics import METRICS

@@ -12,7 +12,7 @@ from typer.main import get_command
 import hsv
 import reference_pages
 import repository_pages
-from hsv.cli.main import app
+from hsv.cli.all_commands import app
 
 ROOT = Path(__file__).parents[2]
 

@@ -7,6 +7,7 @@ modules (launch files and other data are linked one by one).
 
 from __future__ import annotations
 
+import configparser
 import os
 import shutil
 import xml.etree.ElementTree as ElementTree
@@ -57,7 +58,9 @@ class Package:
                 parts.append(str(name))
             if not self.is_python or str(name) in _COPIED:
                 parts.append(path.read_bytes())
-        if not self.is_python:
+        if self.is_python:
+            parts.append(Path(__file__).read_bytes())  # writes the scripts
+        else:
             pins = (ROOT / route.constraints).read_text().splitlines()
             parts += [line for line in pins if line.startswith(_BINARY_INTERFACE)]
         return fingerprint(*parts)
@@ -135,18 +138,27 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
     try:
         stage.run(command, {**env, **own}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
     finally:
-        _hold_interrupts(INSTALL / "hsv" / "bin" / "hsv")
         for package, key in keys.items():
+            _simplify_scripts(package)
             if read_stamp(package.exit_code).strip() == "0":
                 write_stamp(package.stamp, key)
 
 
-def _hold_interrupts(script: Path) -> None:
-    """Have a script start with Ctrl-C held back, which :mod:`hsv.cli.entry` lets through as soon as it can answer it.
+def _simplify_scripts(package: Package) -> None:
+    """Write the scripts of a Python package as pip writes them.
 
-    Else it would be a traceback of Python's own start.
+    Those of "develop" first search the metadata of all packages, which takes longer than Python's own start. The script
+    of :mod:`hsv.cli.entry` starts with Ctrl-C held back, which would else be a traceback of Python's own start, and is
+    let through as soon as it can be answered.
     """
-    plain, held = f"#!{PYTHON}\n", f"#!/usr/bin/env -S --block-signal=INT {PYTHON}\n"
-    # A path with spaces has another first line.
-    if script.is_file() and (text := script.read_text()).startswith(plain):
-        script.write_text(held + text.removeprefix(plain))
+    entry_points = configparser.ConfigParser(delimiters=("=",))
+    entry_points.optionxform = str  # type: ignore[assignment, method-assign]
+    entry_points.read(BUILD / package.name / f"{package.name}.egg-info" / "entry_points.txt")
+    for name, entry_point in entry_points["console_scripts"].items() if "console_scripts" in entry_points else ():
+        module, function = entry_point.split(":")
+        held = "/usr/bin/env -S --block-signal=INT " if module == "hsv.cli.entry" else ""
+        for folder in ("bin", f"lib/{package.name}"):
+            script = INSTALL / package.name / folder / name
+            if script.is_file() and "EASY-INSTALL" in script.read_text():
+                start = f"#!{held}{PYTHON}\nimport sys\n\n"
+                script.write_text(f"{start}from {module} import {function}\n\nsys.exit({function}())\n")

@@ -5,53 +5,17 @@ from __future__ import annotations
 import inspect
 import os
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.completion import completion_init
 
 import hsv
-from hsv.cli.bench import bench
-from hsv.cli.certify import certify
-from hsv.cli.check import check
-from hsv.cli.claims import claims
-from hsv.cli.cluster import cluster
-from hsv.cli.command import command
-from hsv.cli.conclude import conclude
-from hsv.cli.design import design
-from hsv.cli.diff import diff
-from hsv.cli.equipment import equipment
-from hsv.cli.export import export
-from hsv.cli.export_controller import export_controller
 from hsv.cli.extras import missing_extra
-from hsv.cli.fault import fault
-from hsv.cli.faults import faults
-from hsv.cli.figures import figures
-from hsv.cli.govern import govern
-from hsv.cli.include import include
-from hsv.cli.info import info
-from hsv.cli.linearise import linearise
-from hsv.cli.montecarlo import montecarlo
 from hsv.cli.output import Interrupted, console, report_error
-from hsv.cli.play import play
-from hsv.cli.plot import plot
-from hsv.cli.prepare import prepare
-from hsv.cli.recover import recover
-from hsv.cli.replay import replay
-from hsv.cli.report import report
-from hsv.cli.resilience import resilience
-from hsv.cli.run import run
-from hsv.cli.scenarios import scenarios
-from hsv.cli.set import set
-from hsv.cli.simulate import simulate
-from hsv.cli.study import study
-from hsv.cli.topic import topic
-from hsv.cli.trim import trim
-from hsv.cli.vehicles import vehicles
-from hsv.cli.verify import verify
-from hsv.cli.view import view
-from hsv.cli.watch import watch
 from hsv.errors import HsvError, RunError, reason
 
 _INTERRUPTED = 130
@@ -67,14 +31,75 @@ EXIT_CODES = {
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Error for an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
-app = typer.Typer(
-    name="hsv",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode="rich",
-    context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
+COMMANDS = (
+    "trim",
+    "linearise",
+    "design",
+    "verify",
+    "certify",
+    "check",
+    "scenarios",
+    "govern",
+    "vehicles",
+    "equipment",
+    "faults",
+    "simulate",
+    "run",
+    "prepare",
+    "conclude",
+    "include",
+    "info",
+    "plot",
+    "report",
+    "view",
+    "replay",
+    "play",
+    "diff",
+    "recover",
+    "export",
+    "export-controller",
+    "bench",
+    "figures",
+    "claims",
+    "study",
+    "resilience",
+    "cluster",
+    "set",
+    "command",
+    "topic",
+    "watch",
+    "montecarlo",
+    "fault",
 )
+"""Names of the commands; each is in a module of this name, with underscores, a function or a group of commands."""
+
+
+def application(names: Sequence[str] = COMMANDS) -> typer.Typer:
+    """Return the command line with commands of these names, whose modules are imported."""
+    app = typer.Typer(
+        name="hsv",
+        add_completion=False,
+        pretty_exceptions_enable=False,
+        rich_markup_mode="rich",
+        context_settings={"help_option_names": ["-h", "--help"]},
+        epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
+    )
+    app.callback()(options)
+    groups = [app]
+    for name in names:
+        attribute = name.replace("-", "_")
+        command = getattr(import_module(f"hsv.cli.{attribute}"), attribute)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+            groups.append(command)
+        else:
+            app.command()(command)
+    for group in groups:
+        for registered in group.registered_commands:
+            # Folded to the terminal only: typer keeps the line breaks of the source in all paragraphs but the first.
+            paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
+            registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
+    return app
 
 
 def _version(wanted: bool) -> None:
@@ -83,7 +108,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
@@ -92,61 +116,16 @@ def options(
     """Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."""
 
 
-for function in (
-    trim,
-    linearise,
-    design,
-    verify,
-    certify,
-    check,
-    scenarios,
-    govern,
-    vehicles,
-    equipment,
-    faults,
-    simulate,
-    run,
-    prepare,
-    conclude,
-    include,
-    info,
-    plot,
-    report,
-    view,
-    replay,
-    play,
-    diff,
-    recover,
-    export,
-    export_controller,
-    bench,
-    figures,
-    claims,
-    study,
-    resilience,
-    cluster,
-    set,
-    command,
-    topic,
-    watch,
-):
-    app.command()(function)
-app.add_typer(montecarlo, name="montecarlo")
-app.add_typer(fault, name="fault")
-for group in (app, montecarlo, fault):
-    for registered in group.registered_commands:
-        # Folded to the terminal only: typer keeps the line breaks of the source in all paragraphs but the first.
-        paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
-        registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
-
-
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
     if "_HSV_COMPLETE" in os.environ:
         completion_init()  # a shell asks for the words that may come next
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
-        code = app(sys.argv[1:] or ["--help"], prog_name="hsv", standalone_mode=False)
+        words = sys.argv[1:] or ["--help"]
+        # One command is wanted: the modules of all, and what typer makes of them, take as long as numpy.
+        app = application(words[:1]) if words[0] in COMMANDS else application()
+        code = app(words, prog_name="hsv", standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
         if sys.stdout:
