@@ -8,13 +8,28 @@ from ros_domain import own_domain
 from hsv.bench.graph import graph_lap
 from hsv.bench.in_process import against_scipy
 from hsv.bench.ring import ring_lap
+from hsv.bench.startup import against_imports
 from hsv.bench.writing import against_mcap
+from hsv.errors import RunError
 
 
 def test_scipy_arrives_at_the_same_state():
     [measured] = against_scipy(1)
     assert 0.0 < measured.median < math.inf
     assert float(measured.note.split()[-1]) < 1e-3
+
+
+def test_the_start_of_commands_is_measured():
+    names = ["startup_help", "startup_trim", "startup_simulate"]
+    figures = against_imports(1)
+    assert [figure.name for figure in figures] == names
+    assert all(0.0 < figure.median < math.inf for figure in figures)
+
+
+def test_a_command_that_is_not_installed_cannot_be_measured(monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    with pytest.raises(RunError, match="no hsv on the search path"):
+        against_imports(1)
 
 
 def test_writing_is_measured():

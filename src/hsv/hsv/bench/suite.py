@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hsv.bench import campaigns, controllers, graph, in_process, live, offline, writing
+from hsv.bench import campaigns, controllers, graph, in_process, live, offline, startup, writing
 from hsv.bench.figure import Figure
 
 
@@ -21,6 +21,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "scipy": lambda: in_process.against_scipy(times(10)),
         "jsbsim": lambda: in_process.against_jsbsim(times(10)),
         "controllers": lambda: [*controllers.compiled_laws(times(40)), *controllers.a_step_in_python(times(20))],
+        "startup": lambda: startup.against_imports(times(10)),
         "mcap": lambda: writing.against_mcap(times(10)),
         "graph": lambda: graph.against_rings(times(5)),
         "live": lambda: live.watched(times(2)),
