@@ -19,7 +19,16 @@ SOURCES = (ROOT / "src", ROOT / "ros_ws" / "src", ROOT / "tools")
 _STAMP = STAMPS / "bytecode"
 
 # Some packages bring templates and samples for other versions of Python: what does not compile is left out.
-_COMPILE = "import compileall, sys; [compileall.compile_dir(path, quiet=2, workers=0) for path in sys.argv[1:]]"
+_COMPILE = """
+import compileall, re, sys
+for path in sys.argv[2:]:
+    compileall.compile_dir(path, quiet=2, workers=0, rx=re.compile(sys.argv[1]))
+"""
+
+_OWN_TESTS = "/tests?/"
+"""Directories of installed packages that no process of the bench imports: a quarter of all that is installed."""
+
+_NOTHING = "(?!)"
 
 
 def compile_packages(python: Path, env: Mapping[str, str], stage: Stage) -> None:
@@ -28,7 +37,7 @@ def compile_packages(python: Path, env: Mapping[str, str], stage: Stage) -> None
     Raises:
         SetupError: the interpreter does not run.
     """
-    stage.run([python, "-c", _COMPILE, *VENV.glob("lib/python3*/site-packages")], env)
+    stage.run([python, "-c", _COMPILE, _OWN_TESTS, *VENV.glob("lib/python3*/site-packages")], env)
 
 
 def compile_sources(python: Path, env: Mapping[str, str], stage: Stage) -> None:
@@ -37,7 +46,7 @@ def compile_sources(python: Path, env: Mapping[str, str], stage: Stage) -> None:
     Raises:
         SetupError: the interpreter does not run.
     """
-    stage.run([python, "-c", _COMPILE, *SOURCES], env)
+    stage.run([python, "-c", _COMPILE, _NOTHING, *SOURCES], env)
     write_stamp(_STAMP, _key())
 
 

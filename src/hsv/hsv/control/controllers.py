@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from typing import TYPE_CHECKING, Any
 
 from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
@@ -55,6 +54,8 @@ CONTROLLER_PARAMETERS = (
 
 def controller_names() -> list[str]:
     """Return the names of all registered controllers."""
+    from importlib.metadata import entry_points  # slow
+
     return sorted({*SHIPPED_CONTROLLERS, *(entry.name for entry in entry_points(group=GROUP))})
 
 
@@ -101,6 +102,8 @@ def class_place(name: str) -> str:
                 f"controller = {name!r}: {module!r} is no module, expected package.module:Class or path/lib.so:symbol"
             )
         return place
+    from importlib.metadata import entry_points  # slow
+
     for entry in entry_points(group=GROUP):
         if entry.name == name:
             return entry.value

@@ -19,7 +19,6 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Self
@@ -248,7 +247,14 @@ def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def vehicle_names() -> list[str]:
     """Return the names of all registered vehicles."""
-    return sorted({*SHIPPED_VEHICLES, *(entry.name for entry in entry_points(group=GROUP))})
+    return sorted({*SHIPPED_VEHICLES, *_places_elsewhere()})
+
+
+def _places_elsewhere() -> dict[str, str]:
+    """Return the places of vehicles of other packages, by name."""
+    from importlib.metadata import entry_points  # slow
+
+    return {entry.name: entry.value for entry in reversed([*entry_points(group=GROUP)])}
 
 
 def load_vehicle(name: str = DEFAULT_VEHICLE) -> Vehicle:
@@ -300,7 +306,7 @@ def _read(name: str) -> Tables:
 def _path(name: str) -> Path:
     if is_path(name):
         return Path(name)
-    place = SHIPPED_VEHICLES.get(name) or next((e.value for e in entry_points(group=GROUP) if e.name == name), "")
+    place = SHIPPED_VEHICLES.get(name) or _places_elsewhere().get(name, "")
     if not place:
         hint = did_you_mean(name, vehicle_names())
         raise VehicleError(
