@@ -1,7 +1,8 @@
 """Conversion between messages and the signals of the loop, with one pair of functions per topic.
 
-The nodes use them with ROS 2 messages, the replay with those of a bag's own definitions. Messages are objects with the
-fields of their type as attributes; those handed out are filled in place.
+The replay uses them with the messages of a bag's own definitions. Messages are objects with the fields of their type as
+attributes; those handed out are filled in place. The nodes convert their step messages without an object, by
+``hsv_node.wire``; its tests hold it against these.
 """
 
 from __future__ import annotations
