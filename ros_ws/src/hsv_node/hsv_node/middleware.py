@@ -7,7 +7,7 @@ from collections.abc import MutableMapping
 from pathlib import Path
 
 PROFILES = Path(__file__).with_name("fastdds.xml")
-"""The settings: they concern a node's own threads, and nothing that others see of it."""
+"""The settings: how often a node announces itself at first, and when its own threads are woken."""
 
 _VARIABLES = ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE")
 _OWN_FILE = "DEFAULT_FASTRTPS_PROFILES.xml"
