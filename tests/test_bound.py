@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 from hsv.bound import bound
+from hsv.vehicle.envelope import in_model_range
 
 
 @njit
@@ -35,3 +37,9 @@ def test_an_argument_as_by_default_is_compiled_as_if_left_out():
 
 def test_what_is_not_compiled_is_returned_as_it_is():
     assert bound(scaled.py_func, np.ones(1), 1.0, None) is scaled.py_func
+
+
+def test_a_bound_function_travels_to_another_process():
+    state = np.arange(9.0)
+    sent = pickle.loads(pickle.dumps(bound(in_model_range, state, 0.5)))
+    assert sent(state, 0.5) == in_model_range(state, 0.5)

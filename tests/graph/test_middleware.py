@@ -14,7 +14,8 @@ def test_our_settings_are_the_default(tmp_path):
     environment: dict[str, str] = {}
     prefer_profiles(environment, tmp_path)
     assert environment == {"FASTRTPS_DEFAULT_PROFILES_FILE": str(PROFILES)}
-    assert [profile.tag.rpartition("}")[2] for profile in ElementTree.parse(PROFILES).getroot()[0]] == ["participant", "data_writer"]
+    profiles = [profile.tag.rpartition("}")[2] for profile in ElementTree.parse(PROFILES).getroot()[0]]
+    assert profiles == ["participant", "data_writer"]
 
 
 @pytest.mark.parametrize("name", ["FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"])

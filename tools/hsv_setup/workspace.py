@@ -160,5 +160,6 @@ def _simplify_scripts(package: Package) -> None:
         for folder in ("bin", f"lib/{package.name}"):
             script = INSTALL / package.name / folder / name
             if script.is_file() and "EASY-INSTALL" in script.read_text():
-                start = f"#!{held}{PYTHON}\nimport sys\n\n"
-                script.write_text(f"{start}from {module} import {function}\n\nsys.exit({function}())\n")
+                # Processes that are spawned import the script as a module.
+                start = f"#!{held}{PYTHON}\nimport sys\n\nfrom {module} import {function}\n\n"
+                script.write_text(f'{start}if __name__ == "__main__":\n    sys.exit({function}())\n')
