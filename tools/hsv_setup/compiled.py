@@ -21,7 +21,8 @@ _STAMP = STAMPS / "compiled"
 
 
 def _sources() -> list[Path]:
-    return [path for path in sorted(_LIBRARY.rglob("*.py")) if "numba" in path.read_text()]
+    sources = {path: path.read_text() for path in sorted(_LIBRARY.rglob("*.py"))}
+    return [path for path, text in sources.items() if "numba" in text or "njit" in text]
 
 
 def _caches() -> list[Path]:
