@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from importlib.util import find_spec
 
@@ -89,6 +90,7 @@ def against_jsbsim(repeats: int) -> list[Figure]:
     aircraft = import_module("jsbsim").FGFDMExec(None)
     aircraft.set_debug_level(0)
     aircraft.load_model("c172x")
+    aircraft.set_output_filename(0, os.devnull)  # else a file appears where the bench is run
     aircraft["ic/h-sl-ft"], aircraft["ic/vc-kts"] = 5000.0, 100.0
     aircraft.run_ic()
     plant: Plant = assemble(flight_parameters(load_scenario("case1"))).plant
