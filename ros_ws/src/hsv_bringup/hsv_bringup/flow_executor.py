@@ -101,4 +101,4 @@ class BatchExecutor(FlowExecutor):
         self._batches += 1
         if self._batches % LOOKS == 0:
             SingleThreadedExecutor.spin_once(self, 0.0)
-        time.sleep(min(BATCH, BATCH if timeout_sec is None else timeout_sec))
+        time.sleep(BATCH if timeout_sec is None else min(BATCH, timeout_sec))
