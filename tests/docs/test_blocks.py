@@ -45,7 +45,7 @@ HERE = {
 }
 """Pages whose commands this file runs as one script, with what it needs before."""
 
-FEWER = {"--samples 10000 ": "--samples 20 ", "--samples 4096 ": "--samples 16 "}
+FEWER = {"--samples 10000 ": "--samples 20 ", "--samples 4096 ": "--samples 16 ", "memory.py 100000": "memory.py 1000"}
 """Campaigns that are flown with fewer flights than on the page, which would take many minutes."""
 
 NEGATIVE = ("hsv run case1_derived_no_notch", "hsv certify")
@@ -171,7 +171,7 @@ def test_scenarios_on_pages_are_scenarios(page: str, first_line: str, tmp_path: 
 @pytest.mark.long
 @pytest.mark.parametrize("page", sorted(HERE))
 def test_commands_of_the_page_run(page: str, tmp_path: Path) -> None:
-    for name in ("offline_design", "src", "examples"):
+    for name in ("offline_design", "src", "examples", "tools"):
         (tmp_path / name).symlink_to(ROOT / name)
     script = [*HERE[page]]
     script += [block.text for block in all_blocks(page) if accounts(page, block) == ["HERE"]]
