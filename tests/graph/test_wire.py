@@ -1,23 +1,34 @@
-"""Signals straight to bytes and back: the same as by way of messages, whatever they hold."""
+"""Signals to messages and back, in the nodes and in the replay: what rclpy reads and writes, whatever they hold."""
 
 from __future__ import annotations
 
 import struct
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from builtin_interfaces.msg import Time
+from flown_bags import types
+from hsv_msgs import msg
+from rclpy.serialization import serialize_message
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
 
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
+from hsv.errors import ParameterError
 from hsv.faults.schedule import ActiveFault
 from hsv.faults.table import Fault
-from hsv.graph.description import ACTUATOR, CARRIED, CLOCK, TOPICS
-from hsv.graph.exchange import FILL, READ
+from hsv.graph import description
+from hsv.graph.description import TOPICS, WIRE_ALIGNMENT
+from hsv.graph.exchange import Head, filler, reader
+from hsv.recording.fields import blank
 from hsv.simulation.blocks import Signals
 from hsv.vehicle.plant import FlightStatus
-from hsv_node.codec import codec, plain_class
-from hsv_node.wire import STEP_PLACE, TAKE, Head, giver, head_of
+from hsv_node.codec import codec
+from hsv_node.messages import type_name
+from hsv_node.wire import giver, taker
 
 PERIOD = 0.02
 
@@ -71,66 +82,196 @@ CASES = [
 ]
 
 
-def by_message(topic: str, signals: Signals) -> bytes:
-    """Return the bytes by way of a message."""
-    header = plain_class("std_msgs/msg/Header")()
-    header.stamp.sec, header.stamp.nanosec = Head.at(signals.step, PERIOD)[:2]
-    signals.header = header
-    message = plain_class(TOPICS[topic])()
-    FILL[topic](signals, message, plain_class)
-    return codec(TOPICS[topic]).encode(message)
+def head(step: int) -> Header:
+    sec, nanosec = divmod(round(step * PERIOD * 1e9), 10**9)
+    return Header(stamp=Time(sec=sec, nanosec=nanosec), frame_id="body")
+
+
+def longitudinal(x: np.ndarray) -> dict[str, Any]:
+    h, V, alpha, theta, q, coordinate_1, rate_1, coordinate_2, rate_2 = map(float, x)
+    return {
+        "altitude": h,
+        "velocity": V,
+        "angle_of_attack": alpha,
+        "pitch_angle": theta,
+        "pitch_rate": q,
+        "elastic_coordinate": [coordinate_1, coordinate_2],
+        "elastic_rate": [rate_1, rate_2],
+    }
+
+
+def inputs(u: np.ndarray) -> dict[str, float]:
+    return {"fuel_equivalence_ratio": float(u[0]), "elevator_deflection": float(u[1])}
+
+
+def fault(acting: ActiveFault) -> msg.Fault:
+    parameters = dict(acting.fault.parameters)
+    return msg.Fault(
+        channel=acting.fault.channel,
+        type=acting.fault.type,
+        parameter_names=list(parameters),
+        parameter_values=list(parameters.values()),
+    )
+
+
+def typed(topic: str, signals: Signals) -> Any:
+    """Return the message of rclpy that holds these signals, field by field."""
+    s, tube = signals, signals.diagnostics
+    place = {"header": head(s.step), "step": s.step}
+    match topic:
+        case description.CLOCK:
+            return Clock(clock=place["header"].stamp)
+        case description.MEASUREMENT:
+            state = msg.LongitudinalState(**longitudinal(s.measurement))
+            return msg.Measurement(**place, state=state, status=int(s.status))
+        case description.STATE:
+            return msg.VehicleState(**place, **longitudinal(s.state), status=int(s.status))
+        case description.FORCES:
+            names = ("lift", "drag", "thrust", "pitching_moment", "dynamic_pressure")
+            air = ("wind_forward", "wind_up", "density_factor")
+            return msg.VehicleForces(
+                **place,
+                **dict(zip(names, s.forces, strict=True)),
+                effector=msg.InputVector(**inputs(s.effector)),
+                **dict(zip(air, map(float, s.air), strict=True)),
+            )
+        case description.FILTERED_STATE:
+            return msg.FilteredState(
+                **place,
+                state=msg.LongitudinalState(**longitudinal(s.measurement)),
+                filtered_pitch_rate=s.filtered_pitch_rate,
+                filter_state=s.filter_state,
+                estimate=[] if s.estimate is s.measurement else s.estimate,
+                status=int(s.status),
+            )
+        case description.NOMINAL:
+            return msg.NominalState(
+                **place,
+                reference=msg.LongitudinalState(**longitudinal(s.reference)),
+                reference_input=msg.InputVector(**inputs(s.reference_input)),
+                deviation=msg.LongitudinalState(**longitudinal(s.deviation)),
+                input=msg.InputVector(**inputs(s.nominal_input)),
+                gain=[number for row in s.gain for number in row],
+                gain_index=s.gain_index,
+                status=int(s.nominal_status),
+            )
+        case description.COMMAND:
+            return msg.ControlInput(**place, **inputs(s.command), saturated=[bool(limit) for limit in s.saturated])
+        case description.TUBE_STATUS:
+            return msg.TubeStatus(
+                **place,
+                error=tube.error,
+                tube_centre=tube.tube_centre,
+                tube_half_width=tube.tube_half_width,
+                level=tube.level,
+                inside=tube.inside,
+                u_nominal=msg.InputVector(**inputs(tube.u_nominal)),
+                u_feedback=msg.InputVector(**inputs(tube.u_feedback)),
+                u_reference=msg.InputVector(**inputs(s.reference_input)),
+                u_unsaturated=msg.InputVector(**inputs(tube.u_unsaturated)),
+                tau=tube.tau,
+                status=int(tube.status),
+            )
+        case description.ACTUATOR:
+            since = [acting.since for acting in s.active_faults]
+            return msg.Actuator(**place, **inputs(s.actuator), active=[*map(fault, s.active_faults)], since=since)
+    raise AssertionError(topic)
+
+
+def sent(message: Any) -> bytes:
+    """Return the bytes of a message of rclpy as DDS sends them: with zeros between the fields, and no surplus."""
+    kind = codec(type_name(type(message)))
+    return kind.pack(kind.unpack(serialize_message(message))[1:])
+
+
+TAKEN = {
+    description.MEASUREMENT: {"measurement", "status"},
+    description.STATE: {"state", "status"},
+    description.FILTERED_STATE: {"measurement", "estimate", "filtered_pitch_rate", "filter_state", "status"},
+    description.NOMINAL: {"reference", "reference_input", "deviation", "nominal_input"},
+    description.COMMAND: {"command"},
+    description.ACTUATOR: {"actuator", "active_faults"},
+}
+"""What a block needs of each topic, or passes on."""
 
 
 def same(first: Any, second: Any) -> bool:
     """Compare signals: arrays by their bits and layout, for compiled functions take only those they were made for."""
     if isinstance(first, np.ndarray):
-        layout = all(array.flags.c_contiguous and array.flags.aligned and array.flags.owndata for array in (second,))
+        layout = second.flags.c_contiguous and second.flags.aligned and second.flags.owndata
         return layout and first.dtype == second.dtype and first.tobytes() == second.tobytes()
     return bool(first == second)
 
 
+def assert_taken(topic: str, given: Signals, taken: Signals) -> None:
+    assert vars(taken).keys() == TAKEN[topic] | {"header", "step"}
+    assert [n for n in (*TAKEN[topic], "step") if not same(getattr(given, n), getattr(taken, n))] == []
+    stamp, frame = taken.header.stamp, taken.header.frame_id
+    assert ((stamp.sec, stamp.nanosec), frame) == (Head.at(given.step, PERIOD)[:2], "body")
+    if topic == description.FILTERED_STATE:
+        assert (taken.estimate is taken.measurement) == (given.estimate is given.measurement)
+
+
+def headed(signals: Signals) -> Signals:
+    signals.header = Head.at(signals.step, PERIOD)._replace(length=5, frame=b"body\0")
+    return signals
+
+
 @pytest.mark.parametrize("topic", TOPICS)
-def test_the_bytes_are_those_of_the_message(topic):
+def test_the_bytes_of_a_node_are_those_of_rclpy(topic):
     give = giver(topic)  # one for all: what it remembers of one message must not come back in another
     for signals in (*CASES, *reversed(CASES)):
-        expected = by_message(topic, signals)
-        signals.header = Head.at(signals.step, PERIOD)
-        assert give(signals) == expected
+        assert give(headed(signals)) == sent(typed(topic, signals))
 
 
-@pytest.mark.parametrize("topic", TAKE)
-def test_what_is_taken_is_what_the_message_says(topic):
-    take, kind = TAKE[topic](), codec(TOPICS[topic])
+@pytest.mark.parametrize("topic", TAKEN)
+def test_a_node_takes_what_rclpy_writes(topic):
+    take, unpack = taker(topic), codec(TOPICS[topic]).unpack
     for given in (*CASES, *reversed(CASES)):
-        data = by_message(topic, given)
-        one, other = Signals(), Signals()
-        READ[topic](kind.decode(data), one)
-        take(kind.unpack(data), other)
-        names = vars(one).keys() - {"header"}
-        assert vars(other).keys() - {"header"} == names
-        assert [name for name in names if not same(getattr(one, name), getattr(other, name))] == []
-        assert (other.header.stamp.sec, other.header.stamp.nanosec) == (one.header.stamp.sec, one.header.stamp.nanosec)
+        taken = Signals()
+        take(unpack(serialize_message(typed(topic, given))), taken)
+        assert_taken(topic, given, taken)
 
 
-def test_the_header_is_passed_on_as_it_came():
-    kind = TOPICS[ACTUATOR]
-    message = plain_class(kind)(step=7)
-    message.header.frame_id = "body"
-    values = codec(kind).unpack(codec(kind).encode(message))
-    assert values[STEP_PLACE] == 7
-    signals = signals_of(0, sizes=(2, 0, 7))
-    signals.header = head_of(values)
-    answer = codec(kind).decode(giver(ACTUATOR)(signals))
-    assert answer.header == message.header
+@pytest.mark.parametrize("topic", TOPICS)
+def test_the_bytes_of_the_replay_are_those_of_rclpy(topic):
+    store = types()
+    filled = blank(store, TOPICS[topic])  # one for all: what was in it before must not remain
+    for signals in (*CASES, *reversed(CASES)):
+        filler(topic)(headed(signals), filled)
+        data = bytes(store.serialize_cdr(filled, TOPICS[topic]))
+        assert data + bytes(-len(data) % WIRE_ALIGNMENT) == sent(typed(topic, signals))
 
 
-def test_every_step_topic_is_written_and_what_a_node_takes_is_read():
-    assert {*CARRIED, CLOCK} == {*TOPICS}
-    assert {*TAKE} < {*READ}
+@pytest.mark.parametrize("topic", TAKEN)
+def test_the_replay_reads_what_rclpy_writes(topic):
+    store = types()
+    for given in CASES:
+        taken = Signals()
+        reader(topic)(store.deserialize_cdr(sent(typed(topic, given)), TOPICS[topic]), taken)
+        assert_taken(topic, given, taken)
+
+
+def test_a_bag_from_before_there_were_estimators_says_the_measurement_alone():
+    signals = Signals()
+    fields = vars(blank(types(), TOPICS[description.FILTERED_STATE]))
+    former = SimpleNamespace(**{name: value for name, value in fields.items() if name != "estimate"})
+    reader(description.FILTERED_STATE)(former, signals)
+    assert signals.estimate is signals.measurement
+
+
+def test_a_fault_whose_numbers_are_not_as_many_as_their_names_is_refused_by_both():
+    wrong = msg.Fault(channel="elevator_deflection", type="loss_of_effectiveness", parameter_names=["effectiveness"])
+    message = msg.Actuator(active=[wrong], since=[3])
+    with pytest.raises(ParameterError, match=r"fault\.parameter_values: 0 values, expected one a name, 1"):
+        reader(description.ACTUATOR)(message, Signals())
+    with pytest.raises(ParameterError, match=r"fault\.parameter_values: 0 values, expected one a name, 1"):
+        values = codec(TOPICS[description.ACTUATOR]).unpack(serialize_message(message))
+        taker(description.ACTUATOR)(values, Signals())
 
 
 @pytest.mark.parametrize("more", [(), (0, 1)])
 def test_values_that_are_not_as_many_as_their_lengths_say_are_refused(more):
-    kind = codec(TOPICS[ACTUATOR])
+    kind = codec(TOPICS[description.ACTUATOR])
     with pytest.raises((struct.error, IndexError)):
         kind.pack((0, 0, 1, b"\0", 3, 1.0, 2.0, 0, *more))

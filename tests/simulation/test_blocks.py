@@ -5,8 +5,8 @@ from flights import components
 
 from hsv.control.controller import CONTROLLER_INPUTS, ControllerInput
 from hsv.errors import HsvError
-from hsv.graph.description import CARRIED, CLOCK, TOPICS, graph
-from hsv.graph.exchange import FILL
+from hsv.graph.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, graph
+from hsv.graph.exchange import HELD
 from hsv.signals import SignalType
 from hsv.simulation.blocks import LOOP, Block, Signals, in_order, steps
 
@@ -62,8 +62,11 @@ def test_every_node_subscribes_to_no_more_than_what_its_block_needs_and_publishe
     }
 
 
-def test_what_the_topics_carry_is_what_their_messages_are_filled_with():
-    assert CARRIED.keys() == TOPICS.keys() - {CLOCK} == FILL.keys() - {CLOCK}
+def test_what_the_topics_carry_is_what_their_messages_hold():
+    held = {topic: {row.signal.partition(".")[0] for row in rows} for topic, rows in HELD.items()}
+    held[TUBE_STATUS].remove("reference_input")  # besides, for whoever reads the sum of the three inputs
+    assert held == {topic: {signal.name for signal in carried} for topic, carried in CARRIED.items()}
+    assert held.keys() == TOPICS.keys() - {CLOCK}
 
 
 def test_a_controller_takes_its_inputs_in_one_order():

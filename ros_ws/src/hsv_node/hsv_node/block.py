@@ -11,7 +11,7 @@ from hsv.errors import RunError
 from hsv.graph.description import NodeDescription
 from hsv.simulation.blocks import Signals
 from hsv_node.lockstep import PeerNode
-from hsv_node.wire import STEP_PLACE, TAKE, Values, giver
+from hsv_node.wire import STEP_PLACE, Values, giver, taker
 
 
 class BlockNode(PeerNode):
@@ -28,7 +28,7 @@ class BlockNode(PeerNode):
         self._given: dict[str, Values] = {}
         # In the order of the role: others wait for the first, and work on it while the rest is published.
         self._answers = [(giver(topic), self.create_step_publisher(topic)) for topic in role.publishes]
-        self._take = {topic: TAKE[topic]() for topic in self.role.subscribes}
+        self._take = {topic: taker(topic) for topic in self.role.subscribes}
         delayed = self.role.delayed
         self._delays = {topic: int(topic in delayed) for topic in self.role.subscribes}
         for topic in self.role.subscribes:

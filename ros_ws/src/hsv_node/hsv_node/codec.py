@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import field, make_dataclass
+from dataclasses import make_dataclass
 from functools import cache
 from operator import itemgetter
 from typing import Any, Protocol
@@ -48,19 +48,8 @@ def codec(message_type: str) -> Codec:
     return Codec(message_type)
 
 
-def plain_class(message_type: str) -> Callable[..., Any]:
-    """Return the message class for the codec of a type: zero and empty fields except for those given."""
-    return codec(message_type).message
-
-
 class _Kind(Protocol):
     """A kind of field, as Python expressions from which the functions of a codec are generated."""
-
-    def blank(self) -> Any:
-        """Return it empty."""
-
-    def values(self, of: str) -> str:
-        """Return the values that :mod:`struct` packs, of the expression ``of``; lengths go to ``lengths``, too."""
 
     def lay(self, layout: _Layout) -> str:
         """Append its places to ``layout``, and return what it is made of, of the ``values`` that stand there."""
@@ -70,23 +59,11 @@ class _Number:
     def __init__(self, code: str) -> None:
         self.code = code
 
-    def blank(self) -> Any:
-        return False if self.code == "?" else 0
-
-    def values(self, of: str) -> str:
-        return of
-
     def lay(self, layout: _Layout) -> str:
         return f"values[{layout.put(self.code)}]"
 
 
 class _Text:
-    def blank(self) -> str:
-        return ""
-
-    def values(self, of: str) -> str:
-        return f"*_text({of}, lengths)"
-
     def lay(self, layout: _Layout) -> str:
         return f"values[{layout.put('s', layout.length())}][:-1].decode(errors='replace')"
 
@@ -96,15 +73,6 @@ class _Many:
 
     def __init__(self, of: _Kind, count: int | None) -> None:
         self._of, self._count = of, count
-
-    def blank(self) -> list[Any]:
-        return [self._of.blank() for _ in range(self._count or 0)]
-
-    def values(self, of: str) -> str:
-        length = "" if self._count is not None else f"_length({of}, lengths), "
-        if isinstance(self._of, _Number):
-            return f"{length}*{of}"
-        return f"{length}*(value for each in {of} for value in ({self._of.values('each')},))"
 
     def lay(self, layout: _Layout) -> str:
         count = layout.length() if self._count is None else self._count
@@ -118,15 +86,11 @@ class _Message:
     def __init__(self, message_type: str) -> None:
         types = message_class(message_type).get_fields_and_field_types()
         self._fields = {name: _kind(of) for name, of in types.items()}
-        made = [(name, Any, field(default_factory=kind.blank)) for name, kind in self._fields.items()]
         self._name = message_type.replace("/", "_")
-        self.blank: Callable[..., Any] = make_dataclass(self._name, made, slots=True)
-
-    def values(self, of: str) -> str:
-        return ", ".join(kind.values(f"{of}.{name}") for name, kind in self._fields.items())
+        self._class = make_dataclass(self._name, self._fields, slots=True)
 
     def lay(self, layout: _Layout) -> str:
-        layout.classes[self._name] = self.blank
+        layout.classes[self._name] = self._class
         return f"{self._name}({', '.join(kind.lay(layout) for kind in self._fields.values())})"
 
 
@@ -150,16 +114,6 @@ def _kind(field_type: str) -> _Kind:
     if field_type.startswith("sequence<"):
         return _Many(kind, None)
     return _Many(kind, int(found["count"])) if found and found["count"] else kind
-
-
-def _length(value: Any, lengths: list[int]) -> int:
-    lengths.append(len(value))
-    return lengths[-1]
-
-
-def _text(value: str, lengths: list[int]) -> tuple[int, bytes]:
-    data = value.encode() + b"\0"
-    return _length(data, lengths), data
 
 
 class _Layout:
@@ -219,40 +173,18 @@ class _Layout:
 
 
 class Codec:
-    """Makes messages of a type, and turns them into CDR bytes and back.
+    """Turns messages of a type into CDR bytes and back.
 
-    They are plain objects with the fields of the type as attributes, arrays and sequences as lists; in a message that
-    is encoded any other sequence of numbers may stand for one.
+    As objects they have the fields of the type as attributes, arrays and sequences as lists.
     """
 
     def __init__(self, message_type: str) -> None:
         self.type = message_type
         self._kind = _message(message_type)
-        self.message = self._kind.blank
-        """The class of its messages: zeros, empty text and empty sequences, but for what is given by keyword."""
-        values = self._kind.values("message")
-        # As expressions of fields and places a message takes a third of the time that a walk over its fields does.
-        self._values: Callable[[Any, list[int]], tuple[Any, ...]] = eval(
-            f"lambda message, lengths: ({values},)", {"_text": _text, "_length": _length}
-        )
         self._layouts: dict[tuple[int, ...], _Layout] = {}
         self._last: _Layout | None = None
         """The layout of what was read last, and of what was packed last."""
         self._packed: _Layout | None = None
-
-    def encode(self, message: Any) -> bytes:
-        """Return ``message`` as CDR bytes.
-
-        Raises:
-            struct.error: A field is no number of its type, or an array has another length.
-        """
-        lengths: list[int] = []
-        values = self._values(message, lengths)
-        layout = self._layouts.get(tuple(lengths))
-        if layout is None:
-            known = iter(lengths)
-            layout = self._keep(_Layout(self._kind, lambda *_: next(known)))
-        return layout.pack(_LITTLE_ENDIAN, *values)
 
     def pack(self, values: tuple[Any, ...]) -> bytes:
         """Return as CDR bytes a message that is given as :meth:`unpack` does, but for the encapsulation.
@@ -275,6 +207,10 @@ class Codec:
         values = self.unpack(data)
         assert self._last is not None
         return self._last.made(values)
+
+    def message(self, values: tuple[Any, ...]) -> Any:
+        """Return as an object what :meth:`unpack` has given."""
+        return next(layout for layout in self._layouts.values() if layout.fits(values)).made(values)
 
     def unpack(self, data: bytes) -> tuple[Any, ...]:
         """Return all that stands in CDR bytes: the encapsulation, and the fields in order as numbers and bytes.

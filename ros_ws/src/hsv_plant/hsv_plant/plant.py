@@ -28,6 +28,7 @@ from hsv.graph.description import (
     controller_node,
     peers,
 )
+from hsv.graph.exchange import Head
 from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
 from hsv.graph.standstill import Standstill
 from hsv.simulation.blocks import VEHICLE, Signals
@@ -37,7 +38,7 @@ from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, s
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
-from hsv_node.wire import STEP_PLACE, TAKE, Head, Values, giver
+from hsv_node.wire import STEP_PLACE, Values, giver, taker
 from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
@@ -65,7 +66,7 @@ class PlantNode(LockstepNode):
         self._ready: set[str] = set()
         # The measurement first: the other nodes work on it while the rest is published.
         self._answers = [(giver(topic), self.create_step_publisher(topic)) for topic in PLANT.publishes]
-        self._take_actuator = TAKE[ACTUATOR]()
+        self._take_actuator = taker(ACTUATOR)
         self.create_step_subscription(ACTUATOR, self._on_actuator)
         self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
         self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)

@@ -1,17 +1,20 @@
-"""Conversion between messages and the signals of the loop, with one pair of functions per topic.
+"""Which field of which message holds which signal of the loop, as one table, and the functions made of it.
 
-The replay uses them with the messages of a bag's own definitions. Messages are objects with the fields of their type as
-attributes; those handed out are filled in place. The nodes convert their step messages without an object, by
-``hsv_node.wire``; its tests hold it against these.
+Here messages are objects with the fields of their type as attributes, such as those of a bag's own definitions, which
+the replay reads and fills in place. The nodes make and take the bytes by the same table, see ``hsv_node.wire``. In both
+a message becomes straight-line code, for which the table gives the expressions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from hsv import signals as types
 from hsv.errors import ParameterError
 from hsv.graph.description import (
     ACTUATOR,
@@ -24,6 +27,8 @@ from hsv.graph.description import (
     STATE,
     TUBE_STATUS,
 )
+from hsv.simulation.blocks import LOOP
+from hsv.vehicle.dynamics import INPUT_NAMES
 
 if TYPE_CHECKING:
     from hsv.faults.schedule import ActiveFault
@@ -31,104 +36,30 @@ if TYPE_CHECKING:
     from hsv.simulation.blocks import Signals
 
 Message = Any
-MessageClass = Callable[[str], Callable[..., Message]]
-"""Function from ``package/msg/Type`` to the class of the message."""
 
 
-def state_vector(message: Message) -> np.ndarray:
-    """Return x (9) from a message with the fields of LongitudinalState."""
-    coordinate, rate = message.elastic_coordinate, message.elastic_rate
-    return np.array(
-        (
-            message.altitude,
-            message.velocity,
-            message.angle_of_attack,
-            message.pitch_angle,
-            message.pitch_rate,
-            coordinate[0],
-            rate[0],
-            coordinate[1],
-            rate[1],
-        )
-    )
+class Head(NamedTuple):
+    """Header of a message: time, and its frame as a text with its length."""
 
+    sec: int
+    nanosec: int
+    length: int = 1
+    frame: bytes = b"\0"
 
-def fill_state(message: Message, x: np.ndarray) -> None:
-    """Write x (9) into the fields of LongitudinalState of ``message``."""
-    (
-        message.altitude,
-        message.velocity,
-        message.angle_of_attack,
-        message.pitch_angle,
-        message.pitch_rate,
-        coordinate_1,
-        rate_1,
-        coordinate_2,
-        rate_2,
-    ) = x.tolist()
-    message.elastic_coordinate[:] = coordinate_1, coordinate_2
-    message.elastic_rate[:] = rate_1, rate_2
+    @property
+    def stamp(self) -> Head:
+        """The time: what has ``sec`` and ``nanosec``."""
+        return self
 
+    @property
+    def frame_id(self) -> str:
+        """The frame as text."""
+        return self.frame[:-1].decode(errors="replace")
 
-def input_vector(message: Message) -> np.ndarray:
-    """Return u (2) from a message with the fields of InputVector."""
-    return np.array((message.fuel_equivalence_ratio, message.elevator_deflection))
-
-
-def fill_input(message: Message, u: np.ndarray) -> None:
-    """Write u (2) into the fields of InputVector of ``message``."""
-    message.fuel_equivalence_ratio, message.elevator_deflection = u.tolist()
-
-
-def _place(message: Message, signals: Signals) -> None:
-    signals.header, signals.step = message.header, message.step
-
-
-def _read_measurement(message: Message, signals: Signals) -> None:
-    _place(message, signals)
-    signals.measurement, signals.status = state_vector(message.state), message.status
-
-
-def _read_state(message: Message, signals: Signals) -> None:
-    _place(message, signals)
-    signals.state, signals.status = state_vector(message), message.status
-
-
-def _read_filtered_state(message: Message, signals: Signals) -> None:
-    _read_measurement(message, signals)
-    # Bags from before there were estimators lack the field.
-    estimated = getattr(message, "estimate", ())
-    signals.estimate = np.asarray(estimated) if len(estimated) else signals.measurement
-    signals.filtered_pitch_rate = message.filtered_pitch_rate
-    signals.filter_state = np.asarray(message.filter_state)
-
-
-def _read_nominal(message: Message, signals: Signals) -> None:
-    _place(message, signals)
-    signals.reference, signals.reference_input = state_vector(message.reference), input_vector(message.reference_input)
-    signals.deviation, signals.nominal_input = state_vector(message.deviation), input_vector(message.input)
-
-
-def _read_command(message: Message, signals: Signals) -> None:
-    _place(message, signals)
-    signals.command = input_vector(message)
-
-
-def _read_actuator(message: Message, signals: Signals) -> None:
-    _place(message, signals)
-    signals.actuator = input_vector(message)
-    signals.active_faults = active_faults(message) if message.active else ()
-
-
-READ: dict[str, Callable[[Message, Signals], None]] = {
-    MEASUREMENT: _read_measurement,
-    STATE: _read_state,
-    FILTERED_STATE: _read_filtered_state,
-    NOMINAL: _read_nominal,
-    COMMAND: _read_command,
-    ACTUATOR: _read_actuator,
-}
-"""Functions by topic, from its message to the signals."""
+    @classmethod
+    def at(cls, step: int, period: float) -> Head:
+        """Return that of a ``step`` in a flight with a ``period`` (s)."""
+        return cls(*stamp_of(step, period))
 
 
 def stamp_of(step: int, period: float) -> tuple[int, int]:
@@ -136,79 +67,74 @@ def stamp_of(step: int, period: float) -> tuple[int, int]:
     return divmod(round(step * period * 1e9), 1_000_000_000)
 
 
-def _begin(signals: Signals, message: Message) -> None:
-    """Head a message of the plant, with which a step begins."""
-    message.header.stamp.sec, message.header.stamp.nanosec = stamp_of(signals.step, signals.period)
-    message.step = signals.step
+class Form(NamedTuple):
+    """How a signal stands in a message; both functions also take the signal :attr:`Row.beside` it, where there is one.
+
+    Of a sequence they give and take all numbers, else one number for each field.
+    """
+
+    values: Callable[..., Any]
+    """Returns the numbers of a signal, in the order of the fields."""
+    signal: Callable[..., Any]
+    """Returns the signal of these numbers."""
+    sequence: bool = False
 
 
-def _answer(signals: Signals, message: Message) -> None:
-    """Head a message with what those that it answers are headed."""
-    message.header, message.step = signals.header, signals.step
+class Row(NamedTuple):
+    """A signal in a message."""
+
+    signal: str
+    """Attribute of :class:`hsv.simulation.blocks.Signals`, or of one of its attributes."""
+    fields: tuple[str, ...]
+    """Attributes of the message or elements of them, in the order of its type."""
+    form: Form | None = None
+    """None: the signal is the number in the one field."""
+    beside: str = ""
+
+    def given(self, i: int) -> str:
+        """Return the expression of what the fields of the row with number ``i`` are set to."""
+        signals = ", ".join(f"signals.{name}" for name in (self.signal, self.beside) if name)
+        return f"values_{i}({signals})" if self.form else signals
+
+    def taken(self, i: int, values: str) -> str:
+        """Return the statement that sets the signal of the row with number ``i`` from the expression of its numbers."""
+        beside = f", signals.{self.beside}" if self.beside else ""
+        return f"signals.{self.signal} = " + (f"signal_{i}({values}{beside})" if self.form else values)
 
 
-def _fill_clock(signals: Signals, clock: Message, _: MessageClass) -> None:
-    clock.clock.sec, clock.clock.nanosec = stamp_of(signals.step, signals.period)
+_VECTOR = Form(np.ndarray.tolist, np.array)
+_TUPLE = Form(tuple, tuple)
+_SEQUENCE = Form(np.ndarray.tolist, np.array, sequence=True)
+_MATRIX = Form(lambda matrix: matrix.ravel().tolist(), np.array, sequence=True)
+_ESTIMATE = Form(
+    lambda estimate, measurement: [] if estimate is measurement else estimate.tolist(),
+    lambda values, measurement: np.array(values) if len(values) else measurement,
+    sequence=True,
+)
+
+_swapped = itemgetter(0, 1, 2, 3, 4, 5, 7, 6, 8)
+"""From the order of x to that of LongitudinalState, whose elastic coordinates come before their rates, and back."""
+_STATE = Form(lambda x: _swapped(x.tolist()), lambda values: np.array(_swapped(values)))
+_STATE_FIELDS = (
+    "altitude",
+    "velocity",
+    "angle_of_attack",
+    "pitch_angle",
+    "pitch_rate",
+    "elastic_coordinate[0]",
+    "elastic_coordinate[1]",
+    "elastic_rate[0]",
+    "elastic_rate[1]",
+)
 
 
-def _fill_measurement(signals: Signals, measurement: Message, _: MessageClass) -> None:
-    _begin(signals, measurement)
-    fill_state(measurement.state, signals.measurement)
-    measurement.status = int(signals.status)
+class _Fault(NamedTuple):
+    """A message Fault."""
 
-
-def _fill_vehicle_state(signals: Signals, state: Message, _: MessageClass) -> None:
-    _begin(signals, state)
-    fill_state(state, signals.state)
-    state.status = int(signals.status)
-
-
-def _fill_forces(signals: Signals, forces: Message, _: MessageClass) -> None:
-    _begin(signals, forces)
-    forces.lift, forces.drag, forces.thrust, forces.pitching_moment, forces.dynamic_pressure = signals.forces
-    fill_input(forces.effector, signals.effector)
-    forces.wind_forward, forces.wind_up, forces.density_factor = signals.air.tolist()
-
-
-def _fill_filtered_state(signals: Signals, filtered: Message, _: MessageClass) -> None:
-    _answer(signals, filtered)
-    fill_state(filtered.state, signals.measurement)
-    filtered.filtered_pitch_rate = signals.filtered_pitch_rate
-    filtered.filter_state = signals.filter_state
-    filtered.estimate = _NO_ESTIMATE if signals.estimate is signals.measurement else signals.estimate
-    filtered.status = signals.status
-
-
-_NO_ESTIMATE = np.empty(0)
-
-
-def _fill_nominal(signals: Signals, nominal: Message, _: MessageClass) -> None:
-    _answer(signals, nominal)
-    fill_state(nominal.reference, signals.reference)
-    fill_input(nominal.reference_input, signals.reference_input)
-    fill_state(nominal.deviation, signals.deviation)
-    fill_input(nominal.input, signals.nominal_input)
-    nominal.gain = signals.gain.ravel()
-    nominal.gain_index, nominal.status = signals.gain_index, int(signals.nominal_status)
-
-
-def _fill_command(signals: Signals, command: Message, _: MessageClass) -> None:
-    _answer(signals, command)
-    fill_input(command, signals.command)
-    command.saturated[:] = signals.saturated.tolist()
-
-
-def _fill_tube_status(signals: Signals, status: Message, _: MessageClass) -> None:
-    _answer(signals, status)
-    result: Any = signals.diagnostics
-    status.error = result.error
-    status.tube_centre, status.tube_half_width = result.tube_centre, result.tube_half_width
-    status.level, status.inside = result.level, result.inside
-    fill_input(status.u_nominal, result.u_nominal)
-    fill_input(status.u_reference, signals.reference_input)
-    fill_input(status.u_feedback, result.u_feedback)
-    fill_input(status.u_unsaturated, result.u_unsaturated)
-    status.tau, status.status = result.tau, int(result.status)
+    channel: str
+    type: str
+    parameter_names: list[str]
+    parameter_values: np.ndarray
 
 
 def fault_in(message: Message) -> Fault:
@@ -231,38 +157,120 @@ def active_faults(message: Message) -> tuple[ActiveFault, ...]:
     Raises:
         ParameterError: See :func:`fault_in`.
     """
+    return _faults((message.active, message.since))
+
+
+def _faults(values: tuple[Iterable[Message], Iterable[int]]) -> tuple[ActiveFault, ...]:
     from hsv.faults.schedule import ActiveFault
 
-    return tuple(
-        ActiveFault(fault_in(fault), int(since)) for fault, since in zip(message.active, message.since, strict=True)
+    return tuple(ActiveFault(fault_in(fault), int(since)) for fault, since in zip(*values, strict=True))
+
+
+def _said_of(faults: tuple[ActiveFault, ...]) -> tuple[list[_Fault], np.ndarray]:
+    return (
+        [
+            _Fault(fault.channel, fault.type, [*fault.parameters], np.array([*fault.parameters.values()]))
+            for fault, _ in faults
+        ],
+        np.array([since for _, since in faults], np.uint64),
     )
 
 
-def _fill_actuator(signals: Signals, actuator: Message, message_class: MessageClass) -> None:
-    _answer(signals, actuator)
-    fill_input(actuator, signals.actuator)
-    fault = message_class("hsv_msgs/msg/Fault")
-    actuator.active = [
-        fault(
-            channel=acting.channel,
-            type=acting.type,
-            parameter_names=list(acting.parameters),
-            parameter_values=np.array([*acting.parameters.values()]),
-        )
-        for acting, _ in signals.active_faults
-    ]
-    actuator.since = np.array([since for _, since in signals.active_faults], np.uint64)
+FAULTS = Form(_said_of, _faults)
+"""Two sequences, of messages and of numbers."""
 
 
-FILL: dict[str, Callable[[Signals, Message, MessageClass], None]] = {
-    CLOCK: _fill_clock,
-    MEASUREMENT: _fill_measurement,
-    STATE: _fill_vehicle_state,
-    FORCES: _fill_forces,
-    FILTERED_STATE: _fill_filtered_state,
-    NOMINAL: _fill_nominal,
-    COMMAND: _fill_command,
-    TUBE_STATUS: _fill_tube_status,
-    ACTUATOR: _fill_actuator,
+def _state(signal: str, within: str = "") -> Row:
+    return Row(signal, tuple(within + name for name in _STATE_FIELDS), _STATE)
+
+
+def _input(signal: str, within: str = "") -> Row:
+    return Row(signal, tuple(within + name for name in INPUT_NAMES), _VECTOR)
+
+
+HELD: Mapping[str, tuple[Row, ...]] = {
+    MEASUREMENT: (_state("measurement", "state."), Row("status", ("status",))),
+    STATE: (_state("state"), Row("status", ("status",))),
+    FORCES: (
+        Row("forces", ("lift", "drag", "thrust", "pitching_moment", "dynamic_pressure"), _TUPLE),
+        _input("effector", "effector."),
+        Row("air", ("wind_forward", "wind_up", "density_factor"), _VECTOR),
+    ),
+    FILTERED_STATE: (
+        _state("measurement", "state."),
+        Row("filtered_pitch_rate", ("filtered_pitch_rate",)),
+        Row("filter_state", ("filter_state",), _SEQUENCE),
+        Row("estimate", ("estimate",), _ESTIMATE, beside="measurement"),
+        Row("status", ("status",)),
+    ),
+    NOMINAL: (
+        _state("reference", "reference."),
+        _input("reference_input", "reference_input."),
+        _state("deviation", "deviation."),
+        _input("nominal_input", "input."),
+        Row("gain", ("gain",), _MATRIX),
+        Row("gain_index", ("gain_index",)),
+        Row("nominal_status", ("status",)),
+    ),
+    COMMAND: (_input("command"), Row("saturated", ("saturated[0]", "saturated[1]"), _VECTOR)),
+    TUBE_STATUS: (
+        Row("diagnostics.error", ("error",), _SEQUENCE),
+        Row("diagnostics.tube_centre", ("tube_centre",), _SEQUENCE),
+        Row("diagnostics.tube_half_width", ("tube_half_width",), _SEQUENCE),
+        Row("diagnostics.level", ("level",)),
+        Row("diagnostics.inside", ("inside",)),
+        _input("diagnostics.u_nominal", "u_nominal."),
+        _input("diagnostics.u_feedback", "u_feedback."),
+        _input("reference_input", "u_reference."),
+        _input("diagnostics.u_unsaturated", "u_unsaturated."),
+        Row("diagnostics.tau", ("tau",), _SEQUENCE),
+        Row("diagnostics.status", ("status",)),
+    ),
+    ACTUATOR: (_input("actuator"), Row("active_faults", ("active", "since"), FAULTS)),
 }
-"""Functions by topic, from the signals to its message."""
+"""The signals in the messages of a step by topic, behind header and step, in the order of the type; the clock's is the
+stamp of a header alone."""
+
+NEEDED = {signal.name for block in LOOP for signal in (*block.inputs, *block.delayed, *block.state)}
+NEEDED.add(types.STATUS.name)
+"""The signals that are taken from messages: those that a block needs, and the status, which is passed on."""
+
+
+def function(topic: str, arguments: str, statements: Iterable[str], **names: Any) -> Callable[..., Any]:
+    """Return the function of these statements, which know ``names`` and the forms of the rows of a topic."""
+    known: dict[str, Any] = {}
+    for i, row in enumerate(HELD.get(topic, ())):
+        if row.form:
+            known |= {f"values_{i}": row.form.values, f"signal_{i}": row.form.signal}
+    known |= names
+    exec(f"def made({arguments}):\n    " + "\n    ".join(statements), known)
+    made: Callable[..., Any] = known["made"]
+    return made
+
+
+@cache
+def reader(topic: str) -> Callable[[Message, Signals], None]:
+    """Return the function from a topic's message to the signals that a block needs."""
+    statements = ["signals.header, signals.step = message.header, message.step"]
+    for i, row in enumerate(HELD[topic]):
+        values = ", ".join(f"message.{field}" for field in row.fields)
+        if row.form is _ESTIMATE:  # bags from before there were estimators lack the field
+            values = f"getattr(message, {row.fields[0]!r}, ())"
+        elif row.form and not row.form.sequence:
+            values = f"({values})"
+        if row.signal in NEEDED:
+            statements.append(row.taken(i, values))
+    return function(topic, "message, signals", statements)
+
+
+@cache
+def filler(topic: str) -> Callable[[Signals, Message], None]:
+    """Return the function from the signals, whose header is a Head or a message's, to a topic's message."""
+    if topic == CLOCK:
+        return function(topic, "signals, message", ["message.clock = signals.header.stamp"])
+    statements = ["message.header, message.step = signals.header, signals.step"]
+    for i, row in enumerate(HELD[topic]):
+        targets = ", ".join(f"message.{field}" for field in row.fields)
+        values = f"array({row.given(i)})" if row.form and row.form.sequence else row.given(i)
+        statements.append(f"{targets} = {values}")
+    return function(topic, "signals, message", statements, array=np.array)

@@ -93,7 +93,7 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
 
     def step(inputs: tuple[Any, ...]) -> None:
-        process.step(component, inputs, outputs.messages, bag.types.types.__getitem__)
+        process.step(component, inputs, outputs.messages)
         outputs.keep()
 
     if process.restarts:
@@ -172,7 +172,7 @@ def fly(
             given = () if process.restarts and first else process.inputs
             inputs = tuple(None if first and topic in delayed else latest[topic] for topic in given)
             outputs = made[name]
-            process.step(components[name], inputs, outputs.messages, types.types.__getitem__)
+            process.step(components[name], inputs, outputs.messages)
             outputs.keep()
         first = False
         if latest[STATE].step % PROGRESS_INTERVAL == 0:

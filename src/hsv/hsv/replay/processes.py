@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hsv.graph.description import STATE, NodeDescription, graph
-from hsv.graph.exchange import FILL, READ, Message, MessageClass
+from hsv.graph.exchange import Head, Message, filler, reader
 from hsv.simulation.blocks import LOOP, VEHICLE, Block, Signals
 
 _TOLERANCES = {
@@ -69,13 +69,7 @@ class Process:
         """Topics that one step gives."""
         return self.node.publishes
 
-    def step(
-        self,
-        component: Any,
-        inputs: Sequence[Message | None],
-        outputs: Mapping[str, Message],
-        message_class: MessageClass,
-    ) -> None:
+    def step(self, component: Any, inputs: Sequence[Message | None], outputs: Mapping[str, Message]) -> None:
         """Step ``component`` from its input messages, none for the first step of the owner of time, to its ``outputs``.
 
         None stands for one of the step before the first. Outputs are by topic, and filled in place.
@@ -84,10 +78,12 @@ class Process:
         if inputs:
             for topic, message in zip(self.inputs, inputs, strict=True):
                 if message is not None:
-                    READ[topic](message, signals)
+                    reader(topic)(message, signals)
         self.block.step(component, signals)
+        if self.restarts:
+            signals.header = Head.at(signals.step, signals.period)
         for topic, message in outputs.items():
-            FILL[topic](signals, message, message_class)
+            filler(topic)(signals, message)
 
 
 def processes_of(controller: str, estimator: bool = False) -> dict[str, Process]:
