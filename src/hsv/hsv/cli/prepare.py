@@ -55,7 +55,7 @@ def prepare(
 
     if folder:
         check_folder(folder, "folder")
-    namespace = checked_namespace(namespace)
+    namespace, port = checked_namespace(namespace), live_port_of(live, live_port)
     # Not held on: each node claims what it publishes when it starts.
     claim_graph(graph(), namespace).close()
     target = folder or Path(tempfile.mkdtemp(prefix="hsv_run_"))
@@ -68,7 +68,7 @@ def prepare(
             folder=target,
             composed=composed,
             external=external,
-            live_port=live_port_of(live, live_port),
+            live_port=port,
         )
     except BaseException:
         if not folder:
