@@ -11,7 +11,7 @@ from full_disk import files_no_larger_than
 from pyarrow import parquet
 from waiting import wait_until
 
-from hsv.campaign import table
+from hsv.campaign import run, table
 from hsv.campaign.executors import SerialExecutor
 from hsv.campaign.run import capacity, run_campaign
 from hsv.campaign.sample_runner import SampleRunner
@@ -248,21 +248,54 @@ def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):
             read_result(tmp_path / name)
 
 
-def test_what_is_to_come_is_expected_from_flights_of_the_campaign(planned):
-    flown = []
+def test_what_is_to_come_is_expected_from_the_first_batches_which_are_kept(planned, results, out):
+    flown, told = [], []
 
     class Watched(SerialExecutor):
+        cores = 2
+
         def fly(self, job, text, batches):
             flown.append((job.__name__, list(batches)))
             return super().fly(job, text, flown[-1][1])
 
+    def stop(needed):
+        told.append(needed)
+        raise KeyboardInterrupt
+
+    campaign = planned(samples=132)
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(campaign, ResultStore(out, campaign), Watched(), expect=stop)
+    run_campaign(campaign, ResultStore(out, campaign), Watched(), expect=told.append)
+    # One batch a core from all over the campaign; both are there when it is told, and are not flown again.
+    assert flown == [
+        *(("time_flight", [0, 1]), ("fly_batch", [0, 2, 1, 3, 4])),
+        *(("time_flight", [0, 1]), ("fly_batch", [1, 3, 4])),
+    ]
+    all_, rest = told
+    assert (all_.flights, all_.cores, rest.flights) == (132, 2, 68)
+    assert all_.wall_time > 0.0 and rest.wall_time > 0.0
+    assert all_.bytes > 132 * 8 * 30
+
+
+def test_what_takes_is_told_by_whole_batches_in_turn(planned):
     campaign = planned(samples=100)
-    one, all_ = (capacity(campaign, missing, Watched()) for missing in ([3], range(4)))
-    assert (one.flights, all_.flights, all_.cores) == (4, 100, 1)
+    one, all_ = (capacity(campaign, missing, 1, 0.5) for missing in ([3], range(4)))
+    assert (one.flights, one.wall_time, all_.flights, all_.wall_time) == (4, 2.0, 100, 50.0)
     # A batch is not divided, but the last one is smaller.
-    assert all_.wall_time > one.wall_time > 0.0
-    assert all_.bytes > 100 * 8 * 30
-    assert flown == [("time_flight", [96, 97, 98, 99]), ("time_flight", [0, 25, 50, 75])]
+    assert capacity(campaign, range(4), 2, 0.5).wall_time == 32.0
+
+
+def test_where_batches_take_long_what_is_to_come_is_told_before(planned, out, monkeypatch):
+    monkeypatch.setattr(run, "_LATE", 0.0)
+    campaign, told = planned(), []
+    run_campaign(
+        campaign,
+        ResultStore(out, campaign),
+        SerialExecutor(),
+        expect=lambda needed: told.append(("expected", needed.flights)),
+        progress=lambda done: told.append(("done", done)),
+    )
+    assert told == [("expected", 44), ("done", 0), ("done", 32), ("done", 44)]
 
 
 def test_a_flight_that_takes_long_is_timed_by_a_piece_of_it(planned, monkeypatch):
@@ -270,17 +303,18 @@ def test_a_flight_that_takes_long_is_timed_by_a_piece_of_it(planned, monkeypatch
     fly_piece = SampleRunner.fly_piece
 
     def watched(runner, steps):
-        flown.append(fly_piece(runner, steps))
-        return flown[-1]
+        flown.append(steps)
+        return fly_piece(runner, steps)
 
     monkeypatch.setattr(SampleRunner, "fly_piece", watched)
-    for name in ("_SLOW", "_VERY_SLOW"):
-        monkeypatch.setattr(table, name, 1e-9)
-    monkeypatch.setattr(table, "_PIECE", 50)
-    monkeypatch.setattr(table, "_rows", None)  # nothing is flown whole
     campaign = planned(samples=4)
+    for slow, very_slow, pieces in ((1e9, 1e9, [1, 50]), (1e-9, 1e9, [1, 50, 150]), (1e-9, 1e-9, [1, 50])):
+        monkeypatch.setattr(table, "_SLOW", slow)
+        monkeypatch.setattr(table, "_VERY_SLOW", very_slow)
+        monkeypatch.setattr(table, "_PIECE", 50)
+        table._flight_time.cache_clear()
+        flown.clear()
+        first, second = (float(table.time_flight(campaign.text, core)) for core in (0, 1))
+        assert first == second > 0.0
+        assert flown == pieces
     table._flight_time.cache_clear()
-    first, second = (float(table.time_flight(campaign.text, flight)) for flight in (0, 3))
-    table._flight_time.cache_clear()
-    assert first == second > 0.0
-    assert flown == [1, 50]

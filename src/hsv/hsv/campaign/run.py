@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from hsv.campaign.campaign import Campaign
-from hsv.campaign.capacity import Capacity, evenly, timed
+from hsv.campaign.capacity import Capacity, evenly
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Executor
 from hsv.campaign.store import ResultStore
-from hsv.campaign.table import fly_batch, schema, time_flight
+from hsv.campaign.table import fly_batch, schema, seconds_of, time_flight
 
-_TIMED = 4
-"""Flights a core that are timed before the start."""
+_LATE = 30.0
+"""Seconds from which on nobody waits for the first batches to be told what is to come."""
 
 
 def run_campaign(
@@ -31,8 +31,10 @@ def run_campaign(
         store: Where results are kept; batches that are there already are not flown again.
         executor: The back end that flies the batches.
         restart: Whether to discard existing results first.
-        expect: Called once, after flights that are timed, with the capacity that the run needs.
-        progress: Called with the number of finished flights, those found at the start included.
+        expect: Called once with the capacity that the run needs, as its first batches tell, one a core from all over
+            it; before them where they take long.
+        progress: Called with the number of finished flights, those found at the start included; first when workers
+            have built what their flights share.
 
     Raises:
         CampaignError, RunError: See :class:`hsv.campaign.store.ResultStore` and :mod:`hsv.campaign.executors`.
@@ -43,25 +45,33 @@ def run_campaign(
             return 0
         missing = [batch for batch in range(campaign.batches) if batch not in finished]
         done = sum(len(campaign.flights(batch)) for batch in finished)
+        cores = max(executor.cores, 1)
+        first = evenly(missing, cores)
         if missing:
-            expect(capacity(campaign, missing, executor))
+            alone = [float(content) for _, content in executor.fly(time_flight, campaign.text, range(cores))]
+            if max(alone) * campaign.batch > _LATE:
+                expect(capacity(campaign, missing, cores, sum(alone) / len(alone)))
+                first = []
         progress(done)
-        for batch, content in executor.fly(fly_batch, campaign.text, missing):
+        order, seconds = [*first, *(batch for batch in missing if batch not in first)], 0.0
+        for count, (batch, content) in enumerate(executor.fly(fly_batch, campaign.text, order), 1):
             store.keep(batch, content)
             flown += len(campaign.flights(batch))
+            if count <= len(first):
+                seconds += seconds_of(content)
+            if count == len(first):
+                expect(capacity(campaign, missing, cores, seconds / flown))
             progress(done + flown)
         store.finish()
     return flown
 
 
-def capacity(campaign: Campaign, missing: Sequence[int], executor: Executor) -> Capacity:
-    """Return what flying the ``missing`` batches takes."""
-    cores = max(executor.cores, 1)
-    flights = [flight for batch in missing for flight in campaign.flights(batch)]
-    seconds = timed(executor, time_flight, campaign.text, evenly(flights, _TIMED * cores))
+def capacity(campaign: Campaign, missing: Sequence[int], cores: int, seconds: float) -> Capacity:
+    """Return what flying the ``missing`` batches on so many ``cores`` takes, ``seconds`` a flight of one of them."""
+    flights = sum(len(campaign.flights(batch)) for batch in missing)
     # Whole batches go to the cores in turn.
-    longest = min(-(-len(missing) // cores) * campaign.batch, len(flights))
+    longest = min(-(-len(missing) // cores) * campaign.batch, flights)
     # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
-    rows = len(flights) * 8 * len(schema(campaign))
+    rows = flights * 8 * len(schema(campaign))
     envelopes = campaign.batches * len(Envelope.empty().encode())
-    return Capacity(len(flights), cores, longest * sum(seconds.values()) / len(seconds), rows + envelopes)
+    return Capacity(flights, cores, longest * seconds, rows + envelopes)

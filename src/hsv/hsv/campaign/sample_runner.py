@@ -93,7 +93,7 @@ class SampleRunner:
                 yield from self._told(flown)
                 flown = []
             if not together:
-                yield from map(self._flown_alone, components)
+                yield from map(self._flown_or_error, components)
         yield from self._told(flown)
 
     def _group(self, number: int) -> FlightGroup:
@@ -107,10 +107,13 @@ class SampleRunner:
         levels = [level for group in groups for level in self._levels.worst_of(group)]
         return map(Flown, flights, levels, fingerprints([flight.history.flown for flight in flights]))
 
-    def _flown_alone(self, components: Components) -> Flown | ControllerError:
+    def _flown_alone(self, components: Components) -> Flown:
+        flight = fly(components)
+        return Flown(flight, self.level(flight.data()), flight.fingerprint)
+
+    def _flown_or_error(self, components: Components) -> Flown | ControllerError:
         try:
-            flight = fly(components)
-            return Flown(flight, self.level(flight.data()), flight.fingerprint)
+            return self._flown_alone(components)
         except ControllerError as error:
             return error
 
@@ -129,17 +132,19 @@ class SampleRunner:
         """Fly the scenario itself."""
         return fly(self._variants.unchanged)
 
-    def fly_piece(self, steps: int) -> int:
-        """Fly so many ``steps`` of the scenario itself; return how many it came to."""
+    def fly_piece(self, steps: int) -> list[Flown]:
+        """Fly so many ``steps`` of the scenario itself, as often as it is flown at once.
+
+        Raises:
+            ControllerError: As :meth:`fly`.
+        """
         parts = self._variants.unchanged
         plant = copy(parts.plant)
         plant.steps = steps
-        return len(fly(replace(parts, plant=plant)).time) - 1
-
-    @property
-    def at_once(self) -> int:
-        """How many flights of the scenario are flown at once."""
-        return _GROUPS * WIDTH if FlightGroup.takes([self._variants.unchanged] * 2) else 1
+        pieces = [replace(parts, plant=plant)] * WIDTH
+        if not FlightGroup.takes(pieces):
+            return [self._flown_alone(pieces[0])]
+        return list(self._told([FlightGroup(steps).fly(pieces) for _ in range(_GROUPS)]))
 
     @property
     def controller(self) -> Controller:

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Job
-from hsv.campaign.sample_runner import SampleRunner, sample_runner
+from hsv.campaign.sample_runner import Flown, Outcome, SampleRunner, sample_runner
 from hsv.control.library import LibraryController
 from hsv.errors import ControllerError
 from hsv.simulation.closed_loop import watched
@@ -23,6 +23,9 @@ from hsv.simulation.metrics import METRICS
 
 CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys of the file's metadata."""
+
+_SECONDS = b"hsv.seconds"
+"""The same of a batch, for the time that its flights took."""
 
 OUTCOMES = {"end_time": "s", "tube_level": "1", **{name: metric.unit for name, metric in METRICS.items()}}
 """Numbers that are kept of a flight, with their SI units; null where a flight does not define one."""
@@ -39,10 +42,10 @@ _BATCH_WRITTEN: dict[str, Any] = {
 """The same of a batch, which is soon read once and removed: to make it small takes longer than to write it."""
 
 _SLOW = 2.0
-"""Seconds from which on a flight is flown whole once at most to see how long it takes, not sample by sample."""
+"""Seconds from which on a flight is flown whole to see how long it takes: a piece is enough of a fast one."""
 
 _VERY_SLOW = 60.0
-"""Seconds from which on it is not, and a piece of it has to do."""
+"""Seconds from which on it is not, and a piece has to do."""
 
 _PIECE = 198
 """Steps of that piece. Problems that are solved every 2 s, and in the first step, count as often as in the rest; of
@@ -72,13 +75,17 @@ def fly_batch(text: str, batch: int) -> bytes:
     return _fly(_flown_here, text, batch)
 
 
-def time_flight(text: str, flight: int) -> bytes:
-    """Return how long (s) a flight of the campaign in ``text`` takes, as a text: flown, or a piece of a slow one.
+def seconds_of(content: bytes) -> float:
+    """Return how long (s) the flights of a batch took that :func:`fly_batch` returned."""
+    return float(pq.read_schema(BytesIO(content)).metadata[_SECONDS])
 
-    Raises:
-        ScenarioError: The scenario does not admit the values of the flight together; it is named.
+
+def time_flight(text: str, core: int) -> bytes:
+    """Return about how long (s) a flight takes a ``core`` that flies as many as it does at once, as a text.
+
+    What its flights share is built then, and what is compiled is there.
     """
-    return _fly(_timed_here, text, flight)
+    return _fly(_timed_here, text, core)
 
 
 def _fly(job: Job, text: str, number: int) -> bytes:
@@ -92,35 +99,29 @@ def _fly(job: Job, text: str, number: int) -> bytes:
 
 def _flown_here(text: str, batch: int) -> bytes:
     runner = sample_runner(text)
-    return encode(runner.campaign, *_rows(runner, runner.campaign.flights(batch)))
+    started = time.perf_counter()
+    rows, envelope = _rows(runner, runner.campaign.flights(batch))
+    return encode(runner.campaign, rows, envelope, time.perf_counter() - started)
 
 
-def _timed_here(text: str, flight: int) -> bytes:
-    expected = _flight_time(text)
-    if expected < _SLOW:
-        runner = sample_runner(text)
-        # As many as are flown at once: one of them alone would take longer.
-        flights = range(flight, min(flight + runner.at_once, runner.campaign.samples))
-        started = time.perf_counter()
-        _rows(runner, flights)
-        expected = (time.perf_counter() - started) / len(flights)
-    return repr(expected).encode()
+def _timed_here(text: str, core: int) -> bytes:
+    return repr(_flight_time(text)).encode()
 
 
 @lru_cache(maxsize=1)
 def _flight_time(text: str) -> float:
-    """Return how long (s) the scenario's flight takes, extrapolated from a piece of it where that is long.
-
-    What is compiled and built once is there then.
-    """
+    """Return how long (s) the scenario's flight takes, extrapolated from a piece of it where that is long, or short."""
     runner = sample_runner(text)
     seconds = 0.0
     with suppress(ControllerError):  # the flights are going to say so
-        runner.fly_piece(1)
+        for flown in runner.fly_piece(1):
+            _outcome(runner, flown, Envelope.empty())
         for steps in (min(_PIECE, runner.steps), runner.steps):
             started = time.perf_counter()
-            flown = runner.fly_piece(steps)
-            seconds = (time.perf_counter() - started) * (runner.steps / steps if flown == steps else 1.0)
+            pieces = runner.fly_piece(steps)
+            seconds = (time.perf_counter() - started) / len(pieces)
+            if all(len(piece.flight.time) > steps for piece in pieces):
+                seconds *= runner.steps / steps
             if not _SLOW < seconds < _VERY_SLOW:
                 break
     return seconds
@@ -129,16 +130,16 @@ def _flight_time(text: str) -> float:
 def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], Envelope]:
     campaign, envelope, rows = runner.campaign, Envelope.empty(), []
     samples, seeds = runner.sampler.draw(flights)
-    drawn = zip(flights, samples, seeds, runner.fly_all(flights, samples), strict=True)
-    for flight, sample, seed, flown in drawn:
-        if isinstance(flown, ControllerError):
-            outcome = runner.crashed(flown)
-        else:
-            data = flown.flight.data()
-            envelope.add(data, runner.steps)
-            outcome = runner.outcome(data, flown.level, flown.fingerprint)
+    for flight, sample, seed, flown in zip(flights, samples, seeds, runner.fly_all(flights, samples), strict=True):
+        outcome = runner.crashed(flown) if isinstance(flown, ControllerError) else _outcome(runner, flown, envelope)
         rows.append(row(sample, flight, int(seed), campaign, outcome))
     return rows, envelope
+
+
+def _outcome(runner: SampleRunner, flown: Flown, envelope: Envelope) -> Outcome:
+    data = flown.flight.data()
+    envelope.add(data, runner.steps)
+    return runner.outcome(data, flown.level, flown.fingerprint)
 
 
 def row(sample: Sequence[float], flight: int, seed: int, campaign: Campaign, outcome: dict[str, Any]) -> dict[str, Any]:
@@ -147,9 +148,10 @@ def row(sample: Sequence[float], flight: int, seed: int, campaign: Campaign, out
     return {"flight": flight, "seed": seed, **samples, **outcome}
 
 
-def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope) -> bytes:
-    """Return rows and envelope as a Parquet file."""
-    table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata({ENVELOPE: envelope.encode()}))
+def encode(campaign: Campaign, rows: list[dict[str, Any]], envelope: Envelope, seconds: float) -> bytes:
+    """Return rows and envelope as a Parquet file, with the ``seconds`` that the flights took."""
+    beside = {ENVELOPE: envelope.encode(), _SECONDS: repr(seconds)}
+    table = pa.Table.from_pylist(rows, schema=schema(campaign).with_metadata(beside))
     stream = BytesIO()
     pq.write_table(table, stream, **_BATCH_WRITTEN)
     return stream.getvalue()

@@ -113,13 +113,18 @@ def fly(
 
     def expect(needed: Capacity) -> None:
         announce(needed)
-        begun.update(expected=needed.wall_time, at=time.perf_counter())
+        begun["expected"] = needed.wall_time
 
     with (
         resumable(store.folder),
         make_executor(workers, scheduler, lambda: errors.print("waiting for the scheduler's workers")) as flying,
-        flights_bar(campaign.scenario_name, campaign.samples) as progress,
+        flights_bar(campaign.scenario_name, campaign.samples) as shown,
     ):
+
+        def progress(done: int) -> None:
+            begun.setdefault("at", time.perf_counter())
+            shown(done)
+
         flown = run_campaign(campaign, store, flying, restart=restart, expect=expect, progress=progress)
         taken = time.perf_counter() - begun.get("at", time.perf_counter())
     # The campaign in the file is the one that was asked for: its code is that of the user's own scenario.
