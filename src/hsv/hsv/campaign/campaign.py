@@ -108,7 +108,7 @@ class Campaign:
         """Return the numbers of the flights of a batch."""
         return range(batch * self.batch, min((batch + 1) * self.batch, self.samples))
 
-    @property
+    @cached_property
     def text(self) -> str:
         """The campaign as JSON, the same text for the same campaign."""
         return json.dumps(asdict(self), sort_keys=True)

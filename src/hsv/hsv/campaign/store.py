@@ -21,6 +21,9 @@ from hsv.errors import CampaignError, DocumentError, reason
 
 _CAMPAIGN_FILE = "campaign.json"
 
+_ROWS = 1024
+"""Rows that are written at a time, as far as whole batches have them: a group of rows takes as long as its rows."""
+
 
 class ResultStore:
     """Stores the batches of one campaign; a stored batch stays whole whatever happens to this process."""
@@ -74,10 +77,14 @@ class ResultStore:
         columns = schema(self._campaign)
         with _writing(self.out, temporary):
             with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
-                for batch in range(self._campaign.batches):
-                    part, its_envelope = self._read(batch)
-                    envelope.merge(its_envelope)
-                    writer.write_table(part.cast(columns))
+                together = max(1, _ROWS // self._campaign.batch)
+                for first in range(0, self._campaign.batches, together):
+                    parts = []
+                    for batch in range(first, min(first + together, self._campaign.batches)):
+                        part, its_envelope = self._read(batch)
+                        envelope.merge(its_envelope)
+                        parts.append(part.cast(columns))
+                    writer.write_table(pa.concat_tables(parts))
                 kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
                 writer.add_key_value_metadata(kept | {DIGEST: _digest(kept)})
             _replace(temporary, self.out)
@@ -108,7 +115,8 @@ class ResultStore:
     def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
         path = self._part(batch)
         try:
-            part = pq.read_table(path, page_checksum_verification=True)
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                part = file.read(use_threads=False)
             return part, Envelope.decode(part.schema.metadata[ENVELOPE].decode())
         except (OSError, ValueError) as error:
             path.unlink(missing_ok=True)
