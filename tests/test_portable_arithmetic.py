@@ -34,10 +34,11 @@ PYTHON = (
 """Beginnings of the names by which compiled functions take arguments from Python, raise its errors, get memory."""
 
 ON_THE_PATH = (
-    "bound.py",
     "elementary.py",
     "elimination.py",
     "inheritance.py",
+    "lane_arrays.py",
+    "lane_overloads.py",
     "lane_types.py",
     "lanes.py",
     "signals.py",
@@ -84,6 +85,7 @@ ON_THE_PATH = (
     "simulation/distribution.py",
     "simulation/fields.py",
     "simulation/foreign.py",
+    "simulation/foreign_call.py",
     "simulation/governed.py",
     "simulation/history.py",
     "simulation/scenario.py",
@@ -135,6 +137,8 @@ EXEMPT = {
     "documents.py": "reads files",
     "threads.py": "runs flights in threads",
     "compiled.py": "says how functions are compiled",
+    "precompiled.py": "the same",
+    "ahead_of_time.py": "the same",
     "control/design_file.py": "the same",
     "control/design_parameters.py": "takes arrays from files as they are",
     "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",

@@ -43,6 +43,7 @@ setup(
             "py.typed",
             "**/*.toml",
             "known_units.json",
+            "run_time.c",
             "bench/*.c",
             "campaign/template/*",
             "control/include/*.h",

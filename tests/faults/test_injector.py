@@ -168,9 +168,10 @@ def test_reset_returns_to_the_schedule():
 def test_compiled_schedule_does_the_same_as_the_object():
     injector = injector_of((loss(0.9), 2), (loss(0.5), 4), (loss(0.8, FUEL), 1))
     rows = injector.rows((COMMAND_SIDE,))
-    memory, out = fault_memory(rows), np.empty(2)
+    memory = fault_memory(rows)
     for step in range(6):
-        apply_command_faults(rows, memory, step, 0, COMMAND, out)
+        out = COMMAND.copy()
+        apply_command_faults(rows, memory, step, 0, out, 0)
         assert_array_equal(out, actuator(injector, step))
 
 

@@ -33,9 +33,10 @@ def elevator(kind, **parameters):
 def flown(faults, commands, seed=0):
     """Return what becomes of the elevator's commands, of faults with their first step and the one without."""
     rows = fault_rows([COMMAND], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
-    memory, out, result = fault_memory(rows), np.empty(2), []
+    memory, result = fault_memory(rows), []
     for k, command in enumerate(commands):
-        apply_command_faults(rows, memory, k, seed, np.array([0.4, command]), out)
+        out = np.array([0.4, command])
+        apply_command_faults(rows, memory, k, seed, out, 0)
         assert out[0] == 0.4
         result.append(out[1])
     return np.array(result)
@@ -141,12 +142,13 @@ def test_memory_begins_anew_whenever_an_intermittent_fault_does():
 def test_a_change_in_flight_leaves_the_memory_of_the_others():
     slow, lost = elevator("delay", steps=4), elevator("loss_of_effectiveness", effectiveness=0.5)
     rows = fault_rows([COMMAND], [(slow, 2, NEVER)], T)
-    memory, out, result = fault_memory(rows), np.empty(2), []
+    memory, result = fault_memory(rows), []
     for k, command in enumerate(WAVE):
         if k == 30:
             changed = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T)
             memory, rows = fault_memory(changed, rows, memory), changed
-        apply_command_faults(rows, memory, k, 0, np.array([0.4, command]), out)
+        out = np.array([0.4, command])
+        apply_command_faults(rows, memory, k, 0, out, 0)
         result.append(out[1])
     assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
 

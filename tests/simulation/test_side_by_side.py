@@ -8,7 +8,7 @@ from hsv.campaign import sample_runner
 from hsv.campaign.campaign import plan
 from hsv.campaign.sample_runner import SampleRunner
 from hsv.campaign.tube_levels import TubeLevels
-from hsv.lanes import WIDTH
+from hsv.lane_types import WIDTH
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.side_by_side import FlightGroup
 

@@ -23,21 +23,32 @@ def undefined_symbols(dispatcher: CPUDispatcher) -> set[str]:
 
 def main() -> None:
     """Fly once compiled and once step by step, then print "function: symbol" for every function of ours compiled."""
+    from hsv import compiled
     from hsv.simulation.assembly import assemble_flight
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.scenario import load_scenario
 
+    compiled.observer = lambda function, arguments: None  # numba compiles all
     scenario = load_scenario("case2").model_copy(update={"duration": 120.0})
     fly(assemble_flight(scenario))
     step_by_step(assemble_flight(scenario.model_copy(update={"duration": 0.1})))
     modules = [module for name, module in sys.modules.items() if name.startswith("hsv.")]
-    dispatchers = {
-        id(value): value for module in modules for value in vars(module).values() if isinstance(value, CPUDispatcher)
+    functions = {
+        value.name: value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, compiled.CompiledFunction)
     }
-    for dispatcher in dispatchers.values():
-        name = f"{dispatcher.py_func.__module__}.{dispatcher.py_func.__name__}"
+    for name, function in functions.items():
+        dispatcher = function.dispatcher
         for symbol in sorted(undefined_symbols(dispatcher)) or ["-"] * bool(dispatcher.signatures):
             print(f"{name}: {symbol}")
+        if function.targetoptions.get("_nrt") is False:
+            # Who holds an array is not counted then: an array, or a view of one, is none to return.
+            for overload in dispatcher.overloads.values():
+                returned = overload.signature.return_type
+                if "Array" in repr(returned):
+                    print(f"{name}: returns {returned}")
 
 
 if __name__ == "__main__":

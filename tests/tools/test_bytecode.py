@@ -40,3 +40,15 @@ def test_what_is_for_another_python_is_left_out(module):
     bytecode.compile_sources(Path(sys.executable), os.environ, Stage("Trial", "trial"))
     assert Path(importlib.util.cache_from_source(str(module))).is_file()
     assert not Path(importlib.util.cache_from_source(str(broken))).exists()
+
+
+def test_tests_of_installed_packages_are_left_out_wherever_the_checkout_is(module, monkeypatch):
+    environment = module.parents[1] / "tests" / "venv"
+    monkeypatch.setattr(bytecode, "VENV", environment)
+    package = environment / "lib" / "python3.9" / "site-packages" / "package"
+    (package / "tests").mkdir(parents=True)
+    paths = package / "flyer.py", package / "tests" / "test_flyer.py"
+    for path in paths:
+        path.write_text("ALTITUDE = 26000.0\n")
+    bytecode.compile_packages(Path(sys.executable), os.environ, Stage("Trial", "trial"))
+    assert [Path(importlib.util.cache_from_source(str(path))).is_file() for path in paths] == [True, False]

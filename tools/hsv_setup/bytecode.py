@@ -25,7 +25,7 @@ for path in sys.argv[2:]:
     compileall.compile_dir(path, quiet=2, workers=0, rx=re.compile(sys.argv[1]))
 """
 
-_OWN_TESTS = "/tests?/"
+_OWN_TESTS = "site-packages/.*/tests?/"
 """Directories of installed packages that no process of the bench imports: a quarter of all that is installed."""
 
 _NOTHING = "(?!)"

@@ -1,11 +1,13 @@
 """The stage that compiles the numerical code ahead of its first use.
 
 Five nodes that start at once on two cores should not each compile it. numba notices a changed source file, but not
-that a function it calls from another file has changed: so all caches go when any of the compiled sources changes.
+that a function it calls from another file has changed: so all caches go when any of the compiled sources changes, and
+with them the library of what is called without numba (:mod:`hsv.ahead_of_time`).
 """
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -17,16 +19,20 @@ from hsv_setup.paths import ROOT, STAMPS, fingerprint, read_stamp, write_stamp
 
 _LIBRARY = ROOT / "src" / "hsv" / "hsv"
 _PROGRAM = _LIBRARY / "warm.py"
+_INDEX = _LIBRARY / "__pycache__" / "ahead_of_time.json"
 _STAMP = STAMPS / "compiled"
 
 
 def _sources() -> list[Path]:
-    sources = {path: path.read_text() for path in sorted(_LIBRARY.rglob("*.py"))}
-    return [path for path, text in sources.items() if "numba" in text or "njit" in text]
+    """Return what defines compiled functions, and what the library was made of: modules with their constants, too."""
+    made_of = json.loads(_INDEX.read_text())["sources"] if _INDEX.exists() else []
+    defining = {path for path in _LIBRARY.rglob("*.py") if any(word in path.read_text() for word in ("numba", "njit"))}
+    return sorted(defining | {path for name in made_of if (path := _LIBRARY / name).exists()})
 
 
 def _caches() -> list[Path]:
-    return [path for suffix in ("nbi", "nbc") for path in _LIBRARY.rglob(f"__pycache__/*.{suffix}")]
+    numba = [path for suffix in ("nbi", "nbc") for path in _LIBRARY.rglob(f"__pycache__/*.{suffix}")]
+    return [*numba, *_INDEX.parent.glob("ahead_of_time.*")]
 
 
 def _key() -> str:

@@ -1,13 +1,105 @@
-"""How the functions of a flight are compiled."""
+"""Compiled functions: by numba when it is needed, else as they were compiled ahead of time.
+
+To import numba and to prepare it for its first function takes more processor time than twenty flights of Case 1.
+``python -m hsv.warm``, which the set-up runs, therefore also writes a library of the functions that commands and nodes
+call from Python, for the types of arguments with which they call them (:mod:`hsv.ahead_of_time`). A function of
+:func:`njit` that is called with such arguments is taken from there, and numba is not imported
+(:mod:`hsv.precompiled`). With any other arguments, without that library, after a change of a source or on another kind
+of processor it is numba's, as with its own ``njit``. Both are the same machine code, with the same bits.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+import os
+from collections.abc import Callable
+from functools import update_wrapper
+from importlib import import_module
+from typing import Any, TypeVar, cast
 
-from numba import njit
+from hsv.precompiled import entry_for
+
+EXTENSIONS = ("hsv.lane_overloads", "hsv.simulation.foreign_call")
+"""Modules that tell numba of our types and functions; to import them is to import numba."""
+
+ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
+"""Whether functions are compiled; tests and debuggers look through those that are not."""
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+observer: Callable[[CompiledFunction, tuple[Any, ...]], None] | None = None
+"""Told of every call from Python while functions are to be compiled ahead of time; numba is used then."""
 
 
-def njit_in_flight(**options: Any) -> Any:
+class CompiledFunction:
+    """A function that is compiled; in functions compiled by numba it stands for what numba makes of it."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        self.name = f"{function.__module__}.{function.__qualname__}"
+        # Numba looks at these two, too, to decide whether it inlines the function.
+        self.targetoptions = options
+        self._dispatcher: Any = None
+
+    def __reduce__(self) -> str:
+        return self.py_func.__qualname__
+
+    @property
+    def dispatcher(self) -> Any:
+        """What numba makes of the function; numba is imported."""
+        if self._dispatcher is None:
+            for name in EXTENSIONS:
+                import_module(name)
+            compile_with = import_module("numba").njit
+            try:
+                self._dispatcher = compile_with(**self.targetoptions)(self.py_func)
+            except RuntimeError:  # there is no folder to keep what is compiled in
+                self._dispatcher = compile_with(**self.targetoptions | {"cache": False})(self.py_func)
+        return self._dispatcher
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self.dispatcher._numba_type_
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Return what the function returns."""
+        if observer is not None:
+            observer(self, arguments)
+        elif self._dispatcher is None and not named:
+            # Once numba is there for it, it decides by the types of the arguments faster.
+            entry = entry_for(self.name, arguments)
+            if entry:
+                return entry(*arguments)
+        return self.dispatcher(*arguments, **named)
+
+    def compiled_for(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return what is called in the end with arguments of the types of these, which are all of them."""
+        if observer is not None:
+            observer(self, arguments)
+        elif self._dispatcher is None:
+            entry = entry_for(self.name, arguments)
+            if entry:
+                return entry
+        numba = import_module("numba")
+        defaults = self.py_func.__defaults__ or ()
+        first = len(arguments) - len(defaults)
+        kinds = [
+            numba.types.Omitted(given) if i >= first and given is defaults[i - first] else numba.typeof(given)
+            for i, given in enumerate(arguments)
+        ]
+        return cast(Callable[..., Any], self.dispatcher.compile(tuple(kinds)))
+
+
+def njit(**options: Any) -> Callable[[Function], Function]:
+    """Return a decorator for functions that are compiled, with the options of numba's ``njit``."""
+
+    def decorate(function: Function) -> Function:
+        return cast(Function, CompiledFunction(function, options)) if ENABLED else function
+
+    return decorate
+
+
+def njit_in_flight(**options: Any) -> Callable[[Function], Function]:
     """Return the decorator of a function that is compiled, and that fills arrays but makes none.
 
     Where nothing is allocated nobody need count who holds an array. Counting takes an atomic instruction for each array
@@ -16,5 +108,33 @@ def njit_in_flight(**options: Any) -> Any:
     Args:
         **options: Of :func:`numba.njit`.
     """
-    compiled: Any = njit
-    return compiled(cache=True, _nrt=False, **options)
+    return njit(cache=True, _nrt=False, **options)
+
+
+class Bound:
+    """A compiled function whose arguments are looked at in the first call, and not in every one.
+
+    To find out which types its arguments have takes longer than many a function takes where there are large tuples
+    among them. Whoever calls this answers for it that all arguments, none left out, are always of the types of those of
+    the first call, arrays of the same order in memory too.
+    """
+
+    __slots__ = ("_call", "_function")
+
+    def __init__(self, function: CompiledFunction) -> None:
+        self._function = function
+        self._call: Callable[..., Any] | None = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Return what the function returns."""
+        if self._call is None:
+            self._call = self._function.compiled_for(arguments)
+        return self._call(*arguments)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Bound, (self._function,)
+
+
+def bound(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a function of :func:`njit` as a :class:`Bound` one; as it is where compilation is switched off."""
+    return Bound(function) if isinstance(function, CompiledFunction) else function

@@ -6,7 +6,8 @@ LAPACK chooses its kernels, and with them the order of its sums, by the processo
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from hsv.compiled import njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,4 +1,4 @@
-"""Lanes as a type of numbers for numba: what holds them, and the instructions of arithmetic and comparison.
+"""Lanes as a type of numbers for numba: how it holds them, and the instructions of arithmetic and comparison.
 
 See :mod:`hsv.lanes`, which is for those who write compiled functions.
 """
@@ -19,47 +19,10 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
 
+from hsv.lane_arrays import LaneArray, LaneRecord
+
 WIDTH = 8 if binding.get_host_cpu_features().get("avx512f") else 4
 """Lanes that this processor computes at once."""
-
-
-class LaneArray:
-    """An array of lanes, for compiled functions: indexed like an array whose elements are numbers."""
-
-    def __init__(self, array: np.ndarray, *, split: bool = False) -> None:
-        """View ``array``, contiguous (of a lane), of float64.
-
-        Args:
-            array: (..., lanes), or (lanes, ...) where ``split``.
-            split: Whether each lane's numbers are on their own, as histories are; else those of an element are.
-        """
-        if array.dtype != np.float64 or not (array[0] if split else array).flags.c_contiguous:
-            raise ValueError(f"array of {array.dtype}: expected contiguous float64")
-        self.array = array
-        self.split = split
-        self.lanes = array.shape[0] if split else array.shape[-1]
-        self.shape = array.shape[1:] if split else array.shape[:-1]
-        self.address = array.ctypes.data
-        self.stride = array.strides[0] // array.itemsize if split else 1
-
-    @classmethod
-    def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
-        """Return :data:`WIDTH` lanes of zeros."""
-        return cls(np.zeros((*((shape,) if isinstance(shape, int) else shape), WIDTH)))
-
-    @classmethod
-    def of(cls, arrays: Sequence[np.ndarray]) -> LaneArray:
-        """Return a copy of equal arrays, one a lane."""
-        return cls(np.stack(arrays, axis=-1).astype(float, order="C"))
-
-
-class LaneRecord:
-    """A named tuple of numbers for each lane, for compiled functions: an attribute is one number a lane."""
-
-    def __init__(self, tuples: Sequence[Any]) -> None:
-        self.fields = tuple(tuples[0]._fields)
-        self.array = np.array(tuples, float).T.copy()
-        self.address = self.array.ctypes.data
 
 
 class LanesType(types.Type):
@@ -490,32 +453,6 @@ def write_neighbours(typing_context: Any, array: Any, start: Any, value: Any) ->
         return context.get_dummy_value()
 
     return types.none(array, types.intp, LanesType(WIDTH)), generate
-
-
-@_intrinsic
-def lane_numbers(typing_context: Any, array: Any, index: Any) -> Any:
-    """Return one lane of a :class:`LaneArray` of one axis as an array of numbers, in place; of an array itself."""
-    if isinstance(array, types.Array):
-        return array(array, types.intp), lambda context, builder, called, arguments: arguments[0]
-    view = types.Array(types.float64, 1, "A")
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        given = _struct(context, builder, array, arguments[0])
-        size = builder.extract_value(given.shape, 0)
-        step = ir.Constant(_WORD, 8 if array.split else 8 * array.count)
-        made = context.make_array(view)(context, builder)
-        place = builder.gep(given.data, [builder.mul(arguments[1], given.stride)])
-        context.populate_array(
-            made,
-            data=place,
-            shape=cgutils.pack_array(builder, [size], _WORD),
-            strides=cgutils.pack_array(builder, [step], _WORD),
-            itemsize=ir.Constant(_WORD, 8),
-            meminfo=None,
-        )
-        return made._getvalue()
-
-    return view(array, types.intp), generate
 
 
 @_intrinsic

@@ -19,7 +19,6 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import uint64
 
 from hsv.compiled import njit_in_flight
 from hsv.errors import ParameterError
@@ -205,7 +204,7 @@ def _passes(link: Any, state: np.ndarray, come: int, n: int, step: int, seed: in
         return False
     bit = int(place * (64 * n))
     number = come + bit // 64
-    words, turned = state.view(np.uint64), uint64(1) << uint64(bit % 64)
+    words, turned = state.view(np.uint64), np.uint64(1) << np.uint64(bit % 64)
     words[number] ^= turned
     if abs(state[number]) <= LARGEST:
         return True

@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import uint64
 
 from hsv.compiled import njit_in_flight
 from hsv.elementary import logarithm, sine_cosine
@@ -59,7 +58,7 @@ LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
 @njit_in_flight(error_model="numpy")
 def _product(a: Any, b: Any) -> Any:
     """Return the high and the low word of the product of two unsigned words of 64 bits."""
-    half, shift = uint64(_HALF_WORD), uint64(32)
+    half, shift = np.uint64(_HALF_WORD), np.uint64(32)
     a_low, a_high = a & half, a >> shift
     b_low, b_high = b & half, b >> shift
     low = a_low * b_low
@@ -71,14 +70,14 @@ def _product(a: Any, b: Any) -> Any:
 @njit_in_flight(error_model="numpy")
 def philox(c_0: Any, c_1: Any, c_2: Any, c_3: Any, k_0: Any, k_1: Any) -> Any:
     """Return the four words of the counter (``c_0`` ... ``c_3``) under the key (``k_0``, ``k_1``), all uint64."""
-    a, b, c, d = uint64(c_0), uint64(c_1), uint64(c_2), uint64(c_3)
-    key_0, key_1 = uint64(k_0), uint64(k_1)
+    a, b, c, d = np.uint64(c_0), np.uint64(c_1), np.uint64(c_2), np.uint64(c_3)
+    key_0, key_1 = np.uint64(k_0), np.uint64(k_1)
     for _ in range(_ROUNDS):
-        high_0, low_0 = _product(uint64(_MULTIPLIER_0), a)
-        high_1, low_1 = _product(uint64(_MULTIPLIER_1), c)
+        high_0, low_0 = _product(np.uint64(_MULTIPLIER_0), a)
+        high_1, low_1 = _product(np.uint64(_MULTIPLIER_1), c)
         a, b, c, d = high_1 ^ b ^ key_0, low_1, high_0 ^ d ^ key_1, low_0
-        key_0 += uint64(_WEYL_0)
-        key_1 += uint64(_WEYL_1)
+        key_0 += np.uint64(_WEYL_0)
+        key_1 += np.uint64(_WEYL_1)
     return a, b, c, d
 
 
@@ -86,7 +85,7 @@ def philox(c_0: Any, c_1: Any, c_2: Any, c_3: Any, k_0: Any, k_1: Any) -> Any:
 def uniforms(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
     """Return two independent numbers, each uniform on the multiples of 2^-53 in [0, 1)."""
     a, b, _, _ = philox(step, stream, draw, 0, seed, 0)
-    return (a >> uint64(11)) * _TO_UNIT, (b >> uint64(11)) * _TO_UNIT
+    return (a >> np.uint64(11)) * _TO_UNIT, (b >> np.uint64(11)) * _TO_UNIT
 
 
 @njit_in_flight(error_model="numpy")

@@ -15,10 +15,12 @@ from numba import njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
+from hsv.compiled import ENABLED
+
 LANES = 16
 """Arrays that are digested at a time."""
 
-WORTHWHILE = bool(binding.get_host_cpu_features().get("avx512f"))
+WORTHWHILE = ENABLED and bool(binding.get_host_cpu_features().get("avx512f"))
 """Whether it is faster here than one array after the other by :mod:`hashlib`."""
 
 _NUMBERS = 8

@@ -1,20 +1,23 @@
-"""Fill the compiled caches once, so that nodes starting together do not all compile: ``python -m hsv.warm``."""
+"""Compile once what every command and node needs, so that none of them does: ``python -m hsv.warm``."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hsv.sha256_lanes import LANES
+from hsv.ahead_of_time import build, recording
+from hsv.campaign.campaign import plan
+from hsv.campaign.envelope import Envelope
+from hsv.campaign.sample_runner import SampleRunner
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
-from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario
-from hsv.simulation.side_by_side import FlightGroup
 
 
 def warm() -> None:
@@ -29,10 +32,18 @@ def warm() -> None:
         flight_metrics(replace(flown, **columns))  # as they come from a bag, each on its own
         for _ in steps(components):
             pass
-    both = [assemble(flight_parameters(load_scenario("case1")) | {"duration": 0.1}) for _ in range(2)]
-    group = FlightGroup(both[0].plant.steps).fly(both)
-    fingerprints([group.flights[0].history.flown] * LANES)
+    runner, envelope = SampleRunner(plan("case1")), Envelope.empty()
+    for own in runner.fly_piece(5):
+        envelope.add(own.flight.data(), 5)
+        runner.outcome(own.flight.data(), own.level, own.fingerprint)
 
 
 if __name__ == "__main__":
-    warm()
+    with recording() as calls:
+        warm()
+    try:
+        build(calls)
+    except (OSError, subprocess.CalledProcessError, AttributeError) as error:
+        # No compiler to link with, or a llvmlite before 0.44: only the start of commands and nodes takes longer.
+        reason = getattr(error, "stderr", None) or error
+        print(f"python -m hsv.warm: nothing compiled ahead of time: {reason}", file=sys.stderr)

@@ -14,7 +14,7 @@ from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
 from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
-from hsv.lanes import WIDTH
+from hsv.lane_types import WIDTH
 from hsv.sha256_lanes import LANES
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.lanes import LaneArray, choose, every
 from hsv.simulation.metrics import FlightData
 

@@ -17,7 +17,7 @@ from hsv.campaign.variants import FlightVariants
 from hsv.control.controller import Controller
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
-from hsv.lanes import WIDTH
+from hsv.lane_types import WIDTH
 from hsv.sha256_lanes import LANES, WORTHWHILE
 from hsv.simulation.closed_loop import Components, Flight, fly
 from hsv.simulation.fingerprint import fingerprints

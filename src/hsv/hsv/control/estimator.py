@@ -16,9 +16,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
-from hsv.compiled import njit_in_flight
+from hsv.compiled import njit, njit_in_flight
 from hsv.control.estimator_parameters import (
     ESTIMATOR_ENABLED,
     ESTIMATOR_PARAMETERS,

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NominalData, nominal_input
 from hsv.control.nominal_trajectory import LAWS, NominalTrajectory, nominal_advance

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hsv.bound import bound
-from hsv.compiled import njit_in_flight
+from hsv.compiled import bound, njit_in_flight
 from hsv.lanes import choose, every, lanes_in, least, most
 from hsv.lpv.polytope import PolytopeData
 
@@ -129,8 +128,7 @@ class FamilyLaw:
 
     def __init__(self, data: NominalData) -> None:
         self.data = data
-        n, m = data.gains.shape[2], data.gains.shape[1]
-        self._nominal_input = bound(nominal_input, data, np.empty(n), np.empty(m))
+        self._nominal_input = bound(nominal_input)
 
     def reset(self) -> None:
         """Nothing to forget."""

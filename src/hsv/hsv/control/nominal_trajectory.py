@@ -7,8 +7,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.bound import bound
-from hsv.compiled import njit_in_flight
+from hsv.compiled import bound, njit_in_flight
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
@@ -98,10 +97,12 @@ class NominalTrajectory:
         self._step = 0
         self._planned = reference
         self._input = np.zeros(N_INPUTS)
+        self._nominal_advance = bound(nominal_advance)
         # Compile now: a cold cache must not stall a flight.
         FamilyLaw(self.data).step(self._deviation)
-        own, defect = (self._deviation, self._input), reference.data.defect[0]
-        self._nominal_advance = bound(nominal_advance, self.data.polytope, 0.0, 0.0, *own, defect, *self._scratch)
+        if len(self.data.gains):
+            given = np.zeros(N_STATES), self._input, reference.data.defect[0]
+            self._nominal_advance(self.data.polytope, *reference.data.state[0, :2], *given, *self._scratch)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.bound import bound
-from hsv.compiled import njit_in_flight
+from hsv.compiled import bound, njit_in_flight
 from hsv.control.estimator import Estimator
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.elementary import tangent
@@ -234,9 +233,10 @@ class NotchFilter:
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
+        self._filter = bound(filter_step)
         # Compile now: a cold cache must not stall a flight.
-        self._filter = bound(filter_step, self.data, self._state, 0.0)
-        rest(self.data, 0.0, self._state)
+        self.step(0.0)
+        self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:

@@ -25,8 +25,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.elementary import arcsine
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all

@@ -16,8 +16,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.bound import bound
-from hsv.compiled import njit_in_flight
+from hsv.compiled import bound, njit_in_flight
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
@@ -32,6 +31,7 @@ from hsv.control.effectiveness import (
     effectiveness_step,
 )
 from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
+from hsv.control.nominal_law import level
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
     NotchData,
@@ -266,10 +266,10 @@ class TubeLaw(Controller):
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
         self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
+        self._step, self._level = bound(tube_step), bound(level)
         # Compile now: a cold cache must not stall a flight.
         x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
         given = ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown)))
-        self._step = bound(tube_step, self.kernel, self._memory, self._watch, 0, True, *given[1:], u, u, u)
         self.step(given)
         self.reset()
 
@@ -341,7 +341,7 @@ class TubeLaw(Controller):
         error, tube = (x - reference - deviation)[:N_RIGID], None
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
-        level = tube.level(error) if tube else math.nan
+        level = float(self._level(tube.shape, error - tube.centre)) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
         inside = valid and level <= 1.0
         if not valid:

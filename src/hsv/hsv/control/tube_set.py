@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.control.nominal_law import level
 from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
 
 
@@ -20,10 +19,6 @@ class TubeSet:
     centre: np.ndarray
     shape: np.ndarray
     half_width: np.ndarray
-
-    def level(self, error: np.ndarray) -> float:
-        """Return (e - c)' P (e - c) of an error (n): at most 1 inside."""
-        return float(level(self.shape, error - self.centre))
 
     def farthest(self, error: np.ndarray) -> str:
         """Return the name of the component of e - c that is largest for its half-width."""

@@ -21,8 +21,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.control.notch_filter import NotchData, filter_step, rest
 from hsv.design.error_system import lag_response, tube_errors
 from hsv.design.rounding import outward

@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.control.notch_filter import NotchData, filter_step, rest, with_notch
 from hsv.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
 from hsv.lpv.polytope import Polytope, schedule

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.compiled import bound
 from hsv.errors import ParameterError
 from hsv.faults.laws import FaultRows, apply_command_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
@@ -80,6 +81,7 @@ class FaultInjector:
         self.period, self.seed = period, seed
         self.link = link or command_link({}, period)
         self._before = np.zeros(N_INPUTS) if before is None else before
+        self._apply = bound(apply_command_faults)
         self.reset()
         self.step(0, np.zeros(N_INPUTS))  # compile now: a cold cache must not stall a flight
         self.reset()
@@ -184,11 +186,10 @@ class FaultInjector:
 
     def step(self, step: int, command: np.ndarray) -> FaultResult:
         """Return what becomes of ``command`` (2) in ``step``."""
-        actuator = np.empty(N_INPUTS)
+        actuator = np.array(command, float)
         if not self.link.ideal:
-            command = command.copy()
-            receive(self.link, self._link_state, step, self.seed, command)
-        apply_command_faults(self._rows, self._memory, step, self.seed, command, actuator)
+            receive(self.link, self._link_state, step, self.seed, actuator)
+        self._apply(self._rows, self._memory, step, self.seed, actuator, 0)
         self._next = step + 1
         return FaultResult(actuator, self.acting(step))
 

@@ -27,6 +27,7 @@ from hsv.faults.table import (
     UNSTART_OUTSIDE,
     Fault,
 )
+from hsv.lanes import lane, with_lane
 from hsv.noise import STREAMS, uniforms
 from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
 
@@ -162,21 +163,19 @@ def begin_faults(rows: Any, memory: np.ndarray, step: int, seed: int) -> int:
 
 
 @njit_in_flight(error_model="numpy")
-def apply_command_faults(
-    rows: Any, memory: np.ndarray, step: int, seed: int, command: np.ndarray, actuator: np.ndarray
-) -> None:
-    """Write into ``actuator`` (2) what becomes of ``command`` (2) on its way to the actuators in ``step``.
+def apply_command_faults(rows: Any, memory: np.ndarray, step: int, seed: int, actuator: Any, index: int) -> None:
+    """Replace the command (2) in ``actuator`` by what becomes of it on its way to the actuators in ``step``.
 
-    Loss of effectiveness, reversal, delay, dead zone, backlash, in this order (paper eq. 14, eq. 15).
+    Loss of effectiveness, reversal, delay, dead zone, backlash, in this order (paper eq. 14, eq. 15). Of lanes, that of
+    the one with the ``index``.
     """
-    for i in range(len(command)):
-        actuator[i] = command[i]
     if begin_faults(rows, memory, step, seed) == 0:
         return
     for i in range(len(rows.table)):
         if memory[i, ACTING] == 1.0:
             channel = int(rows.table[i, CHANNEL])
-            actuator[channel] = _commanded(rows, memory, i, step, actuator[channel])
+            arriving = _commanded(rows, memory, i, step, lane(actuator[channel], index))
+            actuator[channel] = with_lane(actuator[channel], index, arriving)
 
 
 @njit_in_flight(error_model="numpy", inline="always")

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.linalg import expm
 
+from hsv.compiled import njit
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.actuators import ActuatorSet
 from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
@@ -121,6 +120,8 @@ def held_behind(
     Returns:
         A (n + a + d, n + a + d) and B (n + a + d, 2), of a states of actuators and d commands under way.
     """
+    from scipy.linalg import expm  # see hsv.lpv.discretisation
+
     n = len(A)
     A_a, B_a, C, D = actuator_system(actuators)
     whole = np.block([[A, B @ C], [np.zeros((len(A_a), n)), A_a]])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
 
 
 def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
@@ -14,6 +13,8 @@ def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.nda
         B: (n, m) continuous-time input matrix; the columns may be any inputs, disturbances too.
         period: Sampling period (s).
     """
+    from scipy.linalg import expm  # takes tube_mpc, which hardly discretises, longer than all else that it imports
+
     n, m = B.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n] = A

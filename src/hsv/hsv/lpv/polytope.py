@@ -10,7 +10,7 @@ import numpy as np
 from hsv.compiled import njit_in_flight
 from hsv.elimination import solve
 from hsv.errors import DesignError
-from hsv.lanes import WIDTH, choose, lanes_in, least, most
+from hsv.lanes import BLOCK, choose, lanes_in, least, most
 
 INTERPOLATIONS = ("linear", "cubic")
 
@@ -98,7 +98,7 @@ class PolytopeData(NamedTuple):
     """A polytopic model as compiled functions take it.
 
     ``S`` (r, e) holds what is not zero in all vertices of [A_i, B_i] row by row, then zeros up to a multiple of
-    :data:`hsv.lanes.WIDTH`. ``entries``: the places of these numbers in the flattened [A_i, B_i] (n (n + m)).
+    :data:`hsv.lanes.BLOCK`. ``entries``: the places of these numbers in the flattened [A_i, B_i] (n (n + m)).
     ``starts`` (2 n + 1): where those of the rows of A and of B begin, in turn.
     """
 
@@ -133,7 +133,7 @@ class Polytope:
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))
-        packed = np.zeros((len(S), -(-len(entries) // WIDTH) * WIDTH))
+        packed = np.zeros((len(S), -(-len(entries) // BLOCK) * BLOCK))
         packed[:, : len(entries)] = S[:, entries]
         firsts = [row * (n + m) + column for row in range(n) for column in (0, n)]
         starts = np.searchsorted(entries, [*firsts, n * (n + m)])

@@ -25,7 +25,7 @@ from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
 from hsv.faults.laws import START, FaultRows, apply_command_faults, fault_memory
 from hsv.faults.table import COMMAND
-from hsv.lanes import every, lane, lane_numbers
+from hsv.lanes import every, lane
 from hsv.links import receive
 from hsv.signals import VARYING
 from hsv.simulation.fingerprint import fingerprint
@@ -271,8 +271,7 @@ def fly_loop(
             receive(link, link_state, k, plant.seed, actuator)
         if k >= first_fault:
             for i in range(len(ended)):
-                own = lane_numbers(actuator, i)
-                apply_command_faults(faults[i].rows, faults[i].memory, k, faults[i].seed, own, own)
+                apply_command_faults(faults[i].rows, faults[i].memory, k, faults[i].seed, actuator, i)
         for i in range(m):
             flown[k, ACTUATOR + i] = actuator[i]
         inside = in_model_range(x, vehicle.angle_limit)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.simulation.metrics import SETTLING_BAND
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.elementary import logarithm
 from hsv.errors import QuantityError
 from hsv.units import parse_quantity, rounded

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
 from hsv.control.controller import STEP_FUNCTION
 
@@ -34,22 +31,12 @@ class Call(NamedTuple):
 NO_CALL = Call(NOTHING, NOTHING, NOTHING, NOTHING, NOTHING)
 
 
-@intrinsic
-def _call_step(typing_context: Any, function: Any, step: Any, inputs: Any, outputs: Any, state: Any, par: Any) -> Any:
-    """Call the step function at an address (int64), with addresses of its arrays, and return what it returns."""
+def call_step(function: int, step: int, inputs: int, outputs: int, state: int, parameters: int) -> int:
+    """Call the step function at an address, with addresses of its arrays, and return what it returns.
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        pointer = ir.IntType(8).as_pointer()
-        kind = ir.FunctionType(ir.IntType(32), [ir.IntType(64), *[pointer] * 4])
-        address, number, *arrays = arguments
-        pointers = [builder.inttoptr(array, pointer) for array in arrays]
-        return builder.call(builder.inttoptr(address, kind.as_pointer()), [number, *pointers])
-
-    return types.int32(*[types.int64] * 6), generate
-
-
-call_step: Any = _call_step
-"""Function for compiled code, without the first argument, which numba supplies."""
+    For compiled functions, see :mod:`hsv.simulation.foreign_call`; it is called from Python likewise.
+    """
+    return int(STEP_FUNCTION(function)(step, inputs, outputs, state, parameters))
 
 
 def call_of(function: int, inputs: np.ndarray, outputs: np.ndarray, state: np.ndarray, par: np.ndarray) -> Call:

@@ -7,9 +7,11 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from hsv.compiled import ENABLED
 from hsv.control.controller import CONTROLLER_INPUTS
 from hsv.control.tube_law import TubeData, memory_of, watch_of
-from hsv.lanes import WIDTH, LaneArray, LaneRecord
+from hsv.lane_types import WIDTH
+from hsv.lanes import LaneArray, LaneRecord
 from hsv.signals import VARYING
 from hsv.simulation.closed_loop import (
     CommandFaults,
@@ -52,7 +54,7 @@ class FlightGroup:
         They can where equipment and air are ideal and the bench's own laws fly, and nothing is different but vehicle,
         beginning, faults on the command, gains and reference.
         """
-        return 1 < len(components) <= WIDTH and all(_fits(components[0], other) for other in components)
+        return ENABLED and 1 < len(components) <= WIDTH and all(_fits(components[0], other) for other in components)
 
     def fly(self, components: Sequence[Components]) -> FlightsSideBySide:
         """Return the flights of ``components``, which are valid until the next ones are flown."""

@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from hsv.compiled import njit_in_flight
+from hsv.compiled import njit, njit_in_flight
 from hsv.elementary import arctangent2, exponential, sine_cosine
 from hsv.vehicle.parameters import VehicleParameters
 

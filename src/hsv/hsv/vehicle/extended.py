@@ -12,8 +12,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE, derivative
 from hsv.vehicle.parameters import VehicleParameters
 

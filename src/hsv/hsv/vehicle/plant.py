@@ -9,8 +9,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.bound import bound
-from hsv.compiled import njit_in_flight
+from hsv.compiled import bound, njit_in_flight
 from hsv.faults.effectors import advance_equipped
 from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
@@ -256,14 +255,15 @@ class Plant:
             SUBSTEPS * computation(values, period)[1],
             check_all((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
-        state, held, work = initial.state.copy(), initial.input.copy(), workspace()
-        self._advance_ideal = bound(advance, state, held, vehicle, period, substeps, work, None)
-        self._forces_in_calm = bound(forces, state, held, vehicle)
+        self._in_model_range = bound(in_model_range)
+        self._advance_ideal, self._advance_plant = bound(advance), bound(advance_plant)
+        self._forces_in_calm, self._forces_in = bound(forces), bound(forces_in)
+        self._sense = bound(sense)
         self.reset()
         # Compile now, also what a fault in flight would need: a cold cache must not stall a flight.
         self.step(initial.input)
-        advance_plant(self._state, initial.input, self.data, self._memory, self._faults, 0)
-        sense(self._state, self.data, self._memory, self._faults, 0, np.empty_like(self._state))
+        self._advance_plant(self._state, initial.input, self.data, self._memory, self._faults, 0)
+        self._sense(self._state, self.data, self._memory, self._faults, 0, np.empty_like(self._state))
         self.reset()
 
     @classmethod
@@ -338,7 +338,7 @@ class Plant:
     def _advance(self, actuator: np.ndarray) -> None:
         data, memory = self.data, self._memory
         if not self._ideal:
-            advance_plant(self._state, actuator, data, memory, self._faults, self._step)
+            self._advance_plant(self._state, actuator, data, memory, self._faults, self._step)
             return
         # What advance_plant would do as well; but to hand it all its data takes longer than the step.
         effector = memory.effector
@@ -347,7 +347,7 @@ class Plant:
         self._advance_ideal(self._state, effector, self.vehicle, self.period, data.substeps, memory.work, None)
 
     def _result(self) -> PlantResult:
-        if not in_model_range(self._state, self.vehicle.angle_limit):
+        if not self._in_model_range(self._state, self.vehicle.angle_limit):
             status = FlightStatus.DIVERGED
         elif self._step >= self.steps:
             status = FlightStatus.FINISHED
@@ -357,8 +357,8 @@ class Plant:
         if conditions.tolist() == _CALM:
             felt = self._forces_in_calm(self._state, effector, self.vehicle)
         else:
-            *felt, _ = forces_in(conditions, self._state, effector, self.vehicle)
+            *felt, _ = self._forces_in(conditions, self._state, effector, self.vehicle)
         measurement = self._state.copy()
         if not self._ideal:
-            sense(self._state, self.data, self._memory, self._faults, self._step, measurement)
+            self._sense(self._state, self.data, self._memory, self._faults, self._step, measurement)
         return PlantResult(self._step, self._state.copy(), measurement, tuple(felt), effector, conditions[:3], status)

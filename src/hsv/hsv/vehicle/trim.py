@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.elementary import arcsine
 from hsv.elimination import solve
 from hsv.errors import TrimError

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.threads import over_threads
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numba import njit
 from scipy import sparse
 
+from hsv.compiled import njit
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian
 from hsv.vehicle.integration import advance

@@ -7,8 +7,8 @@ times the command. For a delay the command of the trim is kept, then any inputs 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from hsv.compiled import njit
 from hsv.errors import TrimError
 from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.limits.transfer import free_states

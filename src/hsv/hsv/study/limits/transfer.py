@@ -7,9 +7,9 @@ altitude and velocity are within 2 % of their steps of the target and stay there
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.optimize import minimize
 
+from hsv.compiled import njit
 from hsv.simulation.metrics import SETTLING_BAND
 from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.linear_loop import START, TARGET

@@ -1,0 +1,319 @@
+"""Compiles functions ahead of time, for :mod:`hsv.precompiled`: a library that is called without numba.
+
+While functions are called from Python in :func:`recording`, it is noted with which types of arguments. For each of
+these, numba compiles an entry that takes the arguments from a tuple of Python's objects, calls the function as compiled
+functions do, and returns an object. The entries become one shared library, with ``run_time.c``.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from llvmlite import binding, ir
+from numba import cfunc, njit, typeof, types
+from numba.core import cgutils
+from numba.core.errors import NumbaError, TypingError
+from numba.extending import intrinsic
+from numba.np.arrayobj import populate_array
+
+from hsv import compiled
+from hsv.compiled import EXTENSIONS, CompiledFunction
+from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest, processor, types_of
+
+_WORD = ir.IntType(64)
+_TUPLE: Any = types.BaseTuple
+_RUN_TIME = PACKAGE / "run_time.c"
+
+_IN_ORDER = {"C": 0x1, "F": 0x2, "A": 0}
+_ALIGNED, _WRITEABLE = 0x100, 0x400
+"""Flags of an array in numpy's C interface."""
+
+# To be linked here as well, where entries are not called.
+binding.add_symbol("hsv_array", ctypes.addressof(ctypes.c_char()))
+
+Calls = dict[tuple[str, tuple[str, ...]], tuple[CompiledFunction, tuple[Any, ...]]]
+"""Functions and numba's types of arguments, by the function's name and the types as the index names them."""
+
+
+@contextmanager
+def recording() -> Iterator[Calls]:
+    """Yield the calls from Python within the block that can be compiled ahead of time."""
+    calls: Calls = {}
+
+    def note(function: CompiledFunction, arguments: tuple[Any, ...]) -> None:
+        try:
+            key = function.name, types_of(arguments)
+        except NotAheadOfTimeError:
+            return
+        if key not in calls:
+            calls[key] = function, tuple(map(typeof, arguments))
+
+    compiled.observer = note
+    try:
+        yield calls
+    finally:
+        compiled.observer = None
+
+
+def build(calls: Calls) -> int:
+    """Compile ``calls`` into the library that :mod:`hsv.precompiled` takes functions from; return for how many it did.
+
+    Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced.
+
+    Raises:
+        OSError, subprocess.CalledProcessError: There is no C compiler to link with, or no place for the library.
+    """
+    functions: dict[str, list[tuple[tuple[str, ...], str, Result]]] = {}
+    library = binding.parse_assembly("")
+    for number, ((name, key), (function, arguments)) in enumerate(calls.items()):
+        symbol = f"hsv_{number}"
+        try:
+            code, result = _entry(function, arguments)
+        except NumbaError:
+            continue
+        library.link_in(_only(code, symbol))
+        functions.setdefault(name, []).append((key, symbol, result))
+    linked = _linked(library)
+    target = INDEX.with_name(f"ahead_of_time.{hashlib.sha256(linked).hexdigest()[:16]}.so")
+    INDEX.parent.mkdir(parents=True, exist_ok=True)
+    sources = _sources()
+    index = {
+        "processor": processor(),
+        "sources": sources,
+        "digest": digest(sources),
+        "library": target.name,
+        "functions": functions,
+    }
+    _replace(target, linked)
+    _replace(INDEX, json.dumps(index).encode())
+    for other in INDEX.parent.glob("ahead_of_time.*.so"):
+        if other != target:
+            other.unlink(missing_ok=True)
+    return sum(map(len, functions.values()))
+
+
+def _sources() -> list[str]:
+    """Return the modules that hold compiled functions, and those that define what these use as constants."""
+    modules = {name: vars(module) for name, module in sys.modules.items() if name.startswith("hsv.")}
+    holding = {
+        name: values
+        for name, values in modules.items()
+        if any(isinstance(value, CompiledFunction) and value.__module__ == name for value in values.values())
+    }
+    constants = {name for values in holding.values() for name in values if name.lstrip("_").isupper()}
+    files = [
+        Path(values["__file__"])
+        for name, values in modules.items()
+        if name in holding or name in (*EXTENSIONS, "hsv.lane_types") or not constants.isdisjoint(values)
+    ]
+    return sorted({str(path.relative_to(PACKAGE)) for path in (*files, _RUN_TIME)})
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file that others may be reading: they keep the old one."""
+    temporary = path.with_name(f"{path.name}.{os.getpid()}")
+    temporary.write_bytes(content)
+    temporary.replace(path)
+
+
+def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result]:
+    """Return the code of the entry to a function, and what it returns.
+
+    Raises:
+        NumbaError: It returns something else than can be handed over.
+    """
+    kinds: Any = types.Tuple(arguments)
+    results: list[Result] = []
+    # What is inlined elsewhere cannot be called with a tuple of arguments.
+    inlined = "inline" in function.targetoptions
+    called = njit(**{**function.targetoptions, "inline": "never"})(function.py_func) if inlined else function.dispatcher
+
+    def take(_context: Any, objects: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            python = context.get_python_api(builder)
+            return _taken(context, builder, python, kinds, builder.inttoptr(values[0], python.pyobj))
+
+        return kinds(objects), generate
+
+    def give(_context: Any, value: Any) -> Any:
+        results.append(_result(value))
+
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            made = _made(context, builder, context.get_python_api(builder), value, values[0])
+            return builder.ptrtoint(made, _WORD)
+
+        return types.int64(value), generate
+
+    def ask(_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
+            return cgutils.is_not_null(builder, context.get_python_api(builder).err_occurred())
+
+        return types.boolean(), generate
+
+    def fail(_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
+            _raise(builder, context.get_python_api(builder), "ZeroDivisionError", "division by zero")
+            return _WORD(0)
+
+        return types.int64(), generate
+
+    take_all: Any = intrinsic(take)
+    give_all: Any = intrinsic(give)
+    refused: Any = intrinsic(ask)
+    failed: Any = intrinsic(fail)
+
+    @cfunc(types.int64(types.int64))
+    def entry(objects: int) -> Any:
+        values = take_all(objects)
+        if refused():
+            return 0
+        try:
+            return give_all(called(*values))
+        except Exception:
+            return failed()
+
+    return entry.inspect_llvm(), results[-1]
+
+
+def _raise(builder: Any, python: Any, error: str, text: str) -> None:
+    # The variable is a pointer; where numba itself links, it is what that points to.
+    variable = python.get_c_object(f"PyExc_{error}")
+    python.err_set_string(builder.load(builder.bitcast(variable, python.pyobjptr)), text)
+
+
+def _taken(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> Any:
+    """Return the value of an object as a type of numba's; one of another type leaves an error of Python's."""
+    if isinstance(kind, _TUPLE):
+        # Of what is no tuple, or a shorter one, Python says so, and None takes the place of its elements.
+        none, size = python.borrow_none(), len(kind)
+        elements = [python.tuple_getitem(given, i) for i in range(size)]
+        found = [builder.select(cgutils.is_null(builder, element), none, element) for element in elements]
+        values = [_taken(context, builder, python, *each) for each in zip(kind, found, strict=True)]
+        return context.make_tuple(builder, kind, values)
+    if isinstance(kind, types.Array):
+        return _array_taken(context, builder, kind, given)
+    if isinstance(kind, types.NoneType):
+        with builder.if_then(builder.icmp_unsigned("!=", given, python.borrow_none()), likely=False):
+            _raise(builder, python, "TypeError", "expected None")
+        return context.get_dummy_value()
+    if isinstance(kind, types.Boolean):
+        return builder.icmp_signed("==", python.object_istrue(given), ir.IntType(32)(1))
+    return python.float_as_double(given) if kind == types.float64 else python.long_as_longlong(given)
+
+
+def _array_taken(context: Any, builder: Any, kind: Any, given: Any) -> Any:
+    flags = _ALIGNED | _IN_ORDER[kind.layout] | (_WRITEABLE if kind.mutable else 0)
+    asked = [_WORD(value) for value in (kind.ndim, np.dtype(str(kind.dtype)).num, flags)]
+    checked = ir.FunctionType(_WORD.as_pointer(), [given.type, *[_WORD] * 3])
+    array = builder.call(cgutils.get_or_insert_function(builder.module, checked, "hsv_array"), [given, *asked])
+
+    def word(pointer: Any, index: int) -> Any:
+        return builder.load(builder.gep(pointer, [_WORD(index)]))
+
+    # A head, then data, number of axes, shape and strides.
+    data, _, shape, strides = (word(array, object.__basicsize__ // 8 + field) for field in range(4))
+    lengths, steps = (builder.inttoptr(address, _WORD.as_pointer()) for address in (shape, strides))
+    element = context.get_data_type(kind.dtype)
+    made = context.make_array(kind)(context, builder)
+    populate_array(
+        made,
+        data=builder.inttoptr(data, element.as_pointer()),
+        shape=[word(lengths, axis) for axis in range(kind.ndim)],
+        strides=[word(steps, axis) for axis in range(kind.ndim)],
+        itemsize=_WORD(context.get_abi_sizeof(element)),
+        meminfo=None,
+    )
+    return made._getvalue()
+
+
+def _result(kind: Any) -> Result:
+    """Return the description of a value that is returned.
+
+    Raises:
+        TypingError: It cannot be handed over.
+    """
+    if isinstance(kind, types.Array) and kind.layout == "C":
+        return Result(str(kind.dtype))
+    if isinstance(kind, types.Tuple | types.UniTuple) and len(kind):
+        return Result(elements=tuple(map(_result, kind)))
+    if kind in (types.none, types.float64, types.complex128, types.int64, types.boolean):
+        return Result()
+    raise TypingError(f"returns {kind}")
+
+
+def _made(context: Any, builder: Any, python: Any, kind: Any, value: Any) -> Any:
+    """Return a new object for a value; of an array a tuple of its memory, the address of its data, and its shape."""
+    if isinstance(kind, _TUPLE):
+        values = [builder.extract_value(value, index) for index in range(len(kind))]
+        return _tuple(python, [_made(context, builder, python, *each) for each in zip(kind, values, strict=True)])
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        context.nrt.incref(builder, kind, value)
+        pointers = [builder.ptrtoint(pointer, _WORD) for pointer in (array.meminfo, array.data)]
+        lengths = [builder.extract_value(array.shape, axis) for axis in range(kind.ndim)]
+        return _tuple(python, [python.long_from_longlong(word) for word in (*pointers, *lengths)])
+    if kind == types.complex128:
+        number = context.make_complex(builder, kind, value)
+        return python.complex_from_doubles(number.real, number.imag)
+    if kind == types.float64:
+        return python.float_from_double(value)
+    if kind == types.boolean:
+        return python.bool_from_bool(context.cast(builder, value, kind, types.boolean))
+    return python.make_none() if kind == types.none else python.long_from_longlong(value)
+
+
+def _tuple(python: Any, elements: Any) -> Any:
+    made = python.tuple_new(len(elements))
+    for index, element in enumerate(elements):
+        python.tuple_setitem(made, index, element)
+    return made
+
+
+def _only(code: str, symbol: str) -> Any:
+    """Return the module of an entry, in which nothing else has a name outside of it."""
+    module = binding.parse_assembly(code)
+    for function in module.functions:
+        if function.name.startswith("cfunc."):
+            function.name = symbol
+        elif not function.is_declaration:
+            function.linkage = "internal"
+    for variable in module.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"
+    passes = binding.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    builder = binding.create_pass_builder(_machine(), binding.create_pipeline_tuning_options())
+    passes.run(module, builder)
+    return module
+
+
+def _machine() -> Any:
+    """Return what makes code for this processor, as numba does."""
+    target = binding.Target.from_default_triple()
+    features = binding.get_host_cpu_features().flatten()
+    return target.create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small"
+    )
+
+
+def _linked(library: Any) -> bytes:
+    """Return the shared library of a module."""
+    with TemporaryDirectory() as folder:
+        objects, target = Path(folder, "entries.o"), Path(folder, "library.so")
+        objects.write_bytes(_machine().emit_object(library))
+        compiler = os.environ.get("CC", "cc")
+        # Python's functions are those of the process that loads it.
+        command: list[str | Path] = [compiler, "-O2", "-shared", "-fPIC", "-o", target, objects, _RUN_TIME]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+        return target.read_bytes()

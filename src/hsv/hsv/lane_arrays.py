@@ -1,0 +1,49 @@
+"""Arrays and records with one number a lane, as Python holds them; see :mod:`hsv.lanes`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+
+class LaneArray:
+    """An array of lanes, for compiled functions: indexed like an array whose elements are numbers."""
+
+    def __init__(self, array: np.ndarray, *, split: bool = False) -> None:
+        """View ``array``, contiguous (of a lane), of float64.
+
+        Args:
+            array: (..., lanes), or (lanes, ...) where ``split``.
+            split: Whether each lane's numbers are on their own, as histories are; else those of an element are.
+        """
+        if array.dtype != np.float64 or not (array[0] if split else array).flags.c_contiguous:
+            raise ValueError(f"array of {array.dtype}: expected contiguous float64")
+        self.array = array
+        self.split = split
+        self.lanes = array.shape[0] if split else array.shape[-1]
+        self.shape = array.shape[1:] if split else array.shape[:-1]
+        self.address = array.ctypes.data
+        self.stride = array.strides[0] // array.itemsize if split else 1
+
+    @classmethod
+    def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
+        """Return as many lanes of zeros as this processor computes at once."""
+        from hsv.lane_types import WIDTH  # imports numba
+
+        return cls(np.zeros((*((shape,) if isinstance(shape, int) else shape), WIDTH)))
+
+    @classmethod
+    def of(cls, arrays: Sequence[np.ndarray]) -> LaneArray:
+        """Return a copy of equal arrays, one a lane."""
+        return cls(np.stack(arrays, axis=-1).astype(float, order="C"))
+
+
+class LaneRecord:
+    """A named tuple of numbers for each lane, for compiled functions: an attribute is one number a lane."""
+
+    def __init__(self, tuples: Sequence[Any]) -> None:
+        self.fields = tuple(tuples[0]._fields)
+        self.array = np.array(tuples, float).T.copy()
+        self.address = self.array.ctypes.data
