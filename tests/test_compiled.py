@@ -55,6 +55,10 @@ def text(number):
     return str(number)
 
 
+def scaling(factor):
+    return njit()(lambda x: factor * x)
+
+
 @pytest.fixture
 def index(tmp_path, monkeypatch):
     """Return an index of what a test compiles ahead of time, in place of that of the package."""
@@ -97,7 +101,7 @@ def test_arguments_and_results_of_all_kinds_are_those_of_numba(index):
 def test_an_error_of_python_is_raised_and_inlined_functions_are_called(index):
     built((remainder, 7, 2))
     assert remainder(-7, 2) == -4
-    with pytest.raises(ZeroDivisionError):
+    with pytest.raises(RuntimeError, match="remainder raised an error"):
         remainder(7, 0)
     assert remainder._dispatcher is None
 
@@ -108,6 +112,12 @@ def test_what_is_not_compiled_ahead_of_time_is_numbas(index):
     assert remainder(7.5, 2.0) == 3.0
     assert remainder._dispatcher is not None
     assert remainder(7, b=2) == 3
+
+
+def test_functions_that_share_a_name_are_numbas(index):
+    double, treble = scaling(2.0), scaling(3.0)
+    assert built((double, 1.0), (treble, 1.0)) == 0
+    assert double(1.0) == 2.0 and treble(1.0) == 3.0
 
 
 def test_a_number_that_fits_into_no_word_is_refused(index):
@@ -124,11 +134,20 @@ def test_arrays_of_any_order_are_taken(index):
     assert scaled._dispatcher is None
 
 
-@pytest.mark.parametrize("change", ["processor", "digest"])
-def test_a_library_for_another_processor_or_of_other_sources_is_not_used(index, change):
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"processor": "other"},
+        {"digest": "other"},
+        {"contents": "other"},
+        {"functions": {"a": [[["int64"], "b", ["", []]]]}},
+    ],
+    ids=lambda change: next(iter(change)),
+)
+def test_a_library_that_is_another_one_is_not_used(index, change):
     built((remainder, 7, 2))
     assert precompiled._entries()
-    index.write_text(json.dumps(json.loads(index.read_text()) | {change: "other"}))
+    index.write_text(json.dumps(json.loads(index.read_text()) | change))
     precompiled._entries.cache_clear()
     assert not precompiled._entries() and remainder(7, 2) == 3
 
@@ -137,6 +156,19 @@ def test_a_library_for_another_processor_or_of_other_sources_is_not_used(index, 
 def test_an_index_that_cannot_be_read_is_as_none(index, damaged):
     index.write_text(damaged)
     assert precompiled._entries() == {}
+
+
+def test_a_library_that_was_cut_is_not_used(index):
+    built((remainder, 7, 2))
+    [library] = index.parent.glob("*.so")
+    os.truncate(library, library.stat().st_size // 2)
+    precompiled._entries.cache_clear()
+    assert not precompiled._entries() and remainder(7, 2) == 3
+
+
+def test_what_says_how_functions_are_compiled_and_called_is_a_source_of_the_library():
+    sources = set(json.loads(precompiled.INDEX.read_text())["sources"])
+    assert sources >= {"ahead_of_time.py", "compiled.py", "precompiled.py", "run_time.c", "elementary.py"}
 
 
 def test_a_library_is_not_used_where_numba_is_to_compile_otherwise(index, monkeypatch):
@@ -232,8 +264,12 @@ def test_a_bound_function_refuses_arguments_of_other_types(index):
     with pytest.raises(TypeError):
         sum_of(np.ones(2), "1", None)
     assert sum_of(np.ones(3), 2.0, None) == 6.0
-    with pytest.raises(TypeError):
-        sum_of(np.ones(2), 1.0, 1.0)
+    for others in ((1.0, 1.0), (1.0,), (1.0, None, None)):
+        with pytest.raises(TypeError):
+            sum_of(np.ones(2), *others)
+    constant = np.ones(2)
+    constant.flags.writeable = False
+    assert sum_of(constant, 1.0, None) == 2.0
 
 
 def test_an_argument_as_by_default_is_compiled_as_if_left_out():

@@ -32,7 +32,7 @@ def _sources() -> list[Path]:
 
 def _caches() -> list[Path]:
     numba = [path for suffix in ("nbi", "nbc") for path in _LIBRARY.rglob(f"__pycache__/*.{suffix}")]
-    return [*numba, *_INDEX.parent.glob("ahead_of_time.*")]
+    return [*numba, *_INDEX.parent.glob("ahead_of_time.*.so"), *_INDEX.parent.glob(_INDEX.name)]
 
 
 def _key() -> str:

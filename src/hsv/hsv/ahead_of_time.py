@@ -11,6 +11,7 @@ import ctypes
 import hashlib
 import json
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -34,13 +35,16 @@ from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest,
 _WORD = ir.IntType(64)
 _TUPLE: Any = types.BaseTuple
 _RUN_TIME = PACKAGE / "run_time.c"
+_OWN = ("hsv.ahead_of_time", "hsv.compiled", "hsv.lane_types", "hsv.precompiled")
+"""Modules that say how functions are compiled and called."""
 
 _IN_ORDER = {"C": 0x1, "F": 0x2, "A": 0}
-_ALIGNED, _WRITEABLE = 0x100, 0x400
+_ALIGNED = 0x100
 """Flags of an array in numpy's C interface."""
 
+_nothing = ctypes.c_char()
 # To be linked here as well, where entries are not called.
-binding.add_symbol("hsv_array", ctypes.addressof(ctypes.c_char()))
+binding.add_symbol("hsv_array", ctypes.addressof(_nothing))
 
 Calls = dict[tuple[str, tuple[str, ...]], tuple[CompiledFunction, tuple[Any, ...]]]
 """Functions and numba's types of arguments, by the function's name and the types as the index names them."""
@@ -52,6 +56,8 @@ def recording() -> Iterator[Calls]:
     calls: Calls = {}
 
     def note(function: CompiledFunction, arguments: tuple[Any, ...]) -> None:
+        if "<locals>" in function.name:
+            return  # functions that are made in a function share this name
         try:
             key = function.name, types_of(arguments)
         except NotAheadOfTimeError:
@@ -82,10 +88,11 @@ def build(calls: Calls) -> int:
             code, result = _entry(function, arguments)
         except NumbaError:
             continue
-        library.link_in(_only(code, symbol))
+        library.link_in(_with_one_symbol(code, symbol))
         functions.setdefault(name, []).append((key, symbol, result))
     linked = _linked(library)
-    target = INDEX.with_name(f"ahead_of_time.{hashlib.sha256(linked).hexdigest()[:16]}.so")
+    contents = hashlib.sha256(linked).hexdigest()
+    target = INDEX.with_name(f"ahead_of_time.{contents[:16]}.so")
     INDEX.parent.mkdir(parents=True, exist_ok=True)
     sources = _sources()
     index = {
@@ -93,14 +100,23 @@ def build(calls: Calls) -> int:
         "sources": sources,
         "digest": digest(sources),
         "library": target.name,
+        "contents": contents,
         "functions": functions,
     }
+    before = _library_before()
     _replace(target, linked)
+    ctypes.PyDLL(str(target))  # whatever is missing in it is an OSError here
     _replace(INDEX, json.dumps(index).encode())
-    for other in INDEX.parent.glob("ahead_of_time.*.so"):
-        if other != target:
-            other.unlink(missing_ok=True)
+    if before not in ("", target.name):
+        INDEX.with_name(before).unlink(missing_ok=True)
     return sum(map(len, functions.values()))
+
+
+def _library_before() -> str:
+    try:
+        return str(json.loads(INDEX.read_text())["library"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return ""
 
 
 def _sources() -> list[str]:
@@ -115,7 +131,7 @@ def _sources() -> list[str]:
     files = [
         Path(values["__file__"])
         for name, values in modules.items()
-        if name in holding or name in (*EXTENSIONS, "hsv.lane_types") or not constants.isdisjoint(values)
+        if name in holding or name in (*EXTENSIONS, *_OWN) or not constants.isdisjoint(values)
     ]
     return sorted({str(path.relative_to(PACKAGE)) for path in (*files, _RUN_TIME)})
 
@@ -123,7 +139,10 @@ def _sources() -> list[str]:
 def _replace(path: Path, content: bytes) -> None:
     """Write a file that others may be reading: they keep the old one."""
     temporary = path.with_name(f"{path.name}.{os.getpid()}")
-    temporary.write_bytes(content)
+    with temporary.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
     temporary.replace(path)
 
 
@@ -134,6 +153,7 @@ def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str,
         NumbaError: It returns something else than can be handed over.
     """
     kinds: Any = types.Tuple(arguments)
+    nogil = function.targetoptions.get("nogil")
     results: list[Result] = []
     # What is inlined elsewhere cannot be called with a tuple of arguments.
     inlined = "inline" in function.targetoptions
@@ -142,7 +162,7 @@ def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str,
     def take(_context: Any, objects: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
             python = context.get_python_api(builder)
-            return _taken(context, builder, python, kinds, builder.inttoptr(values[0], python.pyobj))
+            return _from_object(context, builder, python, kinds, builder.inttoptr(values[0], python.pyobj))
 
         return kinds(objects), generate
 
@@ -150,7 +170,7 @@ def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str,
         results.append(_result(value))
 
         def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-            made = _made(context, builder, context.get_python_api(builder), value, values[0])
+            made = _to_object(context, builder, context.get_python_api(builder), value, values[0])
             return builder.ptrtoint(made, _WORD)
 
         return types.int64(value), generate
@@ -163,25 +183,46 @@ def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str,
 
     def fail(_context: Any) -> Any:
         def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
-            _raise(builder, context.get_python_api(builder), "ZeroDivisionError", "division by zero")
+            _raise(builder, context.get_python_api(builder), "RuntimeError", f"{function.name} raised an error")
             return _WORD(0)
 
         return types.int64(), generate
+
+    def unlock(_context: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
+            return builder.ptrtoint(context.get_python_api(builder).save_thread(), _WORD) if nogil else _WORD(0)
+
+        return types.int64(), generate
+
+    def lock(_context: Any, thread: Any) -> Any:
+        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            if nogil:
+                python = context.get_python_api(builder)
+                python.restore_thread(builder.inttoptr(values[0], python.voidptr))
+            return context.get_dummy_value()
+
+        return types.void(thread), generate
 
     take_all: Any = intrinsic(take)
     give_all: Any = intrinsic(give)
     refused: Any = intrinsic(ask)
     failed: Any = intrinsic(fail)
+    unlocked: Any = intrinsic(unlock)
+    locked: Any = intrinsic(lock)
 
     @cfunc(types.int64(types.int64))
     def entry(objects: int) -> Any:
         values = take_all(objects)
         if refused():
             return 0
+        thread = unlocked()
         try:
-            return give_all(called(*values))
+            result = called(*values)
         except Exception:
+            locked(thread)
             return failed()
+        locked(thread)
+        return give_all(result)
 
     return entry.inspect_llvm(), results[-1]
 
@@ -192,17 +233,19 @@ def _raise(builder: Any, python: Any, error: str, text: str) -> None:
     python.err_set_string(builder.load(builder.bitcast(variable, python.pyobjptr)), text)
 
 
-def _taken(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> Any:
+def _from_object(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> Any:
     """Return the value of an object as a type of numba's; one of another type leaves an error of Python's."""
     if isinstance(kind, _TUPLE):
-        # Of what is no tuple, or a shorter one, Python says so, and None takes the place of its elements.
+        # Where there are fewer elements, or it is no tuple, None takes their place.
         none, size = python.borrow_none(), len(kind)
         elements = [python.tuple_getitem(given, i) for i in range(size)]
+        with builder.if_then(builder.icmp_signed("!=", python.tuple_size(given), _WORD(size)), likely=False):
+            _raise(builder, python, "TypeError", f"expected a tuple of {size}, or as many arguments")
         found = [builder.select(cgutils.is_null(builder, element), none, element) for element in elements]
-        values = [_taken(context, builder, python, *each) for each in zip(kind, found, strict=True)]
+        values = [_from_object(context, builder, python, *each) for each in zip(kind, found, strict=True)]
         return context.make_tuple(builder, kind, values)
     if isinstance(kind, types.Array):
-        return _array_taken(context, builder, kind, given)
+        return _array_of(context, builder, kind, given)
     if isinstance(kind, types.NoneType):
         with builder.if_then(builder.icmp_unsigned("!=", given, python.borrow_none()), likely=False):
             _raise(builder, python, "TypeError", "expected None")
@@ -212,8 +255,8 @@ def _taken(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> An
     return python.float_as_double(given) if kind == types.float64 else python.long_as_longlong(given)
 
 
-def _array_taken(context: Any, builder: Any, kind: Any, given: Any) -> Any:
-    flags = _ALIGNED | _IN_ORDER[kind.layout] | (_WRITEABLE if kind.mutable else 0)
+def _array_of(context: Any, builder: Any, kind: Any, given: Any) -> Any:
+    flags = _ALIGNED | _IN_ORDER[kind.layout]
     asked = [_WORD(value) for value in (kind.ndim, np.dtype(str(kind.dtype)).num, flags)]
     checked = ir.FunctionType(_WORD.as_pointer(), [given.type, *[_WORD] * 3])
     array = builder.call(cgutils.get_or_insert_function(builder.module, checked, "hsv_array"), [given, *asked])
@@ -252,11 +295,11 @@ def _result(kind: Any) -> Result:
     raise TypingError(f"returns {kind}")
 
 
-def _made(context: Any, builder: Any, python: Any, kind: Any, value: Any) -> Any:
+def _to_object(context: Any, builder: Any, python: Any, kind: Any, value: Any) -> Any:
     """Return a new object for a value; of an array a tuple of its memory, the address of its data, and its shape."""
     if isinstance(kind, _TUPLE):
         values = [builder.extract_value(value, index) for index in range(len(kind))]
-        return _tuple(python, [_made(context, builder, python, *each) for each in zip(kind, values, strict=True)])
+        return _tuple(python, [_to_object(context, builder, python, *each) for each in zip(kind, values, strict=True)])
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
         context.nrt.incref(builder, kind, value)
@@ -280,7 +323,7 @@ def _tuple(python: Any, elements: Any) -> Any:
     return made
 
 
-def _only(code: str, symbol: str) -> Any:
+def _with_one_symbol(code: str, symbol: str) -> Any:
     """Return the module of an entry, in which nothing else has a name outside of it."""
     module = binding.parse_assembly(code)
     for function in module.functions:
@@ -312,8 +355,8 @@ def _linked(library: Any) -> bytes:
     with TemporaryDirectory() as folder:
         objects, target = Path(folder, "entries.o"), Path(folder, "library.so")
         objects.write_bytes(_machine().emit_object(library))
-        compiler = os.environ.get("CC", "cc")
+        compiler = shlex.split(os.environ.get("CC") or "cc")
         # Python's functions are those of the process that loads it.
-        command: list[str | Path] = [compiler, "-O2", "-shared", "-fPIC", "-o", target, objects, _RUN_TIME]
+        command: list[str | Path] = [*compiler, "-O2", "-shared", "-fPIC", "-o", target, objects, _RUN_TIME]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return target.read_bytes()

@@ -1,7 +1,8 @@
 """Functions that were compiled ahead of time, called without numba.
 
 They are in a library that :mod:`hsv.ahead_of_time` writes, with an index of which functions there are in it and for
-which types of arguments. Its functions take and return Python's objects, but arrays that they make: these are copied.
+which types of arguments. Its functions take and return Python's objects. An array that is returned is a copy, also of
+an argument.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import os
 import platform
 from collections.abc import Callable, Sequence
 from functools import cache
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,6 +36,8 @@ _NUMBERS: dict[type, str] = {
     np.bool_: "bool",
 }
 _ELEMENTS = {np.dtype(name): name for name in ("float64", "int64", "uint64", "bool", "complex128")}
+_LAYOUT = 16
+"""Size of what every object of Python's begins with, as ``run_time.c`` has it: other Pythons have another."""
 
 
 class NotAheadOfTimeError(TypeError):
@@ -83,7 +87,10 @@ class Result(NamedTuple):
         return bool(self.array) or any(element.holds_arrays for element in self.elements)
 
     def value(self, returned: Any, release: Callable[[int], None]) -> Any:
-        """Return the value of what an entry returned, of arrays memory, address and shape; these are released."""
+        """Return the value of what an entry returned, in which an array is a tuple of memory, address and shape.
+
+        The memory is given to ``release``.
+        """
         if self.elements:
             return tuple(each.value(one, release) for each, one in zip(self.elements, returned, strict=True))
         if not self.array:
@@ -111,7 +118,7 @@ class Entry:
         Raises:
             TypeError: An argument is of another type.
             OverflowError: A whole number has more than 64 bits.
-            ZeroDivisionError: The function divided by zero where Python's rules hold.
+            RuntimeError: The function raised an error, as where it divides by zero and Python's rules hold.
         """
         returned = self._function(arguments)
         return self._result.value(returned, self._release) if self._result else returned
@@ -133,16 +140,19 @@ def _entries() -> dict[str, dict[tuple[str, ...], Entry]]:
     """Return what was compiled ahead of time and is current, by function and types of arguments."""
     try:
         index = json.loads(INDEX.read_text())
-        if index["processor"] != processor() or index["digest"] != digest(index["sources"]) or _other_code():
+        if index["processor"] != processor() or index["digest"] != digest(index["sources"]) or why_none():
             return {}
-        library = ctypes.PyDLL(str(INDEX.with_name(index["library"])))
+        path = INDEX.with_name(index["library"])
+        if hashlib.sha256(path.read_bytes()).hexdigest() != index["contents"]:
+            return {}  # to call into half a library would end the process
+        library = ctypes.PyDLL(str(path))
         library.hsv_begin(ctypes.py_object(np.ndarray))
-    except (OSError, ValueError, LookupError, TypeError):
+        return {
+            name: {tuple(types): Entry(library, symbol, Result.read(result)) for types, symbol, result in by}
+            for name, by in index["functions"].items()
+        }
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return {}
-    return {
-        name: {tuple(types): Entry(library, symbol, Result.read(result)) for types, symbol, result in by}
-        for name, by in index["functions"].items()
-    }
 
 
 def digest(sources: Sequence[str]) -> str:
@@ -157,22 +167,26 @@ def digest(sources: Sequence[str]) -> str:
     return contents.hexdigest()
 
 
-def _other_code() -> bool:
-    """Tell whether numba is asked by its environment variables to compile otherwise."""
-    return any(name.startswith("NUMBA_") and name not in _NUMBA_SETTINGS for name in os.environ)
+def why_none() -> str:
+    """Return why no function is compiled ahead of time here, empty where they are."""
+    for name in os.environ:
+        if name.startswith("NUMBA_") and name not in _NUMBA_SETTINGS:
+            return f"{name} is set, which may change the code"
+    return "" if object.__basicsize__ == _LAYOUT else "objects of this Python are of another layout"
 
 
 def processor() -> str:
-    """Return a digest of what is said of the first processor's model and instructions, and of this Python's objects.
+    """Return a digest of what is said of the first processor's model and instructions, and of numpy's version.
 
     Under an emulator the system may tell of the processor below; numpy asks the one that there is.
     """
     try:
         with Path("/proc/cpuinfo").open() as file:
-            lines = [line for line in iter(file.readline, "\n") if line.startswith(("model name", "flags", "Features"))]
+            of_first = takewhile(str.strip, file)
+            lines = [line for line in of_first if line.startswith(("model name", "flags", "Features"))]
     except OSError:
         lines = [platform.processor()]
     found: Any = np.show_config(mode="dicts")
     instructions = str(found.get("SIMD Extensions"))
-    words = [platform.machine(), str(object.__basicsize__), instructions, *lines]
+    words = [platform.machine(), np.__version__, instructions, *lines]
     return hashlib.sha256("".join(words).encode()).hexdigest()

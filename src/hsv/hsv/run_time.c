@@ -69,7 +69,7 @@ extern void *PyExc_TypeError;
 void PyErr_SetString(void *type, const char *text);
 
 static void *array_type;
-static intptr_t no_lengths[3];
+static intptr_t no_lengths[64]; /* as many axes as numpy admits */
 static const struct Array no_array = {.shape = no_lengths, .strides = no_lengths};
 
 /* Says what numpy.ndarray is, before anything else is called. */

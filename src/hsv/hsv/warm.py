@@ -13,6 +13,7 @@ from hsv.ahead_of_time import build, recording
 from hsv.campaign.campaign import plan
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
+from hsv.precompiled import why_none
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
@@ -42,8 +43,11 @@ if __name__ == "__main__":
     with recording() as calls:
         warm()
     try:
-        build(calls)
+        reason = why_none()
+        if not reason:
+            build(calls)
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only the start of commands and nodes takes longer.
-        reason = getattr(error, "stderr", None) or error
+        reason = str(getattr(error, "stderr", None) or error)
+    if reason:
         print(f"python -m hsv.warm: nothing compiled ahead of time: {reason}", file=sys.stderr)
