@@ -107,3 +107,38 @@ def test_a_length_beyond_the_message_is_refused_at_once():
     whole[28:32] = b"\xff\xff\xff\x7f"
     with pytest.raises(RunError, match="length 2147483647 at byte 28"):
         codec(kind).decode(bytes(whole))
+
+
+@pytest.mark.parametrize("kind", TYPES)
+def test_of_whatever_bytes_no_other_error_is_raised_than_that_of_the_codec(kind):
+    """What is changed at random is read as some message, the same when it is packed and read again, or refused."""
+    draw, read = random.Random(kind), 0
+    for _ in range(300):
+        typed = message_class(kind)()
+        fill(typed, draw)
+        data = bytearray(packed(kind, serialize_message(typed)))
+        for _ in range(draw.randrange(1, 4)):
+            at = draw.randrange(4, len(data))
+            # Zeros and small numbers are lengths of something, which most others are not.
+            data[at] = draw.choice([0, 1, 2, 4, draw.randrange(256)])
+        del data[draw.randrange(len(data) - 4, len(data) + 1) :]
+        try:
+            plain = codec(kind).decode(bytes(data))
+        except RunError as error:
+            assert str(error).startswith(kind)
+            continue
+        read += 1
+        values = codec(kind).unpack(bytes(data))
+        # By their representations: what is not a number is not equal to itself.
+        assert (
+            repr(codec(kind).decode(codec(kind).pack(values[1:]))) == repr(codec(kind).message(values)) == repr(plain)
+        )
+    assert read > 30
+
+
+def test_an_empty_text_may_lack_the_zero_that_ends_it():
+    kind = OTHER_TOPICS["hsv/ready"]
+    data = serialize_message(message_class(kind)(run_id="x"))
+    without = data[:4] + bytes(4) + data[12:]
+    assert codec(kind).decode(without) == codec(kind).decode(data)
+    assert codec(kind).pack(codec(kind).unpack(without)[1:]).rstrip(b"\0") == without.rstrip(b"\0")

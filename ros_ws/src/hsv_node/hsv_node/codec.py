@@ -140,9 +140,12 @@ class _Layout:
         self._twice = (*self.lengths, *self.lengths)
 
     def put(self, code: str, count: int = 1) -> int:
-        """Append so many numbers, or a text of so many bytes, aligned; return the place of the first value."""
+        """Append so many numbers, or a text of so many bytes, aligned; return the place of the first value.
+
+        A text has a place whatever its length: some write an empty one without the zero that ends it.
+        """
         place = self._values
-        if count:
+        if count or code == "s":
             size = struct.calcsize("<" + code)
             padding = -self._offset % size
             self._formats.append(f"{padding}x{count}{code}")
