@@ -2,12 +2,35 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
 from hsv_node.middleware import PROFILES, prefer_profiles
+
+JOIN = """
+from hsv_node.middleware import prefer_profiles
+prefer_profiles()
+import rclpy
+from hsv_msgs.msg import Ready
+rclpy.init()
+node = rclpy.create_node("joins")
+node.create_publisher(Ready, "hsv/ready", 1)
+node.destroy_node()
+rclpy.shutdown()
+"""
+"""What every node does first."""
+
+
+def said_by_fast_dds(environment: dict[str, str], folder: Path) -> str:
+    """Return what a process says that has made a node and a publisher."""
+    words = [sys.executable, "-c", JOIN]
+    done = subprocess.run(words, env=environment, cwd=folder, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
 
 
 def test_our_settings_are_the_default(tmp_path):
@@ -30,3 +53,19 @@ def test_settings_in_the_working_directory_hold_alone(tmp_path):
     environment: dict[str, str] = {}
     prefer_profiles(environment, tmp_path)
     assert not environment
+
+
+@pytest.mark.graph
+def test_fast_dds_takes_our_settings_without_a_word(ros_environment, tmp_path):
+    for name in ("FASTRTPS_DEFAULT_PROFILES_FILE", "FASTDDS_DEFAULT_PROFILES_FILE"):
+        ros_environment.pop(name, None)
+    assert said_by_fast_dds(ros_environment, tmp_path) == ""
+
+
+@pytest.mark.graph
+@pytest.mark.parametrize("tag", ["initialAnnouncements", "nackSupressionDuration"])
+def test_fast_dds_would_name_a_setting_that_it_does_not_know(ros_environment, tmp_path, tag):
+    misspelled = tmp_path / "misspelled.xml"
+    misspelled.write_text(PROFILES.read_text().replace(tag, f"{tag}s"))
+    said = said_by_fast_dds(ros_environment | {"FASTRTPS_DEFAULT_PROFILES_FILE": str(misspelled)}, tmp_path)
+    assert "XMLPARSER" in said and f"{tag}s" in said
