@@ -12,7 +12,7 @@ from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.control.tube_set import TubeSet
-from hsv.errors import DesignError
+from hsv.errors import DesignError, SignalError
 
 
 @pytest.fixture(scope="module")
@@ -101,3 +101,15 @@ def test_a_vehicle_that_the_tube_is_not_certified_for_is_told(design):
         assert step(law, design, np.zeros(5)).status is status
         result = step(law, design, [1111.1, 0.0, 0.0, 0.0, 0.0])
         assert result.status is TubeStatusCode.OUTSIDE
+
+
+def test_states_of_another_filter_than_that_flown_are_refused(design):
+    [section] = design.notch
+    for law, sections in ((TubeLaw(design), 1), (TubeLaw(design, notch=(section, section)), 2)):
+        due = 2 * sections
+        for size in (0, due):  # none where no filter is in the loop
+            assert step(law, design, [0.0] * 5, np.zeros(size)).error.shape == (5 + size,)
+        for size in {1, 2, 3, 4, 6} - {due}:
+            words = f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"
+            with pytest.raises(SignalError, match=words):
+                step(law, design, [0.0] * 5, np.zeros(size))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 import struct
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +18,7 @@ from std_msgs.msg import Header
 
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
-from hsv.errors import ParameterError
+from hsv.errors import RunError, SignalError
 from hsv.faults.schedule import ActiveFault
 from hsv.faults.table import Fault
 from hsv.graph import description
@@ -260,14 +261,110 @@ def test_a_bag_from_before_there_were_estimators_says_the_measurement_alone():
     assert signals.estimate is signals.measurement
 
 
-def test_a_fault_whose_numbers_are_not_as_many_as_their_names_is_refused_by_both():
-    wrong = msg.Fault(channel="elevator_deflection", type="loss_of_effectiveness", parameter_names=["effectiveness"])
-    message = msg.Actuator(active=[wrong], since=[3])
-    with pytest.raises(ParameterError, match=r"fault\.parameter_values: 0 values, expected one a name, 1"):
-        reader(description.ACTUATOR)(message, Signals())
-    with pytest.raises(ParameterError, match=r"fault\.parameter_values: 0 values, expected one a name, 1"):
-        values = codec(TOPICS[description.ACTUATOR]).unpack(serialize_message(message))
-        taker(description.ACTUATOR)(values, Signals())
+def loss(**fields: Any) -> msg.Fault:
+    """Return the message of a loss of effectiveness in which something may be wrong."""
+    right = {"parameter_names": ["effectiveness"], "parameter_values": [0.9]}
+    return msg.Fault(**{"channel": "elevator_deflection", "type": "loss_of_effectiveness"} | right | fields)
+
+
+@pytest.mark.parametrize(
+    ("topic", "message", "words"),
+    [
+        *(
+            (
+                description.FILTERED_STATE,
+                msg.FilteredState(estimate=[1.0] * size),
+                f"estimate: {size} numbers, expected 9",
+            )
+            for size in (1, 3, 8, 10)
+        ),
+        *(
+            (
+                description.FILTERED_STATE,
+                msg.FilteredState(filter_state=[1.0] * size, estimate=[1.0] * 9),
+                f"filter_state: {size} numbers, expected two a section of the notch filter",
+            )
+            for size in (1, 3)
+        ),
+        (description.NOMINAL, msg.NominalState(gain=[1.0] * 9), "gain: 9 numbers, expected 18, or none"),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss(parameter_values=[])], since=[3]),
+            r"active\[0\]: fault\.parameter_values: 0 values, expected one a name, 1",
+        ),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss(), loss(type="stuk")], since=[3, 3]),
+            r"active\[1\]: fault\.type = 'stuk': expected one of ",
+        ),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss(channel="rudder")], since=[3]),
+            r"active\[0\]: fault\.channel = 'rudder': expected",
+        ),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss(parameter_values=[float("nan")])], since=[3]),
+            r"active\[0\]: fault\.effectiveness = nan: expected",
+        ),
+        (description.ACTUATOR, msg.Actuator(active=[loss()]), "since: 0 steps, expected one a fault in active, 1"),
+        (description.ACTUATOR, msg.Actuator(since=[3]), "since: 1 steps, expected one a fault in active, 0"),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss()], since=[2**64 - 1]),
+            r"since\[0\] = 18446744073709551615: expected a step, at most 4611686018427387904",
+        ),
+    ],
+)
+def test_what_no_block_can_take_is_refused_by_both_and_sets_no_signal(topic: str, message: Any, words: str) -> None:
+    data, store = serialize_message(message), types()
+    taken = Signals()
+    with pytest.raises(SignalError, match=words) as refused:
+        taker(topic)(codec(TOPICS[topic]).unpack(data), taken)
+    assert description.TOPIC_OF[refused.value.signal] == topic
+    with pytest.raises(SignalError, match=words):
+        reader(topic)(store.deserialize_cdr(sent(message), TOPICS[topic]), taken)
+    assert not vars(taken)
+
+
+def test_a_message_after_one_that_was_refused_is_taken():
+    unpack, take, taken = codec(TOPICS[description.ACTUATOR]).unpack, taker(description.ACTUATOR), Signals()
+    good = unpack(serialize_message(typed(description.ACTUATOR, CASES[2])))
+    take(good, taken)
+    with pytest.raises(SignalError, match="since: 0 steps"):
+        take(unpack(serialize_message(msg.Actuator(active=[loss()]))), taken)
+    assert taken.active_faults == (LOSS, REVERSAL) and taken.step == CASES[2].step
+    take(good, taken)
+    assert taken.active_faults == (LOSS, REVERSAL)
+
+
+def test_an_empty_text_of_no_bytes_shifts_nothing():
+    """Some write an empty text as the length 0, without the zero that ends it."""
+    for topic in TAKEN:
+        taken, given = Signals(), CASES[2]
+        kind = codec(TOPICS[topic])
+        values = kind.unpack(serialize_message(typed(topic, given)))
+        data = kind.pack((*values[1:3], 0, b"", *values[5:]))
+        assert len(data) < len(kind.pack(values[1:])) and data[12:16] == bytes(4)
+        taker(topic)(kind.unpack(data), taken)
+        assert [n for n in (*TAKEN[topic], "step") if not same(getattr(given, n), getattr(taken, n))] == []
+        assert taken.header.frame_id == ""
+
+
+def test_of_whatever_numbers_no_other_error_is_raised_than_that_of_a_signal():
+    draw = random.Random(0)
+    for topic in TAKEN:
+        take, kind = taker(topic), codec(TOPICS[topic])
+        for _ in range(300):
+            data = bytearray(sent(typed(topic, draw.choice(CASES))))
+            for _ in range(draw.randrange(1, 4)):
+                data[draw.randrange(4, len(data))] = draw.choice([0, 1, 2, 4, draw.randrange(256)])
+            taken = Signals()
+            try:
+                take(kind.unpack(bytes(data)), taken)
+            except RunError as error:
+                assert isinstance(error, SignalError) or str(error).startswith(TOPICS[topic])
+                assert not vars(taken)
 
 
 @pytest.mark.parametrize("more", [(), (0, 1)])

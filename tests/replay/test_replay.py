@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from flown_bags import flown_bag, parameters, types, write_bag
 
@@ -95,6 +97,40 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
     assert sorted(values.of("fault_injector")["fault.stops"]) != []
     assert all(result.identical for result in replay_all(bag).values())
     assert all(result.identical for result in rerun(bag, CONTROLLER, values, quiet))
+
+
+@pytest.mark.parametrize(
+    ("topic", "node", "fields", "words"),
+    [
+        ("hsv/filtered_state", "tube_mpc", {"estimate": [0.0]}, "estimate: 1 numbers, expected 9, or none"),
+        (
+            "hsv/filtered_state",
+            "tube_mpc",
+            {"filter_state": [0.0] * 4},
+            "filter_state: 4 numbers, expected 2 of the notch filter flown, or none",
+        ),
+        ("hsv/nominal", "tube_mpc", {"gain": [0.0] * 9}, "gain: 9 numbers, expected 18, or none"),
+        ("hsv/actuator", "plant", {"since": [1]}, "since: 1 steps, expected one a fault in active, 0"),
+    ],
+)
+def test_a_message_that_no_block_can_take_is_named(
+    bag: Bag, tmp_path: Path, topic: str, node: str, fields: dict[str, list[float]], words: str
+) -> None:
+    def spoil(tracks: dict[str, Track]) -> None:
+        track, data = tracks[topic], list(tracks[topic].data)
+        message = track.types.deserialize_cdr(data[100], track.type)
+        for name, numbers in fields.items():
+            setattr(message, name, np.array(numbers, getattr(message, name).dtype))
+        data[100] = bytes(track.types.serialize_cdr(message, track.type))
+        tracks[topic] = replace(track, data=data)
+
+    spoiled = tampered(bag, tmp_path, spoil)
+    refused = f"^{re.escape(f'{spoiled.path}: topic {topic}: {words}')}$"
+    with pytest.raises(RecordingError, match=refused):
+        replay(spoiled, processes_of(CONTROLLER)[node], flown_parameters(bag), quiet)
+    if topic == "hsv/actuator":
+        with pytest.raises(RecordingError, match=refused):
+            flown_parameters(spoiled)
 
 
 def test_a_lost_message_is_a_difference_of_count(bag: Bag, tmp_path: Path) -> None:

@@ -49,6 +49,17 @@ class ControllerError(RunError):
     """A custom controller that failed in flight; the message names it, and the step if known."""
 
 
+class SignalError(RunError):
+    """A signal that no block can take as it was sent; the message begins with the field, and ``signal`` names it."""
+
+    def __init__(self, signal: str, wrong: str) -> None:
+        super().__init__(signal, wrong)
+        self.signal, self.wrong = signal, wrong
+
+    def __str__(self) -> str:
+        return self.wrong
+
+
 class ProcessError(RunError):
     """A process with foreign code that crashed or hangs."""
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 from hsv_msgs.msg import Run
 
-from hsv.errors import RunError
+from hsv.errors import RunError, SignalError
 from hsv.graph.description import NodeDescription
 from hsv.simulation.blocks import Signals
 from hsv_node.lockstep import PeerNode
@@ -44,23 +45,18 @@ class BlockNode(PeerNode):
 
     def on_message(self, topic: str, values: Values) -> None:
         """Step as soon as all messages of a step have arrived."""
-        given, delays, signals, take = self._given, self._delays, self.signals, self._take
-        if len(delays) == 1:
-            take[topic](values, signals)
-        else:
-            given[topic] = values
-            step = values[STEP_PLACE] + delays[topic]
-            due = []
-            for name, delay in delays.items():
-                # Before the first step there is none.
-                if step > 0 or not delay:
-                    if name not in given or given[name][STEP_PLACE] + delay != step:
-                        return
-                    due.append(name)
-            for name in due:
-                take[name](given[name], signals)
+        signals, given = self.signals, self._given
+        given[topic] = values
+        due = (topic,) if len(self._delays) == 1 else self._topics_of(values[STEP_PLACE] + self._delays[topic])
+        if not due:
+            return
         try:
+            for name in due:
+                self._take[name](given[name], signals)
             self.advance(signals)
+        except SignalError as error:
+            self.refuse_signal(error)
+            return
         except RunError as error:
             # Not raised: the executor would print a traceback.
             self.get_logger().fatal(str(error))
@@ -69,6 +65,17 @@ class BlockNode(PeerNode):
         for give, publish in self._answers:
             publish(give(signals))
         self.stepped(signals)
+
+    def _topics_of(self, step: int) -> Sequence[str]:
+        """Return the topics that ``step`` takes, none as long as one of their messages is missing."""
+        due = []
+        for name, delay in self._delays.items():
+            # Before the first step there is none.
+            if step > 0 or not delay:
+                if name not in self._given or self._given[name][STEP_PLACE] + delay != step:
+                    return ()
+                due.append(name)
+        return due
 
     def advance(self, signals: Signals) -> None:
         """Step the component."""

@@ -16,7 +16,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
-from hsv.errors import RunError
+from hsv.errors import RunError, SignalError
 from hsv.graph import description
 from hsv.graph.description import NodeDescription
 from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
@@ -98,17 +98,28 @@ class LockstepNode(ProcessNode):
         unpack = codec(kind).unpack
 
         def take(data: bytes) -> None:
+            if self.exit_code is not None:
+                return  # this node wants to end, and why is said
             try:
                 values = unpack(data)
             except RunError as error:
-                # Not raised: the executor would print a traceback.
-                self.get_logger().fatal(f"{self.resolve_topic_name(topic)}: {error}")
-                self.finish(1)
+                self._refuse_message(topic, error)
                 return
             callback(values)
 
         taken = callback if raw else take
         self._inputs[topic] = self.create_subscription(message_class(kind), topic, taken, STEP, raw=True)
+
+    def refuse_signal(self, error: SignalError) -> str:
+        """End for a signal that cannot be taken from its message, or not be flown; return what has been said."""
+        return self._refuse_message(description.TOPIC_OF[error.signal], error)
+
+    def _refuse_message(self, topic: str, error: RunError) -> str:
+        said = f"{self.resolve_topic_name(topic)}: {error}"
+        # Not raised: the executor would print a traceback.
+        self.get_logger().fatal(said)
+        self.finish(1)
+        return said
 
     def create_step_publisher(self, topic: str) -> Callable[[bytes], None]:
         """Return the function that publishes the bytes of a message on a step topic of the graph description."""

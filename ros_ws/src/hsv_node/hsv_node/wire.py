@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsv.graph.description import CLOCK, TOPICS
-from hsv.graph.exchange import FAULTS, HELD, NEEDED, Head, active_faults, function
+from hsv.graph.exchange import FAULTS, HELD, Head, active_faults, function, taking
 from hsv_node.codec import codec
 
 if TYPE_CHECKING:
@@ -35,28 +35,29 @@ def head_of(values: Values) -> Head:
 def taker(topic: str) -> Callable[[Values, Signals], None]:
     """Return the function that takes the signals that a block needs from a step topic's message.
 
-    Faults that are those of the message before are not read again; others raise what
-    :func:`hsv.graph.exchange.active_faults` does.
+    It raises a :class:`hsv.errors.SignalError` where they cannot be made of it, and leaves the signals as they are.
+    Faults that are those of the message before are not read again.
     """
     kind = codec(TOPICS[topic])
     names: dict[str, Any] = {"head": Head._make}
-    statements = [f"signals.header, signals.step = head(values[1:{STEP_PLACE}]), values[{STEP_PLACE}]"]
+    fields = []
     at = f"{_FIRST}"
     for i, row in enumerate(HELD[topic]):
         # Expressions of places: constants in them are summed once, when this is compiled.
-        first, end = at, f"{at} + {len(row.fields)}"
+        first, end, size = at, f"{at} + {len(row.fields)}", ""
         if row.form is FAULTS:
             names[f"signal_{i}"] = _remembering(lambda _, values: active_faults(kind.message(values)), (0, 0), ())
             numbers = f"values[{first}:], values"
         elif row.form and row.form.sequence:
-            first, end = f"{at} + 1", f"{at} + 1 + values[{at}]"
+            size = f"values[{at}]"
+            first, end = f"{at} + 1", f"{at} + 1 + {size}"
             numbers = f"values[{first}:{end}]"
         else:
             numbers = f"values[{first}:{end}]" if row.form else f"values[{first}]"
-        if row.signal in NEEDED:
-            statements.append(row.taken(i, numbers))
+        fields.append((numbers, size))
         at = end
-    return function(topic, "values, signals", statements, **names)
+    head = f"head(values[1:{STEP_PLACE}]), values[{STEP_PLACE}]"
+    return function(topic, "values, signals", taking(topic, head, fields), **names)
 
 
 def giver(topic: str) -> Callable[[Signals], bytes]:

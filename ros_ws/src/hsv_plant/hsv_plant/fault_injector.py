@@ -45,8 +45,6 @@ class FaultInjectorNode(BlockNode):
 
     def on_message(self, topic: str, values: Values) -> None:
         """Step; in a run, a step or time other than the expected one ends it."""
-        if self.exit_code is not None:
-            return  # the run has ended, and why is said
         if self.announced is not None:
             step, stamp = values[STEP_PLACE], head_of(values)
             if step != self._due or stamp[:2] != stamp_of(step, self.announced.period):

@@ -13,6 +13,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
 
+from hsv.errors import SignalError
 from hsv.graph.description import (
     ACTUATOR,
     EXIT_DIVERGED,
@@ -124,7 +125,11 @@ class PlantNode(LockstepNode):
             return
         self._messages += 1
         if signals.status is FlightStatus.RUNNING:
-            self._take_actuator(values, signals)
+            try:
+                self._take_actuator(values, signals)
+            except SignalError as error:
+                self._broken_off = self.refuse_signal(error)
+                return
             if not all(map(math.isfinite, signals.actuator.tolist())):
                 self._refuse_answer(signals)
                 return

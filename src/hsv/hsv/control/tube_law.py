@@ -41,6 +41,7 @@ from hsv.control.notch_filter import (
     flown_sections,
 )
 from hsv.control.tube_factor import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
+from hsv.errors import SignalError
 from hsv.lanes import choose
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
@@ -328,12 +329,20 @@ class TubeLaw(Controller):
         )
 
     def step(self, inputs: ControllerInput) -> TubeResult:
-        """Return the input of this step; the first of a run is step 0."""
+        """Return the input of this step; the first of a run is step 0.
+
+        Raises:
+            SignalError: The filter's states are neither those of the notch filter flown nor none.
+        """
         k, estimate, q_f, *others = inputs
         # As the bound function takes them for granted, whoever made them.
         x, reference, _, deviation, _, filter_state = given = [_plain(array) for array in (estimate, *others)]
-        memory, size = self._memory, len(filter_state)
-        in_loop = 0 < size == 2 * len(self._notch.D)
+        memory, size, due = self._memory, len(filter_state), 2 * len(self._notch.D)
+        if size not in (0, due):
+            raise SignalError(
+                "filter_state", f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"
+            )
+        in_loop = 0 < size == due
         planned = filter_state if k == 0 else memory[:size].copy()
         u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
         active = self._step(self.kernel, memory, self._watch, k, True, x, q_f, *given[1:], u_feedback, total, u)

@@ -75,6 +75,9 @@ CARRIED = {
 }
 """The signals of the loop that the messages of a topic carry, passed on or from the block that publishes them."""
 
+TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
+"""The topic that carries a signal, by its name; of one that is passed on, the last."""
+
 LATCHED_TOPICS = {
     RUN: "hsv_msgs/msg/Run",
     READY: "hsv_msgs/msg/Ready",

@@ -2,20 +2,29 @@
 
 Here messages are objects with the fields of their type as attributes, such as those of a bag's own definitions, which
 the replay reads and fills in place. The nodes make and take the bytes by the same table, see ``hsv_node.wire``. In both
-a message becomes straight-line code, for which the table gives the expressions.
+a message becomes straight-line code, for which the table gives the expressions. That which reads ``hsv/actuator`` is::
+
+    def made(message, signals):
+        header, step = message.header, message.step
+        actuator = signal_0((message.fuel_equivalence_ratio, message.elevator_deflection))
+        active_faults = signal_1((message.active, message.since))
+        signals.header, signals.step, signals.actuator, signals.active_faults = header, step, actuator, active_faults
+
+where ``signal_0`` and ``signal_1`` are those of the forms of its two rows. No signal is set before all are known, so
+that a message that is refused leaves none of it behind.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
 import numpy as np
 
 from hsv import signals as types
-from hsv.errors import ParameterError
+from hsv.errors import ParameterError, SignalError
 from hsv.graph.description import (
     ACTUATOR,
     CLOCK,
@@ -28,7 +37,8 @@ from hsv.graph.description import (
     TUBE_STATUS,
 )
 from hsv.simulation.blocks import LOOP
-from hsv.vehicle.dynamics import INPUT_NAMES
+from hsv.timing import NEVER
+from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS, N_STATES
 
 if TYPE_CHECKING:
     from hsv.faults.schedule import ActiveFault
@@ -39,7 +49,10 @@ Message = Any
 
 
 class Head(NamedTuple):
-    """Header of a message: time, and its frame as a text with its length."""
+    """Header of a message, flat as it stands in its bytes: the two numbers of the time, and the frame as a text.
+
+    It reads as a header that is an object, too, with ``stamp.sec``, ``stamp.nanosec`` and ``frame_id``.
+    """
 
     sec: int
     nanosec: int
@@ -48,7 +61,7 @@ class Head(NamedTuple):
 
     @property
     def stamp(self) -> Head:
-        """The time: what has ``sec`` and ``nanosec``."""
+        """The time. Its two numbers are attributes of the head itself, so that no further object is made of them."""
         return self
 
     @property
@@ -67,6 +80,14 @@ def stamp_of(step: int, period: float) -> tuple[int, int]:
     return divmod(round(step * period * 1e9), 1_000_000_000)
 
 
+class Sizes(NamedTuple):
+    """How many numbers a sequence may have."""
+
+    admitted: Container[int]
+    words: str
+    """What is said to be expected where it has others."""
+
+
 class Form(NamedTuple):
     """How a signal stands in a message; both functions also take the signal :attr:`Row.beside` it, where there is one.
 
@@ -76,8 +97,14 @@ class Form(NamedTuple):
     values: Callable[..., Any]
     """Returns the numbers of a signal, in the order of the fields."""
     signal: Callable[..., Any]
-    """Returns the signal of these numbers."""
+    """Returns the signal of these numbers.
+
+    Raises:
+        SignalError: It cannot be made of them.
+    """
     sequence: bool = False
+    sizes: Sizes | None = None
+    """Of a sequence, None for any."""
 
 
 class Row(NamedTuple):
@@ -97,20 +124,41 @@ class Row(NamedTuple):
         return f"values_{i}({signals})" if self.form else signals
 
     def taken(self, i: int, values: str) -> str:
-        """Return the statement that sets the signal of the row with number ``i`` from the expression of its numbers."""
-        beside = f", signals.{self.beside}" if self.beside else ""
-        return f"signals.{self.signal} = " + (f"signal_{i}({values}{beside})" if self.form else values)
+        """Return the statement that makes the signal of the row with number ``i`` from the expression of its numbers.
+
+        It is a variable of the signal's name, and so is the one beside it.
+        """
+        beside = f", {self.beside}" if self.beside else ""
+        return f"{self.signal} = " + (f"signal_{i}({values}{beside})" if self.form else values)
+
+    def refuse(self, size: int) -> NoReturn:
+        """Refuse the sequence of the row for its ``size``.
+
+        Raises:
+            SignalError: Always.
+        """
+        assert self.form and self.form.sizes
+        raise SignalError(self.signal, f"{self.fields[0]}: {size} numbers, expected {self.form.sizes.words}")
 
 
 _VECTOR = Form(np.ndarray.tolist, np.array)
 _TUPLE = Form(tuple, tuple)
 _SEQUENCE = Form(np.ndarray.tolist, np.array, sequence=True)
-_MATRIX = Form(lambda matrix: matrix.ravel().tolist(), np.array, sequence=True)
+_SECTIONS = _SEQUENCE._replace(sizes=Sizes(range(0, 2**32, 2), "two a section of the notch filter"))
+_GAIN = Form(
+    lambda matrix: matrix.ravel().tolist(),
+    np.array,
+    sequence=True,
+    sizes=Sizes((0, N_INPUTS * N_STATES), f"{N_INPUTS * N_STATES}, or none"),
+)
 _ESTIMATE = Form(
     lambda estimate, measurement: [] if estimate is measurement else estimate.tolist(),
     lambda values, measurement: np.array(values) if len(values) else measurement,
     sequence=True,
+    sizes=Sizes((0, N_STATES), f"{N_STATES}, or none"),
 )
+_ADDED = ("estimate", "gain")
+"""Sequences that the messages of older bags lack, which is as if they were empty."""
 
 _swapped = itemgetter(0, 1, 2, 3, 4, 5, 7, 6, 8)
 """From the order of x to that of LongitudinalState, whose elastic coordinates come before their rates, and back."""
@@ -155,18 +203,29 @@ def active_faults(message: Message) -> tuple[ActiveFault, ...]:
     """Return the faults in a message Actuator, with their first steps.
 
     Raises:
-        ParameterError: See :func:`fault_in`.
+        SignalError: See :func:`fault_in`; or there are not as many first steps, or none of a flight.
     """
     return _faults((message.active, message.since))
 
 
-def _faults(values: tuple[Iterable[Message], Iterable[int]]) -> tuple[ActiveFault, ...]:
+def _faults(values: tuple[Sequence[Message], Sequence[int]]) -> tuple[ActiveFault, ...]:
     from hsv.faults.schedule import ActiveFault
 
-    return tuple(ActiveFault(fault_in(fault), int(since)) for fault, since in zip(*values, strict=True))
+    active, since = values
+    if len(active) != len(since):
+        raise SignalError("active_faults", f"since: {len(since)} steps, expected one a fault in active, {len(active)}")
+    made = []
+    for i, (message, first) in enumerate(zip(active, map(int, since), strict=True)):
+        try:
+            made.append(ActiveFault(fault_in(message), first))
+        except ParameterError as error:
+            raise SignalError("active_faults", f"active[{i}]: {error}") from error
+        if first > NEVER:
+            raise SignalError("active_faults", f"since[{i}] = {first}: expected a step, at most {NEVER}")
+    return tuple(made)
 
 
-def _said_of(faults: tuple[ActiveFault, ...]) -> tuple[list[_Fault], np.ndarray]:
+def _fault_messages(faults: tuple[ActiveFault, ...]) -> tuple[list[_Fault], np.ndarray]:
     return (
         [
             _Fault(fault.channel, fault.type, [*fault.parameters], np.array([*fault.parameters.values()]))
@@ -176,7 +235,7 @@ def _said_of(faults: tuple[ActiveFault, ...]) -> tuple[list[_Fault], np.ndarray]
     )
 
 
-FAULTS = Form(_said_of, _faults)
+FAULTS = Form(_fault_messages, _faults)
 """Two sequences, of messages and of numbers."""
 
 
@@ -199,7 +258,7 @@ HELD: Mapping[str, tuple[Row, ...]] = {
     FILTERED_STATE: (
         _state("measurement", "state."),
         Row("filtered_pitch_rate", ("filtered_pitch_rate",)),
-        Row("filter_state", ("filter_state",), _SEQUENCE),
+        Row("filter_state", ("filter_state",), _SECTIONS),
         Row("estimate", ("estimate",), _ESTIMATE, beside="measurement"),
         Row("status", ("status",)),
     ),
@@ -208,7 +267,7 @@ HELD: Mapping[str, tuple[Row, ...]] = {
         _input("reference_input", "reference_input."),
         _state("deviation", "deviation."),
         _input("nominal_input", "input."),
-        Row("gain", ("gain",), _MATRIX),
+        Row("gain", ("gain",), _GAIN),
         Row("gain_index", ("gain_index",)),
         Row("nominal_status", ("status",)),
     ),
@@ -242,25 +301,50 @@ def function(topic: str, arguments: str, statements: Iterable[str], **names: Any
     for i, row in enumerate(HELD.get(topic, ())):
         if row.form:
             known |= {f"values_{i}": row.form.values, f"signal_{i}": row.form.signal}
+            if row.form.sizes:
+                known |= {f"sizes_{i}": row.form.sizes.admitted, f"refuse_{i}": row.refuse}
     known |= names
     exec(f"def made({arguments}):\n    " + "\n    ".join(statements), known)
     made: Callable[..., Any] = known["made"]
     return made
 
 
+def taking(topic: str, head: str, fields: Iterable[tuple[str, str]]) -> Iterator[str]:
+    """Yield the statements that take from a topic's message the signals that a block needs.
+
+    Args:
+        topic: The topic.
+        head: Expressions of header and step.
+        fields: By row, the expressions of its numbers and, of a sequence, of how many there are.
+    """
+    yield f"header, step = {head}"
+    taken = ["header", "step"]
+    for i, (row, (values, size)) in enumerate(zip(HELD[topic], fields, strict=True)):
+        if row.form and row.form.sizes:
+            yield f"if {size} not in sizes_{i}: refuse_{i}({size})"
+        if row.signal in NEEDED:
+            yield row.taken(i, values)
+            taken.append(row.signal)
+    yield f"{', '.join(f'signals.{name}' for name in taken)} = {', '.join(taken)}"
+
+
 @cache
 def reader(topic: str) -> Callable[[Message, Signals], None]:
-    """Return the function from a topic's message to the signals that a block needs."""
-    statements = ["signals.header, signals.step = message.header, message.step"]
-    for i, row in enumerate(HELD[topic]):
-        values = ", ".join(f"message.{field}" for field in row.fields)
-        if row.form is _ESTIMATE:  # bags from before there were estimators lack the field
+    """Return the function from a topic's message to the signals that a block needs.
+
+    It raises a :class:`hsv.errors.SignalError` where they cannot be made of it, and leaves the signals as they are.
+    """
+
+    def fields(row: Row) -> tuple[str, str]:
+        if row.signal in _ADDED:
             values = f"getattr(message, {row.fields[0]!r}, ())"
-        elif row.form and not row.form.sequence:
-            values = f"({values})"
-        if row.signal in NEEDED:
-            statements.append(row.taken(i, values))
-    return function(topic, "message, signals", statements)
+        else:
+            values = ", ".join(f"message.{field}" for field in row.fields)
+        sequence = row.form is not None and row.form.sequence
+        return f"({values})" if row.form and not sequence else values, f"len({values})" if sequence else ""
+
+    head = "message.header, message.step"
+    return function(topic, "message, signals", taking(topic, head, map(fields, HELD[topic])))
 
 
 @cache

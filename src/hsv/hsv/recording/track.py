@@ -10,16 +10,17 @@ from typing import Any
 from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
-from hsv.errors import RecordingError
+from hsv.errors import RecordingError, SignalError
+from hsv.graph.description import TOPIC_OF
 from hsv.recording.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
 
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Convert the access to a field that the definition of a message does not have into a clear error.
+    """Convert a field that the definition of a message does not have, or that no block can take, into a clear error.
 
     Raises:
-        RecordingError: It names ``source``, the message's type and the field.
+        RecordingError: It names ``source``, the message's type or the topic, and the field.
     """
     try:
         yield
@@ -29,6 +30,8 @@ def expecting_fields(source: object) -> Iterator[None]:
         raise RecordingError(
             f"{source}: {kind}: recorded with another definition, expected a field {error.name}"
         ) from None
+    except SignalError as error:
+        raise RecordingError(f"{source}: topic {TOPIC_OF[error.signal]}: {error}") from error
 
 
 @dataclass(frozen=True)

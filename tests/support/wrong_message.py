@@ -1,0 +1,48 @@
+"""A node that disturbs a flight: ``python3 wrong_message.py HOW STEP``, with one of :data:`WRONG` from that step on."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import rclpy
+from hsv_msgs.msg import Actuator, ControlInput, Fault, FilteredState, Measurement, NominalState
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+
+LOSS = {"channel": "elevator_deflection", "type": "loss_of_effectiveness"}
+WRONG: dict[str, tuple[str, Any]] = {
+    "fault": ("hsv/actuator", Actuator(active=[Fault(channel="elevator_deflection", type="stuk")], since=[1])),
+    "value": ("hsv/actuator", Actuator(active=[Fault(**LOSS, parameter_names=["effectiveness"])], since=[1])),
+    "estimate": ("hsv/filtered_state", FilteredState(estimate=[1.0])),
+    "states": ("hsv/filtered_state", FilteredState(filter_state=[0.0] * 4)),
+    "gain": ("hsv/nominal", NominalState(gain=[1.0] * 9)),
+    "command": ("hsv/command", ControlInput()),
+    "measurement": ("hsv/measurement", Measurement()),
+}
+"""Topic and message; of the last two, as of no other, the end is missing."""
+
+
+def main(how: str, step: int) -> None:
+    """Send the message for every step from ``step`` on, as soon as that begins."""
+    rclpy.init()
+    node = rclpy.create_node("disturber")
+    deep = QoSProfile(depth=256)
+    topic, message = WRONG[how]
+    publishers: list[Any] = []
+
+    def disturb(measured: Measurement) -> None:
+        if not publishers:  # in flight: before it, two that publish the command are refused
+            publishers.append(node.create_publisher(type(message), topic, deep))
+        if measured.step >= step:
+            # Of another time than the step: that of a flight is not to become it.
+            message.step = measured.step
+            data = serialize_message(message)
+            publishers[0].publish(data[:-8] if topic.endswith(how) else data)
+
+    node.create_subscription(Measurement, "hsv/measurement", disturb, deep)
+    rclpy.spin(node)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))
