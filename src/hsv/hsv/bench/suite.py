@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hsv.bench import campaigns, controllers, graph, in_process, live, offline, startup, writing
+from hsv.bench import campaigns, controllers, graph, in_process, live, offline, roofline, startup, writing
 from hsv.bench.figure import Figure
 
 
@@ -29,6 +29,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
             *campaigns.over_workers(times(3), max(cores, 2)),
             *campaigns.corners(times(3), max(cores, 2)),
             *campaigns.digests(times(10)),
+            *roofline.against_roofline(times(10)),
         ],
         "offline": offline.design_and_verify,
     }
