@@ -20,10 +20,10 @@ def test_ratios_are_taken_pair_by_pair():
 @pytest.mark.parametrize(
     ("value", "bound", "verdict"),
     [
-        (1.2, "most", "within 1.3"),
-        (1.4, "most", "within the limit 1.5, short of the goal 1.3"),
+        (1.2, "most", "at most 1.3, which is the goal"),
+        (1.4, "most", "at most 1.5, as promised; short of the goal, at most 1.3"),
         (1.6, "most", "WORSE than the limit, at most 1.5"),
-        (1.6, "least", "within 1.3"),
+        (1.6, "least", "at least 1.3, which is the goal"),
         (1.2, "least", "WORSE than the limit, at least 1.5"),
     ],
 )
@@ -34,8 +34,19 @@ def test_what_is_worse_than_promised_is_said_plainly(value, bound, verdict):
 
 def test_a_figure_of_one_side_has_its_unit():
     alone = Figure("f", "ours", "", "s", (2e-6, 4e-6, 3e-6), bound="most", limit=5e-6)
-    assert alone.verdict == "within 5e-06 s"
+    assert alone.verdict == "at most 5e-06 s, as promised"
     assert cells(alone)[2:6] == ("3 us", "", "", "2.2 to 3.8")
+
+
+def test_a_lower_limit_is_called_one():
+    pace = Figure("f", "ours", "", "x real time", (18.2,), bound="least", limit=8.0)
+    assert pace.verdict == "at least 8 x real time, as promised"
+
+
+def test_nothing_is_promised_without_a_limit():
+    rate = figure(0.4, theirs=(1.0,), bound="least")
+    assert rate.verdict == ""
+    assert rate.is_rate
 
 
 def test_the_two_sides_are_measured_in_turn():

@@ -27,7 +27,7 @@ def test_the_table_of_a_run_replaces_the_one_before_and_adds_a_row_to_that_of_al
     assert text.startswith("# Before\n") and "\nBetween\n" in text and text.endswith("\nAfter\n")
     assert "old" not in text
     assert text.count("| ours | theirs | 1") == 1 and "| ours | theirs | 1.2 s" in text
-    assert "within 1.5; noted" in text
+    assert "at most 1.5, as promised; noted" in text
     assert "a machine" in text and "Not measured: jsbsim, not installed." in text
     # A commit that is measured anew has its last figures; columns that were not measured are empty.
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in text.splitlines() if "cores |" in line]

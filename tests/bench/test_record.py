@@ -5,7 +5,7 @@ import json
 import pytest
 
 from hsv.bench.figure import Figure
-from hsv.bench.record import as_json, changes, read_run
+from hsv.bench.record import as_json, changes, not_measured, read_run
 from hsv.errors import QuantityError
 
 
@@ -19,7 +19,7 @@ def rate(*ours):
 
 def recorded(folder, *figures, **changed):
     path = folder / "run.json"
-    path.write_text(json.dumps(as_json(figures, {}) | changed))
+    path.write_text(json.dumps(as_json({"laps": figures}, {}) | changed))
     return read_run(path)
 
 
@@ -47,6 +47,23 @@ def test_only_ratios_are_held_against_other_hardware(tmp_path):
 
 def test_what_was_not_measured_before_is_left_out(tmp_path):
     assert changes([rate(5.0)], recorded(tmp_path, ratio(1.0))) == []
+
+
+@pytest.mark.parametrize(
+    ("only", "names"), [(None, ["pace"]), (("laps",), ["pace"]), (("laps", "other"), ["pace"]), (("other",), [])]
+)
+def test_what_was_measured_before_only_is_named_where_its_group_was_asked_for(tmp_path, only, names):
+    run = recorded(tmp_path, ratio(1.0), rate(10.0))
+    assert not_measured([ratio(1.0)], run, only) == names
+
+
+def test_a_run_of_an_earlier_version_has_no_groups(tmp_path):
+    old = as_json({"laps": [rate(10.0)]}, {})
+    for figure in old["figures"]:
+        del figure["group"]
+    run = recorded(tmp_path, **old)
+    assert not_measured([], run, None) == ["pace"]
+    assert not_measured([], run, ("laps",)) == []
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,8 @@ class Figure:
     ours: tuple[float, ...]
     theirs: tuple[float, ...] = ()
     bound: str = ""
-    """``"most"`` or ``"least"``: which side of the limit is good; empty: nothing is promised."""
+    """``"most"`` or ``"least"``: which side of the limit is good, where ``"least"`` is for what is better if larger;
+    without a limit nothing is promised."""
     limit: float | None = None
     goal: float | None = None
     note: str = ""
@@ -52,14 +53,18 @@ class Figure:
         if self.limit is None:
             return ""
         sign = -1.0 if self.is_rate else 1.0
+        limit = self._written(self.limit)
         if sign * self.median > sign * self.limit:
-            return f"WORSE than the limit, at {self.bound} {self._written(self.limit)}"
-        if self.goal is not None and sign * self.median > sign * self.goal:
-            return f"within the limit {self._written(self.limit)}, short of the goal {self._written(self.goal)}"
-        return f"within {self._written(self.limit if self.goal is None else self.goal)}"
+            return f"WORSE than the limit, {limit}"
+        if self.goal is None:
+            return f"{limit}, as promised"
+        goal = self._written(self.goal)
+        if sign * self.median > sign * self.goal:
+            return f"{limit}, as promised; short of the goal, {goal}"
+        return f"{goal}, which is the goal"
 
     def _written(self, value: float) -> str:
-        return f"{value:g}" if self.theirs else f"{value:g} {self.unit}"
+        return f"at {self.bound} {value:g}{'' if self.theirs else f' {self.unit}'}"
 
 
 def interleaved(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ class RecordedFigure(pydantic.BaseModel):
     """Data of a figure in a recorded run that are needed for a comparison."""
 
     name: str
+    group: str = ""
+    """What ``--only`` calls the figures measured together; empty in runs of earlier versions."""
     spread: tuple[float, float]
     ratio: float | None = None
     value: float | None = None
@@ -45,13 +47,18 @@ class Change:
     slower: float
 
 
-def as_json(figures: Sequence[Figure], skipped: Mapping[str, str]) -> dict[str, Any]:
-    """Return a run for :func:`read_run`: commit, machine, figures with all samples, what was not measured and why."""
+def as_json(measured: Mapping[str, Sequence[Figure]], skipped: Mapping[str, str]) -> dict[str, Any]:
+    """Return a run for :func:`read_run`: commit, machine, figures with all samples, what was not measured and why.
+
+    Args:
+        measured: Figures by their group.
+        skipped: Why groups were not measured.
+    """
     return {
         "commit": commit(),
         "hardware": hardware(),
         "machine": machine(),
-        "figures": [_as_json(figure) for figure in figures],
+        "figures": [_as_json(figure, group) for group, figures in measured.items() for figure in figures],
         "skipped": dict(skipped),
     }
 
@@ -96,9 +103,16 @@ def changes(figures: Sequence[Figure], run: RecordedRun) -> list[Change]:
     return found
 
 
-def _as_json(figure: Figure) -> dict[str, Any]:
+def not_measured(figures: Sequence[Figure], run: RecordedRun, only: Collection[str] | None) -> list[str]:
+    """Return the names of recorded figures that are missing among ``figures``, of the groups in ``only``, or of all."""
+    names = {figure.name for figure in figures}
+    return [old.name for old in run.figures if old.name not in names and (not only or old.group in only)]
+
+
+def _as_json(figure: Figure, group: str) -> dict[str, Any]:
     return {
         "name": figure.name,
+        "group": group,
         "what": figure.what,
         "against": figure.against or None,
         "unit": figure.unit,

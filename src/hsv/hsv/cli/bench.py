@@ -29,13 +29,13 @@ def bench(
 ) -> None:
     """Measure the performance of this machine, as ratios whose two sides are measured alternately.
 
-    With --compare, the exit code is 1 if anything became slower.
+    The exit code is 1 if a group of --only could not be measured, and with --compare if anything became slower.
 
     Example: hsv bench --only in_process --only mcap
     """
     from hsv.bench.machine import busy, machine
     from hsv.bench.page import Page
-    from hsv.bench.record import as_json, changes, read_run
+    from hsv.bench.record import as_json, changes, not_measured, read_run
     from hsv.bench.suite import groups
     from hsv.cli.progress import stages
     from hsv.errors import QuantityError, RunError
@@ -57,32 +57,37 @@ def bench(
     measured_on = machine()
     if warning := busy():
         errors.print(warning, style="yellow", soft_wrap=True)
-    figures: list[Figure] = []
+    measured: dict[str, list[Figure]] = {}
     skipped: dict[str, str] = {}
     with stages() as progress:
         for number, name in enumerate(chosen):
             progress("measuring", number, len(chosen))
             try:
-                measured = available[name]()
+                measured[name] = available[name]()
             except RunError as error:
                 # Without a compiler or a built workspace, the rest can still be measured.
                 skipped[name] = str(error)
                 continue
-            if not measured:
+            if not measured[name]:
                 skipped[name] = "not installed"
-            figures += measured
+    figures = [figure for found in measured.values() for figure in found]
     since = changes(figures, recorded) if recorded else []
+    absent = not_measured(figures, recorded, only) if recorded else []
     if json:
         slower = {change.figure.name: change.slower for change in since}
-        print_json(as_json(figures, skipped) | ({"slower_than_recorded": slower} if recorded else {}))
+        compared = {"slower_than_recorded": slower, "recorded_but_not_measured": absent} if recorded else {}
+        print_json(as_json(measured, skipped) | compared)
     else:
         _print(figures)
-        for name, reason in skipped.items():
-            errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
+        if not only:
+            for name, reason in skipped.items():
+                errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
         if recorded:
-            _print_changes(since, recorded.commit, len(figures))
+            _print_changes(since, recorded.commit, len(figures), absent)
     if page:
         page.write(measured_on, figures, skipped)
+    if only and skipped:
+        raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
     if any(change.slower > 0.0 for change in since):
         raise typer.Exit(1)
 
@@ -102,8 +107,8 @@ def _print(figures: list[Figure]) -> None:
             console.print(Text(folded(promise, 4, first=4), style), soft_wrap=True)
 
 
-def _print_changes(since: list[Change], commit: str, measured: int) -> None:
-    """Print what became slower or faster since a recorded run of a ``commit``, and how many could not be compared."""
+def _print_changes(since: list[Change], commit: str, measured: int, absent: list[str]) -> None:
+    """Print what became slower or faster since a recorded run of a ``commit``, and what could not be compared."""
     console.print(Text(f"since {commit}", "bold"))
     for change in since:
         if change.slower:
@@ -114,3 +119,7 @@ def _print_changes(since: list[Change], commit: str, measured: int) -> None:
     alone = measured - len(since)
     said = f"as before: {same} of {measured}{f'; {alone} not in that run, or of other hardware' if alone else ''}"
     console.print(folded(said, 4, first=4), soft_wrap=True)
+    if absent:
+        console.print(
+            Text(folded(f"recorded there, not measured here: {', '.join(absent)}", 4, first=4)), soft_wrap=True
+        )
