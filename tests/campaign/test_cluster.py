@@ -16,7 +16,7 @@ from hosts import Hosts, emulated_hosts
 from waiting import output_of, wait_until
 
 from hsv.campaign.campaign import plan
-from hsv.campaign.cluster import Host, address_for, cluster, read_host, read_hosts
+from hsv.campaign.cluster import Host, address_for, cluster, read_host, read_hosts, read_ssh
 from hsv.errors import CampaignError
 
 FLIGHTS = 20_000
@@ -53,14 +53,25 @@ def test_the_address_is_that_of_the_way_to_a_host():
         address_for("no.such.host.invalid")
 
 
+def test_ssh_is_a_command_with_options():
+    assert read_ssh("sh -p 2222 -i 'a key'") == ["sh", "-p", "2222", "-i", "a key"]
+
+
+@pytest.mark.parametrize("text", ["", " ", "''", "/", "no_such_command -p 22", "sh 'open"])
+def test_what_is_no_command_is_refused_before_anything_starts(text):
+    refused = pytest.raises(CampaignError, match=r"^ssh = .*: expected a command of this machine, with options, as in")
+    with refused, cluster([Host("far", 1)], "127.0.0.1", 8786, "python", text):
+        pass
+
+
 def test_a_taken_port_or_a_foreign_address_is_refused():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        with pytest.raises(CampaignError, match=f"port = {port}: in use"), cluster([], "127.0.0.1", port, "", "ssh"):
+        with pytest.raises(CampaignError, match=f"port = {port}: in use"), cluster([], "127.0.0.1", port, "", "sh"):
             pass
     # Of the documentation's range: no machine has it.
     foreign = pytest.raises(CampaignError, match=r"does not start .*expected an address of this machine")
-    with foreign, cluster([], "192.0.2.1", port, "", "ssh"):
+    with foreign, cluster([], "192.0.2.1", port, "", "sh"):
         pass
 
 

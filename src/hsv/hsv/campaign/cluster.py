@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import shlex
+import shutil
 import socket
 import subprocess
 import sys
@@ -98,6 +99,22 @@ def remote_python() -> str:
     return f"{source}exec {shlex.quote(sys.executable)}"
 
 
+def read_ssh(text: str) -> list[str]:
+    """Return the words of the command ssh, with options, as a shell splits them.
+
+    Raises:
+        CampaignError: There are none, or this machine has no such command.
+    """
+    expected = f"ssh = {text!r}: expected a command of this machine, with options, as in 'ssh -p 2222'"
+    try:
+        words = shlex.split(text)
+    except ValueError as error:
+        raise CampaignError(f"{expected} ({str(error).lower()})") from error
+    if not words or shutil.which(words[0]) is None:
+        raise CampaignError(expected)
+    return words
+
+
 class _Process:
     """A process whose last words are kept."""
 
@@ -168,9 +185,10 @@ def cluster(
         say: Takes what happens to a host, in words.
 
     Raises:
-        CampaignError: The scheduler does not start.
+        CampaignError: The scheduler does not start, or ``ssh`` is no command.
         RunError: From what is yielded: the scheduler has ended.
     """
+    command = read_ssh(ssh)
     goal = f"tcp://{address}:{port}"
     with ExitStack() as stack:
         if _answers(address, port):
@@ -187,7 +205,7 @@ def cluster(
             there = f"export DASK_LOGGING__DISTRIBUTED=error; {python} {_WORKER} {count} {goal}"
             # With a terminal the workers end when the connection does.
             options = [word for option in _ALIVE for word in ("-o", option)]
-            words = [*shlex.split(ssh), "-tt", *options, host.name, f"bash -c {shlex.quote(there)}"]
+            words = [*command, "-tt", *options, host.name, f"bash -c {shlex.quote(there)}"]
             workers.append(_Workers(host, words, say))
             stack.callback(workers[-1].stop)
 
