@@ -285,6 +285,20 @@ def test_what_takes_is_told_by_whole_batches_in_turn(planned):
     assert capacity(campaign, range(4), 2, 0.5).wall_time == 32.0
 
 
+def test_the_space_that_is_told_holds_the_batches_and_the_result(planned, out):
+    campaign, told, kept = planned(samples=132), [], []
+    store = ResultStore(out, campaign)
+
+    def weigh(done):
+        kept.append(sum(file.stat().st_size for file in store.folder.glob("*.parquet")))
+
+    run_campaign(campaign, store, SerialExecutor(), expect=told.append, progress=weigh)
+    needed = kept[-1] + out.stat().st_size
+    assert told[0].bytes == pytest.approx(needed, rel=0.1)
+    # As it is told before the first batch.
+    assert capacity(campaign, range(campaign.batches), 1, 0.5).bytes == pytest.approx(needed, rel=0.1)
+
+
 def test_where_batches_take_long_what_is_to_come_is_told_before(planned, out, monkeypatch):
     monkeypatch.setattr(run, "_LATE", 0.0)
     campaign, told = planned(), []

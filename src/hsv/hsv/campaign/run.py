@@ -53,25 +53,40 @@ def run_campaign(
                 expect(capacity(campaign, missing, cores, sum(alone) / len(alone)))
                 first = []
         progress(done)
-        order, seconds = [*first, *(batch for batch in missing if batch not in first)], 0.0
+        order, seconds, size = [*first, *(batch for batch in missing if batch not in first)], 0.0, 0
         for count, (batch, content) in enumerate(executor.fly(fly_batch, campaign.text, order), 1):
             store.keep(batch, content)
             flown += len(campaign.flights(batch))
             if count <= len(first):
                 seconds += seconds_of(content)
+                size += len(content)
             if count == len(first):
-                expect(capacity(campaign, missing, cores, seconds / flown))
+                expect(capacity(campaign, missing, cores, seconds / flown, size / count))
             progress(done + flown)
         store.finish()
     return flown
 
 
-def capacity(campaign: Campaign, missing: Sequence[int], cores: int, seconds: float) -> Capacity:
-    """Return what flying the ``missing`` batches on so many ``cores`` takes, ``seconds`` a flight of one of them."""
+def capacity(
+    campaign: Campaign, missing: Sequence[int], cores: int, seconds: float, size: float | None = None
+) -> Capacity:
+    """Return what flying the ``missing`` batches on so many ``cores`` takes.
+
+    Args:
+        campaign: The campaign.
+        missing: Numbers of the batches to be flown.
+        cores: Number of flights that are flown at the same time.
+        seconds: What a flight takes one of the cores, s.
+        size: Bytes of a batch; None: estimated.
+    """
     flights = sum(len(campaign.flights(batch)) for batch in missing)
     # Whole batches go to the cores in turn.
     longest = min(-(-len(missing) // cores) * campaign.batch, flights)
-    # Eight bytes a number, hardly less when compressed; beside the rows, each batch keeps its envelope for a while.
-    rows = flights * 8 * len(schema(campaign))
-    envelopes = campaign.batches * len(Envelope.empty().encode())
-    return Capacity(flights, cores, longest * seconds, rows + envelopes)
+    # Eight bytes a number, hardly less when compressed.
+    row, envelope = 8 * len(schema(campaign)), len(Envelope.empty().encode())
+    if size is None:
+        # A batch has its envelope twice, the second time in the schema, in base 64.
+        size = campaign.batch * row + envelope * (1.0 + 4.0 / 3.0)
+    # The batches are kept until the result is whole.
+    result = campaign.samples * row + envelope
+    return Capacity(flights, cores, longest * seconds, round(len(missing) * size) + result)
