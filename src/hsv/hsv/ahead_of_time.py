@@ -15,7 +15,9 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager, nullcontext
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -72,22 +74,23 @@ def recording() -> Iterator[Calls]:
         compiled.observer = None
 
 
-def build(calls: Calls) -> int:
+def build(calls: Calls, processes: int = 1) -> int:
     """Compile ``calls`` into the library that :mod:`hsv.precompiled` takes functions from; return for how many it did.
 
-    Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced.
+    Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced. With
+    more ``processes`` than one, each of these compiles some of them.
 
     Raises:
         OSError, subprocess.CalledProcessError: There is no C compiler to link with, or no place for the library.
     """
     functions: dict[str, list[tuple[tuple[str, ...], str, Result]]] = {}
     library = binding.parse_assembly("")
-    for number, ((name, key), (function, arguments)) in enumerate(calls.items()):
-        symbol = f"hsv_{number}"
-        try:
-            code, result = _entry(function, arguments)
-        except NumbaError:
+    with ProcessPoolExecutor(processes, get_context("spawn")) if processes > 1 else nullcontext() as pool:
+        entries = [*(pool.map if pool else map)(_entry_if_any, *zip(*calls.values(), strict=True))] if calls else []
+    for number, ((name, key), entry) in enumerate(zip(calls, entries, strict=True)):
+        if entry is None:
             continue
+        symbol, (code, result) = f"hsv_{number}", entry
         library.link_in(_with_one_symbol(code, symbol))
         functions.setdefault(name, []).append((key, symbol, result))
     linked = _linked(library)
@@ -144,6 +147,13 @@ def _replace(path: Path, content: bytes) -> None:
         file.flush()
         os.fsync(file.fileno())
     temporary.replace(path)
+
+
+def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result] | None:
+    try:
+        return _entry(function, arguments)
+    except NumbaError:
+        return None
 
 
 def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result]:

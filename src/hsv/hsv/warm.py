@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from dataclasses import replace
@@ -45,7 +46,7 @@ if __name__ == "__main__":
     try:
         reason = why_none()
         if not reason:
-            build(calls)
+            build(calls, len(os.sched_getaffinity(0)))
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only the start of commands and nodes takes longer.
         reason = str(getattr(error, "stderr", None) or error)
