@@ -30,13 +30,15 @@ def messages(path: Path) -> list[dict[str, str]]:
 
 
 def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Processes) -> None:
-    scenario = short_scenario(processes.folder, duration=2, fault=1)
+    scenario = short_scenario(processes.folder, duration=4, fault=1)
     node = processes.start("ros2", "run", "hsv_bringup", "airframe", "--ros-args", "-p", "rate:=5.0")
     received = processes.folder / "markers"
     with received.open("w") as output:
         reader = processes.start("hsv", "topic", "/hsv/airframe", "--json", output=output)
+        # So short a flight waits for neither of the two, and its first second may pass before they know of it.
+        wait_until(lambda: "waiting for a message" in received.read_text(), [node.pid, reader.pid])
         ran = processes.run("hsv", "run", scenario, "--bag", "flown", "--real-time-factor", "1", "--no-report")
-        assert ran.returncode in (0, 1), ran.stdout  # so short a flight may settle late
+        assert ran.returncode in (0, 1), ran.stdout  # it may settle late
         wait_until(lambda: len(messages(received)) > 5, [node.pid, reader.pid])
         processes.stop()
 
