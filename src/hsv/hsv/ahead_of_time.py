@@ -14,7 +14,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext
 from multiprocessing import get_context
@@ -123,7 +123,7 @@ def _library_before() -> str:
 
 
 def _sources() -> list[str]:
-    """Return the modules that hold compiled functions, and those that define what these use as constants."""
+    """Return the modules with compiled functions or their constants (in capitals), and those that compile or call."""
     modules = {name: vars(module) for name, module in sys.modules.items() if name.startswith("hsv.")}
     holding = {
         name: values
@@ -164,77 +164,86 @@ def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str,
     """
     kinds: Any = types.Tuple(arguments)
     nogil = function.targetoptions.get("nogil")
-    results: list[Result] = []
     # What is inlined elsewhere cannot be called with a tuple of arguments.
     inlined = "inline" in function.targetoptions
     called = njit(**{**function.targetoptions, "inline": "never"})(function.py_func) if inlined else function.dispatcher
+    results: list[Result] = []
 
-    def take(_context: Any, objects: Any) -> Any:
-        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-            python = context.get_python_api(builder)
-            return _from_object(context, builder, python, kinds, builder.inttoptr(values[0], python.pyobj))
+    def from_objects(context: Any, builder: Any, python: Any, _kind: Any, address: Any) -> Any:
+        return _from_object(context, builder, python, kinds, builder.inttoptr(address, python.pyobj))
 
-        return kinds(objects), generate
+    def to_be_object(kind: Any) -> Any:
+        results.append(_result(kind))
+        return types.int64(kind)
 
-    def give(_context: Any, value: Any) -> Any:
-        results.append(_result(value))
+    def to_object(context: Any, builder: Any, python: Any, kind: Any, value: Any) -> Any:
+        return builder.ptrtoint(_to_object(context, builder, python, kind, value), _WORD)
 
-        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-            made = _to_object(context, builder, context.get_python_api(builder), value, values[0])
-            return builder.ptrtoint(made, _WORD)
+    def is_refused(_context: Any, builder: Any, python: Any) -> Any:
+        return cgutils.is_not_null(builder, python.err_occurred())
 
-        return types.int64(value), generate
+    def fail(_context: Any, builder: Any, python: Any) -> Any:
+        _raise(builder, python, "RuntimeError", f"{function.name} raised an error")
+        return _WORD(0)
 
-    def ask(_context: Any) -> Any:
-        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
-            return cgutils.is_not_null(builder, context.get_python_api(builder).err_occurred())
+    def release_lock(_context: Any, builder: Any, python: Any) -> Any:
+        return builder.ptrtoint(python.save_thread(), _WORD) if nogil else _WORD(0)
 
-        return types.boolean(), generate
+    def take_lock(context: Any, builder: Any, python: Any, _kind: Any, thread: Any) -> Any:
+        if nogil:
+            python.restore_thread(builder.inttoptr(thread, python.voidptr))
+        return context.get_dummy_value()
 
-    def fail(_context: Any) -> Any:
-        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
-            _raise(builder, context.get_python_api(builder), "RuntimeError", f"{function.name} raised an error")
-            return _WORD(0)
-
-        return types.int64(), generate
-
-    def unlock(_context: Any) -> Any:
-        def generate(context: Any, builder: Any, _signature: Any, _values: Any) -> Any:
-            return builder.ptrtoint(context.get_python_api(builder).save_thread(), _WORD) if nogil else _WORD(0)
-
-        return types.int64(), generate
-
-    def lock(_context: Any, thread: Any) -> Any:
-        def generate(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
-            if nogil:
-                python = context.get_python_api(builder)
-                python.restore_thread(builder.inttoptr(values[0], python.voidptr))
-            return context.get_dummy_value()
-
-        return types.void(thread), generate
-
-    take_all: Any = intrinsic(take)
-    give_all: Any = intrinsic(give)
-    refused: Any = intrinsic(ask)
-    failed: Any = intrinsic(fail)
-    unlocked: Any = intrinsic(unlock)
-    locked: Any = intrinsic(lock)
+    arguments_of, object_of = _with_argument(kinds, from_objects), _with_argument(to_be_object, to_object)
+    refused, failed = _without_argument(types.boolean, is_refused), _without_argument(types.int64, fail)
+    released, taken = _without_argument(types.int64, release_lock), _with_argument(types.void, take_lock)
 
     @cfunc(types.int64(types.int64))
     def entry(objects: int) -> Any:
-        values = take_all(objects)
+        values = arguments_of(objects)
         if refused():
             return 0
-        thread = unlocked()
+        thread = released()
         try:
-            result = called(*values)
+            returned = called(*values)
         except Exception:
-            locked(thread)
+            taken(thread)
             return failed()
-        locked(thread)
-        return give_all(result)
+        taken(thread)
+        return object_of(returned)
 
     return entry.inspect_llvm(), results[-1]
+
+
+def _without_argument(returned: Any, generate: Callable[..., Any]) -> Any:
+    """Return a function for compiled functions.
+
+    Args:
+        returned: Type of what it returns.
+        generate: Makes its code, of context, builder and Python's interface, and returns the value.
+    """
+
+    def typed(_context: Any) -> Any:
+        return returned(), lambda context, builder, *_: generate(context, builder, context.get_python_api(builder))
+
+    made: Any = intrinsic(typed)
+    return made
+
+
+def _with_argument(returned: Any, generate: Callable[..., Any]) -> Any:
+    """Return the same with an argument, of which ``generate`` is given type and value as well.
+
+    ``returned``: returns the signature, for the type of the argument.
+    """
+
+    def typed(_context: Any, given: Any) -> Any:
+        def code(context: Any, builder: Any, _signature: Any, values: Any) -> Any:
+            return generate(context, builder, context.get_python_api(builder), given, values[0])
+
+        return returned(given), code
+
+    made: Any = intrinsic(typed)
+    return made
 
 
 def _raise(builder: Any, python: Any, error: str, text: str) -> None:

@@ -5,7 +5,8 @@ To import numba and to prepare it for its first function takes more processor ti
 call from Python, for the types of arguments with which they call them (:mod:`hsv.ahead_of_time`). A function of
 :func:`njit` that is called with such arguments is taken from there, and numba is not imported
 (:mod:`hsv.precompiled`). With any other arguments, without that library, after a change of a source or on another kind
-of processor it is numba's, as with its own ``njit``. Both are the same machine code, with the same bits.
+of processor it is numba's, as with its own ``njit``. Both are compiled from the same source with the same options, and
+a test compares the bits of flights.
 """
 
 from __future__ import annotations

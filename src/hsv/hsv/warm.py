@@ -21,6 +21,9 @@ from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario
 
+_PROCESSES = 4
+"""At most: each takes half a gigabyte of memory, and the largest function a fifth of the time of all."""
+
 
 def warm() -> None:
     """Step every component and fly every compiled loop once."""
@@ -46,7 +49,7 @@ if __name__ == "__main__":
     try:
         reason = why_none()
         if not reason:
-            build(calls, len(os.sched_getaffinity(0)))
+            build(calls, min(_PROCESSES, os.cpu_count() or 1))
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only the start of commands and nodes takes longer.
         reason = str(getattr(error, "stderr", None) or error)

@@ -12,7 +12,7 @@ from hsv.campaign.store import ResultStore
 from hsv.campaign.table import fly_batch, schema, seconds_of, time_flight
 
 _LATE = 30.0
-"""Seconds from which on nobody waits for the first batches to be told what is to come."""
+"""Seconds: where a batch takes longer, the announcement does not wait for the first batches."""
 
 
 def run_campaign(

@@ -13,7 +13,8 @@ def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.nda
         B: (n, m) continuous-time input matrix; the columns may be any inputs, disturbances too.
         period: Sampling period (s).
     """
-    from scipy.linalg import expm  # takes tube_mpc, which hardly discretises, longer than all else that it imports
+    # Here, because tube_mpc imports this module without using it, and scipy.linalg takes longer than all else.
+    from scipy.linalg import expm
 
     n, m = B.shape
     block = np.zeros((n + m, n + m))
