@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 
 from hsv_setup.console import Stage
@@ -47,19 +46,16 @@ def is_current() -> bool:
     return not _PROGRAM.exists() or (read_stamp(_STAMP) == _key() and bool(_caches()))
 
 
-@contextmanager
-def warming(env: Mapping[str, str], stage: Stage) -> Iterator[None]:
-    """Compile everything that is outdated once, as `python -m hsv.warm` does it, beside what is done in the block.
+def warm(env: Mapping[str, str], stage: Stage) -> None:
+    """Compile everything that is outdated once, as `python -m hsv.warm` does it.
 
     Raises:
         SetupError: the numerical code does not compile.
     """
     if is_current():
-        yield
         return
     for path in _caches():
         path.unlink()
     paths = [str(_LIBRARY.parent), *filter(None, [env.get("PYTHONPATH")])]
-    with stage.running([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)}):
-        yield
+    stage.run([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)})
     write_stamp(_STAMP, _key())

@@ -6,7 +6,7 @@ import re
 import shlex
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from hsv_setup.bytecode import compile_packages
@@ -39,8 +39,8 @@ def is_current(route: Route, python: Interpreter) -> bool:
     return made_for and read_stamp(_CONTENTS) == contents(route) and PYTHON.exists()
 
 
-def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: Stage) -> None:
-    """Make the environment, or bring the existing one up to date.
+def install_for_build(route: Route, python: Interpreter, env: Mapping[str, str], stage: Stage) -> None:
+    """Make the environment, or bring the existing one up to date, as far as the workspace needs it to be built.
 
     Raises:
         SetupError: venv or pip failed.
@@ -54,20 +54,32 @@ def install(route: Route, python: Interpreter, env: Mapping[str, str], stage: St
         write_stamp(_ROUTE, route.name)
     _CONTENTS.unlink(missing_ok=True)
 
-    pip: list[str | Path] = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
-    # Compiled below, on all cores.
-    pip += ["--no-compile", "--progress-bar", "off"]
-    pinned = ["--constraint", route.constraints]
     if route.wheels:
         # First, because empy comes as source only and is built with this pinned setuptools, not with the newest.
-        stage.run([*pip, *pinned, "setuptools"], env)
-    named = [option for name in route.requirements for option in ("--requirement", name)]
-    stage.run([*pip, *pinned, "--use-pep517", "--no-build-isolation", *named], env, _pip_progress)
-    compile_packages(PYTHON, env, stage)
+        _install(route, ["setuptools"], env, stage)
+    _install(route, ["--requirement", route.requirements[0]], env, stage)
     if route.wheels:
         relocate(VENV, python.include, _numpy_include(env))
         _install_ros2_command()
+
+
+def install_rest(route: Route, env: Mapping[str, str], stage: Stage) -> None:
+    """Install what else there is; of what is there nothing changes, so that the workspace may be built meanwhile.
+
+    Raises:
+        SetupError: pip failed.
+    """
+    for name in route.requirements[1:]:
+        _install(route, ["--requirement", name], env, stage)
     write_stamp(_CONTENTS, contents(route))
+
+
+def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
+    pip: list[str | Path] = [PYTHON, "-m", "pip", "--disable-pip-version-check", "--no-input", "install"]
+    # Compiled below, on all cores.
+    pip += ["--no-compile", "--progress-bar", "off", "--constraint", route.constraints]
+    stage.run([*pip, "--use-pep517", "--no-build-isolation", *wanted], env, _pip_progress)
+    compile_packages(PYTHON, env, stage)
 
 
 def _discard() -> None:

@@ -49,27 +49,30 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
         checks.require(route, python, env)
         return
     with _alone():
-        if not environment.is_current(route, python):
+        incomplete = not environment.is_current(route, python)
+        if incomplete:
             checks.require(route, python, env)
-            stage = Stage(f"[1/3] Python {python.version_text} environment and packages", "packages")
-            environment.install(route, python, env, stage)
-            stage.done("installed in .venv")
+            packages = Stage(f"[1/3] Python {python.version_text} environment and packages", "packages")
+            environment.install_for_build(route, python, env, packages)
         wanted = workspace.outdated(route)
-        compiling = not (bytecode.sources_are_current() and compiled.is_current())
+        rebuilding = bool(wanted or workspace.removed())
         with ExitStack() as beside:
-            if compiling:
-                caches = Stage("[2/3] Compiled caches", "compile")
-                # The numerical code needs no package of the workspace to be built, and one core each is enough.
-                beside.enter_context(compiled.warming(env, caches))
-            if wanted or workspace.removed():
+            if rebuilding:
                 checks.require(route, python, env)
-                stage = Stage("[3/3] Workspace", "build")
-                workspace.build(route, wanted, env, stage)
-                stage.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
-        if compiling:
-            completion.write(environment.PYTHON, env, caches)
-            bytecode.compile_sources(environment.PYTHON, env, caches)
-            caches.done("byte code and numerical code compiled")
+                built = Stage("[2/3] Workspace", "build")
+                # Neither other packages nor the numerical code need the workspace, and one core each is enough.
+                beside.enter_context(workspace.building(route, wanted, env, built))
+            if incomplete:
+                environment.install_rest(route, env, packages)
+                packages.done("installed in .venv")
+            if not (bytecode.sources_are_current() and compiled.is_current()):
+                caches = Stage("[3/3] Compiled caches", "compile")
+                compiled.warm(env, caches)
+                completion.write(environment.PYTHON, env, caches)
+                bytecode.compile_sources(environment.PYTHON, env, caches)
+                caches.done("byte code and numerical code compiled")
+        if rebuilding:
+            built.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
     print(f"Set up ({time.monotonic() - start:.1f} s). To use it in this shell: source env.sh", flush=True)
 
 

@@ -40,6 +40,7 @@ class Route:
 
     name: str
     requirements: tuple[str, ...]
+    """Files of requirements: what the workspace is built with first, then what is installed beside that build."""
     constraints: str
     system_site_packages: bool
     """Whether the virtual environment sees the system's rclpy."""

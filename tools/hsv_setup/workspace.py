@@ -12,6 +12,7 @@ import os
 import shutil
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,8 +108,9 @@ def removed() -> list[str]:
     return sorted(marker.name for marker in markers if marker.name not in names)
 
 
-def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage: Stage) -> None:
-    """Build packages, and take away what removed ones left behind.
+@contextmanager
+def building(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage: Stage) -> Iterator[None]:
+    """Build packages beside what is done in the block, and take away what removed ones left behind.
 
     Raises:
         SetupError: colcon failed.
@@ -117,6 +119,7 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
         shutil.rmtree(INSTALL / name)
         shutil.rmtree(BUILD / name, ignore_errors=True)
     if not wanted:
+        yield
         return
     keys = {package: package.key(route) for package in wanted}
     for package in wanted:
@@ -136,7 +139,10 @@ def build(route: Route, wanted: Sequence[Package], env: Mapping[str, str], stage
     command += ["--packages-select", *(package.name for package in wanted)]
     command += ["--cmake-args", "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", f"-DPython3_EXECUTABLE={PYTHON}"]
     try:
-        stage.run(command, {**env, **own}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages")
+        with stage.running(
+            command, {**env, **own}, lambda log: f"{log.count('Finished <<<')} of {len(wanted)} packages"
+        ):
+            yield
     finally:
         for package, key in keys.items():
             _simplify_scripts(package)

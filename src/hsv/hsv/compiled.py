@@ -52,10 +52,12 @@ class CompiledFunction:
             for name in EXTENSIONS:
                 import_module(name)
             compile_with = import_module("numba").njit
+            # The wrapper by which C would call it takes a tenth of the time to compile, and nobody does.
+            options = self.targetoptions | {"no_cfunc_wrapper": True}
             try:
-                self._dispatcher = compile_with(**self.targetoptions)(self.py_func)
+                self._dispatcher = compile_with(**options)(self.py_func)
             except RuntimeError:  # there is no folder to keep what is compiled in
-                self._dispatcher = compile_with(**self.targetoptions | {"cache": False})(self.py_func)
+                self._dispatcher = compile_with(**options | {"cache": False})(self.py_func)
         return self._dispatcher
 
     @property
