@@ -1,5 +1,7 @@
 """Flights side by side: each has the bits that it has alone, whatever flies in the other lanes."""
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 from flights import components
@@ -72,7 +74,7 @@ COMMAND_FAULTS = (
 def test_faults_on_the_command_begin_and_act_in_each_lane_on_their_own():
     changes = [
         {"seed": 100 + i, "fault__starts": [2.0 + 0.5 * i], "fault__types": [kind], "fault__parameters": [text]}
-        for i, (kind, text) in enumerate(COMMAND_FAULTS[:WIDTH])
+        for i, (kind, text) in zip(range(WIDTH), cycle(COMMAND_FAULTS), strict=False)
     ]
     flown = check([components("case1", duration=12.0, **change) for change in changes])
     assert len({own.fingerprint for own in flown}) == WIDTH
@@ -83,7 +85,7 @@ def test_beginnings_references_and_factors_of_the_gain_may_differ():
         components(
             "case2",
             duration=30.0,
-            feedback__tau=[0.9 + 0.01 * i],
+            feedback__tau=[0.9 + 0.005 * i],
             initial__altitude=26060.4 + i,
             reference__times=[0.0, 10.0 + i],
             reference__altitudes=[26100.0, 26243.28],
@@ -110,9 +112,9 @@ def test_flights_of_different_lengths_or_designs_are_not_taken():
 @pytest.mark.parametrize("groups", [1, 3])
 def test_a_campaign_flies_its_samples_as_each_alone(groups, monkeypatch):
     monkeypatch.setattr(sample_runner, "_GROUPS", groups)
-    campaign = plan("case2", method="sobol", samples=16, factors={"tube.tau": (0.9, 1.0)})
+    campaign = plan("case2", method="sobol", samples=2 * WIDTH, factors={"tube.tau": (0.9, 1.0)})
     runner = SampleRunner(campaign)
-    flights = range(16)
+    flights = range(2 * WIDTH)
     samples, _ = runner.sampler.draw(flights)
     for flight, sample, flown in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
         alone = runner.fly(flight, sample)

@@ -29,7 +29,7 @@ class LaneArray:
 
     @classmethod
     def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
-        """Return as many lanes of zeros as this processor computes at once."""
+        """Return zeros, as many lanes as there are flights side by side."""
         from hsv.lane_types import WIDTH  # imports numba
 
         return cls(np.zeros((*((shape,) if isinstance(shape, int) else shape), WIDTH)))

@@ -8,7 +8,7 @@ from typing import Any
 from numba.extending import overload
 
 from hsv.lane_types import (
-    WIDTH,
+    REGISTER,
     LaneArrayType,
     LanesType,
     MaskType,
@@ -95,7 +95,7 @@ def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
 
         def of_numbers(weights: Any, rows: Any, total: Any) -> None:
             size = rows.shape[1]
-            for e in range(0, size, WIDTH):
+            for e in range(0, size, REGISTER):
                 some = 0.0
                 for r in range(len(rows)):
                     some += weights[r] * neighbours(rows, r * size + e)

@@ -21,8 +21,11 @@ from numba.extending import NativeValue, intrinsic, models, register_model, type
 
 from hsv.lane_arrays import LaneArray, LaneRecord
 
-WIDTH = 8 if binding.get_host_cpu_features().get("avx512f") else 4
-"""Lanes that this processor computes at once."""
+REGISTER = 8 if binding.get_host_cpu_features().get("avx512f") else 4
+"""Numbers that a vector register of this processor holds."""
+
+WIDTH = 2 * REGISTER
+"""Lanes of flights side by side, of two registers: while one waits for its last result, the other one is computed."""
 
 
 class LanesType(types.Type):
@@ -426,33 +429,33 @@ def with_lane(typing_context: Any, value: Any, index: Any, number: Any) -> Any:
 
 
 def _beginning(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
-    """Return the address of :data:`WIDTH` numbers of a contiguous array, from the flat index ``start`` on."""
+    """Return the address of :data:`REGISTER` numbers of a contiguous array, from the flat index ``start`` on."""
     data = builder.gep(context.make_array(kind)(context, builder, array).data, [start])
-    return builder.bitcast(data, _vector(_DOUBLE, WIDTH).as_pointer())
+    return builder.bitcast(data, _vector(_DOUBLE, REGISTER).as_pointer())
 
 
 @_intrinsic
 def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
-    """Return :data:`WIDTH` numbers of a contiguous array of float64 as lanes, from the flat index ``start`` on."""
+    """Return :data:`REGISTER` numbers of a contiguous array of float64 as lanes, from the flat index ``start`` on."""
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         load = builder.load(_beginning(context, builder, called.args[0], *arguments))
         load.align = 8
         return load
 
-    return LanesType(WIDTH)(array, types.intp), generate
+    return LanesType(REGISTER)(array, types.intp), generate
 
 
 @_intrinsic
 def write_neighbours(typing_context: Any, array: Any, start: Any, value: Any) -> Any:
-    """Write lanes to :data:`WIDTH` numbers of a contiguous array of float64, from the flat index ``start`` on."""
+    """Write lanes to :data:`REGISTER` numbers of a contiguous array of float64, from the flat index ``start`` on."""
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         given, place, lanes = arguments
         builder.store(lanes, _beginning(context, builder, called.args[0], given, place)).align = 8
         return context.get_dummy_value()
 
-    return types.none(array, types.intp, LanesType(WIDTH)), generate
+    return types.none(array, types.intp, LanesType(REGISTER)), generate
 
 
 @_intrinsic

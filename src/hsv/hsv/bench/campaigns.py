@@ -14,7 +14,7 @@ from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
 from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
-from hsv.lane_types import WIDTH
+from hsv.lane_types import REGISTER, WIDTH
 from hsv.sha256_lanes import LANES
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
@@ -82,7 +82,7 @@ def corners(repeats: int, workers: int) -> list[Figure]:
                 theirs.append(time.perf_counter() - started)
     what = f"1024 corners of Case 1, {workers} workers"
     against = f"as many flights of the C build, {' '.join(FLAGS)}, alone on as many workers"
-    limit, goal = (0.4, None) if WIDTH == 8 else (0.6, 0.35)
+    limit, goal = (0.4, None) if REGISTER == 8 else (0.6, 0.35)
     return [
         Figure("corners", f"{what}, their start included", "", "s", (first,), (), "most", 15.0),
         Figure(

@@ -11,7 +11,7 @@ import numpy as np
 from hsv.bench.figure import Figure
 from hsv.bench.operations import operations_per_step
 from hsv.compiled import njit_in_flight
-from hsv.lane_types import WIDTH
+from hsv.lane_types import REGISTER, WIDTH
 from hsv.lanes import LaneArray
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.history import BESIDE, FLOWN
@@ -43,8 +43,8 @@ def multiply_and_add(x: Any, factor: float, term: float, rounds: int) -> None:
 
 def operation_rate() -> float:
     """Return the additions and multiplications a second of one core, each rounded, all lanes of its vectors."""
-    x: Any = LaneArray.zeros(_CHAINS)
-    return 2 * _CHAINS * WIDTH * _ROUNDS / _seconds(lambda: multiply_and_add(x, 0.5, 1.0, _ROUNDS))
+    x: Any = LaneArray(np.zeros((_CHAINS, REGISTER)))
+    return 2 * _CHAINS * REGISTER * _ROUNDS / _seconds(lambda: multiply_and_add(x, 0.5, 1.0, _ROUNDS))
 
 
 def copy_rate() -> float:
@@ -65,7 +65,7 @@ def against_roofline(repeats: int) -> list[Figure]:
     flown = assemble_flight(load_scenario("case1"))
     group, side_by_side = FlightGroup(flown.plant.steps), [flown] * WIDTH
     operations, steps = operations_per_step(), flown.plant.steps + 1
-    multiply_and_add(LaneArray.zeros(_CHAINS), 0.5, 1.0, 1)
+    multiply_and_add(LaneArray(np.zeros((_CHAINS, REGISTER))), 0.5, 1.0, 1)
     group.fly(side_by_side)
     ours, limits, seconds = [], [], []
     for _ in range(repeats):

@@ -1,4 +1,4 @@
-"""Flights that differ little, as many at a time as this processor computes at once: each with the bits it has alone."""
+"""Flights that differ little, several at a time in vector registers: each with the bits that it has alone."""
 
 from __future__ import annotations
 
