@@ -28,7 +28,7 @@ def main() -> None:
     from hsv.simulation.closed_loop import fly
     from hsv.simulation.scenario import load_scenario
 
-    compiled.observer = lambda function, arguments: None  # numba compiles all
+    compiled.instead = lambda function, arguments, named: function.dispatcher(*arguments, **named)  # numba compiles all
     scenario = load_scenario("case2").model_copy(update={"duration": 120.0})
     fly(assemble_flight(scenario))
     step_by_step(assemble_flight(scenario.model_copy(update={"duration": 0.1})))

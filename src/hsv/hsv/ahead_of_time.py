@@ -1,8 +1,9 @@
 """Compiles functions ahead of time, for :mod:`hsv.precompiled`: a library that is called without numba.
 
-While functions are called from Python in :func:`recording`, it is noted with which types of arguments. For each of
-these, numba compiles an entry that takes the arguments from a tuple of Python's objects, calls the function as compiled
-functions do, and returns an object. The entries become one shared library, with ``run_time.c``.
+While functions are called from Python in :func:`recording`, it is noted with which types of arguments; they are not
+compiled meanwhile. For each of these, numba compiles an entry that takes the arguments from a tuple of Python's objects,
+calls the function as compiled functions do, and returns an object. The entries become one shared library, with
+``run_time.c``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -48,46 +50,66 @@ _nothing = ctypes.c_char()
 # To be linked here as well, where entries are not called.
 binding.add_symbol("hsv_array", ctypes.addressof(_nothing))
 
-Calls = dict[tuple[str, tuple[str, ...]], tuple[CompiledFunction, tuple[Any, ...]]]
-"""Functions and numba's types of arguments, by the function's name and the types as the index names them."""
+Compiled = tuple[str, Result] | None
+"""Code of an entry and what it returns, or nothing where that cannot be handed over."""
+
+Calls = dict[tuple[str, tuple[str, ...]], Callable[[], Compiled]]
+"""What returns an entry, by the function's name and the types of arguments as the index names them."""
 
 
 @contextmanager
-def recording() -> Iterator[Calls]:
-    """Yield the calls from Python within the block that can be compiled ahead of time."""
+def recording(processes: int = 1) -> Iterator[Calls]:
+    """Yield the calls from Python within the block that can be compiled ahead of time.
+
+    These run as Python, and what they call in turn; other calls are compiled by numba. Where there are to be several
+    ``processes``, these compile the entries meanwhile, and the block ends when they have.
+    """
     calls: Calls = {}
+    noted = False
 
-    def note(function: CompiledFunction, arguments: tuple[Any, ...]) -> None:
-        if "<locals>" in function.name:
-            return  # functions that are made in a function share this name
+    def call(function: CompiledFunction, arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
+        nonlocal noted
+        if noted:
+            return function.py_func(*arguments, **named)
         try:
-            key = function.name, types_of(arguments)
+            # Functions that are made in a function share its name.
+            key = None if named or "<locals>" in function.name else (function.name, types_of(arguments))
         except NotAheadOfTimeError:
-            return
+            key = None
+        if key is None:
+            return function.dispatcher(*arguments, **named)
         if key not in calls:
-            calls[key] = function, tuple(map(typeof, arguments))
+            kinds = tuple(map(typeof, arguments))
+            calls[key] = (
+                pool.submit(_entry_if_any, function, kinds).result if pool else partial(_entry_if_any, function, kinds)
+            )
+        noted = True
+        try:
+            with np.errstate(all="ignore"):  # as in compiled functions
+                return function.py_func(*arguments)
+        finally:
+            noted = False
 
-    compiled.observer = note
-    try:
-        yield calls
-    finally:
-        compiled.observer = None
+    with ProcessPoolExecutor(processes, get_context("spawn")) if processes > 1 else nullcontext() as pool:
+        compiled.instead = call
+        try:
+            yield calls
+        finally:
+            compiled.instead = None
 
 
-def build(calls: Calls, processes: int = 1) -> int:
+def build(calls: Calls) -> int:
     """Compile ``calls`` into the library that :mod:`hsv.precompiled` takes functions from; return for how many it did.
 
-    Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced. With
-    more ``processes`` than one, each of these compiles some of them.
+    Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced.
 
     Raises:
         OSError, subprocess.CalledProcessError: There is no C compiler to link with, or no place for the library.
     """
     functions: dict[str, list[tuple[tuple[str, ...], str, Result]]] = {}
     library = binding.parse_assembly("")
-    with ProcessPoolExecutor(processes, get_context("spawn")) if processes > 1 else nullcontext() as pool:
-        entries = [*(pool.map if pool else map)(_entry_if_any, *zip(*calls.values(), strict=True))] if calls else []
-    for number, ((name, key), entry) in enumerate(zip(calls, entries, strict=True)):
+    for number, ((name, key), compile_entry) in enumerate(calls.items()):
+        entry = compile_entry()
         if entry is None:
             continue
         symbol, (code, result) = f"hsv_{number}", entry
@@ -149,7 +171,7 @@ def _replace(path: Path, content: bytes) -> None:
     temporary.replace(path)
 
 
-def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result] | None:
+def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...]) -> Compiled:
     try:
         return _entry(function, arguments)
     except NumbaError:

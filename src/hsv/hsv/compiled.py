@@ -27,8 +27,8 @@ ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-observer: Callable[[CompiledFunction, tuple[Any, ...]], None] | None = None
-"""Told of every call from Python while functions are to be compiled ahead of time; numba is used then."""
+instead: Callable[[CompiledFunction, tuple[Any, ...], dict[str, Any]], Any] | None = None
+"""Given every call, and returns what it returns, while it is found out what to compile ahead of time."""
 
 
 class CompiledFunction:
@@ -66,9 +66,9 @@ class CompiledFunction:
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Return what the function returns."""
-        if observer is not None:
-            observer(self, arguments)
-        elif self._dispatcher is None and not named:
+        if instead is not None:
+            return instead(self, arguments, named)
+        if self._dispatcher is None and not named:
             # Once numba is there for it, it decides by the types of the arguments faster.
             entry = entry_for(self.name, arguments)
             if entry:
@@ -77,9 +77,9 @@ class CompiledFunction:
 
     def compiled_for(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
         """Return what is called in the end with arguments of the types of these, which are all of them."""
-        if observer is not None:
-            observer(self, arguments)
-        elif self._dispatcher is None:
+        if instead is not None:
+            return self
+        if self._dispatcher is None:
             entry = entry_for(self.name, arguments)
             if entry:
                 return entry

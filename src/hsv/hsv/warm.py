@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from concurrent.futures import BrokenExecutor
 from dataclasses import replace
 from typing import Any
 
@@ -44,14 +45,15 @@ def warm() -> None:
 
 
 if __name__ == "__main__":
-    with recording() as calls:
-        warm()
+    reason = why_none()
     try:
-        reason = why_none()
         if not reason:
-            build(calls, min(_PROCESSES, os.cpu_count() or 1))
-    except (OSError, subprocess.CalledProcessError, AttributeError) as error:
-        # No compiler to link with, or a llvmlite before 0.44: only the start of commands and nodes takes longer.
+            with recording(min(_PROCESSES, os.cpu_count() or 1)) as calls:
+                warm()
+            build(calls)
+    except (OSError, subprocess.CalledProcessError, AttributeError, BrokenExecutor) as error:
+        # No compiler to link with, a llvmlite before 0.44, or no memory: only the start of commands and nodes takes longer.
         reason = str(getattr(error, "stderr", None) or error)
     if reason:
         print(f"python -m hsv.warm: nothing compiled ahead of time: {reason}", file=sys.stderr)
+        warm()  # by numba alone
