@@ -1,8 +1,8 @@
 """Compiles functions ahead of time, for :mod:`hsv.precompiled`: a library that is called without numba.
 
 While functions are called from Python in :func:`recording`, where they are not compiled, it is noted with which types
-of arguments. For each of these, numba compiles an entry that takes the arguments from a tuple of Python's objects, calls
-the function as compiled functions do, and returns an object. The entries become one shared library, with
+of arguments. For each of these, numba compiles an entry that takes the arguments from a tuple of Python's objects,
+calls the function as compiled functions do, and returns an object. The entries become one shared library, with
 ``run_time.c``.
 """
 

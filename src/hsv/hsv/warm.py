@@ -52,7 +52,7 @@ if __name__ == "__main__":
                 warm()
             build(calls)
     except (OSError, subprocess.CalledProcessError, AttributeError, BrokenExecutor) as error:
-        # No compiler to link with, a llvmlite before 0.44, no memory: only the start of commands and nodes takes longer.
+        # No compiler to link with, a llvmlite before 0.44, no memory: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)
     if reason:
         print(f"python -m hsv.warm: nothing compiled ahead of time: {reason}", file=sys.stderr)
