@@ -98,6 +98,15 @@ def test_arguments_and_results_of_all_kinds_are_those_of_numba(index):
     assert np.array_equal(given[0], changed[0])  # written in place
 
 
+def test_what_is_recorded_is_not_compiled_meanwhile(index):
+    text._dispatcher = remainder._dispatcher = None
+    with ahead_of_time.recording() as calls:
+        assert remainder(7, 2) == 3 and text(5) == "5" and remainder(7, b=2) == 3
+    assert [name.rpartition(".")[2] for name, _ in calls] == ["remainder", "text"]
+    assert text._dispatcher is None and remainder._dispatcher is not None  # a named argument is numba's
+    remainder._dispatcher = None
+
+
 def test_an_error_of_python_is_raised_and_inlined_functions_are_called(index):
     built((remainder, 7, 2))
     assert remainder(-7, 2) == -4
