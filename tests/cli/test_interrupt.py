@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,18 +15,6 @@ from ros_domain import own_environment
 from hsv.cli.main import EXIT_CODES
 
 INTERRUPTED = next(code for code, meaning in EXIT_CODES.items() if meaning == "interrupted")
-
-SWALLOWED = {
-    "finaliser": """
-class Closed:
-    def __del__(self): signal.raise_signal(signal.SIGINT)
-Closed()
-""",
-    "callback of a library": """
-ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
-""",
-}
-"""Programs that are interrupted where Python only reports an exception, and goes on."""
 
 DESIGNS = Path(__file__).parents[2] / "offline_design"
 
@@ -93,13 +80,3 @@ def test_ctrl_c_is_one_line_and_leaves_no_process(tmp_path, words, delay) -> Non
         assert said[-1].startswith("hsv: error: interrupted")
         assert not [line for line in said if "Traceback" in line or "KeyboardInterrupt" in line]
         assert left_of(mark) == []
-
-
-@pytest.mark.parametrize("program", SWALLOWED.values(), ids=SWALLOWED)
-def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
-    begin = "import ctypes, signal\nfrom hsv.cli.interruption import take_interrupts\ntake_interrupts()"
-    # Lost for good, it would be waited for in vain: ten seconds of processor time end that.
-    end = "signal.setitimer(signal.ITIMER_PROF, 10.0)\nwhile True: pass"
-    ran = subprocess.run([sys.executable, "-c", f"{begin}{program}{end}"], capture_output=True, text=True)
-    assert ran.returncode == -signal.SIGINT, ran.stderr
-    assert ran.stderr.splitlines()[-1] == "KeyboardInterrupt" and "ignored" not in ran.stderr

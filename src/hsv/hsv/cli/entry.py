@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from hsv.cli.interruption import take_interrupts
+from hsv.interruption import take_interrupts
 
 
 def main() -> None:

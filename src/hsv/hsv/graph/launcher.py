@@ -31,6 +31,7 @@ from hsv.graph.description import (
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
+from hsv.interruption import uninterrupted
 
 GRACE = 20.0
 """Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
@@ -219,6 +220,7 @@ class Launcher:
             if process.reader:
                 process.reader.join(1.0)
 
+    @uninterrupted
     def _start(self, description: NodeDescription, path: Path) -> None:
         command = [str(path), "--ros-args", *self._arguments]
         if description in (*_FLYING, RECORDER):

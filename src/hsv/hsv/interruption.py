@@ -1,18 +1,34 @@
-"""Ctrl-C, and being asked to end: an exception, but not in the middle of an import."""
+"""Ctrl-C, and being asked to end: an exception, but not in the middle of an import or of what has to be whole."""
 
 from __future__ import annotations
 
 import signal
 import sys
-from types import FrameType
-from typing import Any
+from collections.abc import Callable
+from types import CodeType, FrameType
+from typing import Any, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 _LATER = 0.02
 """Seconds after which it is tried once more where nothing could be raised, or what was raised was swallowed."""
 
+_WHOLE: set[CodeType] = set()
+"""What is not interrupted before it is finished."""
+
+
+def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
+    """Let an interruption of ``function``, a short one, come when it has returned.
+
+    A process that is started is then known to who is to end it, whenever Ctrl-C comes.
+    """
+    _WHOLE.add(function.__code__)
+    return function
+
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise ``KeyboardInterrupt``, at once or as soon as the current import is finished.
+    """Raise ``KeyboardInterrupt``, at once or as soon as the current import or uninterrupted function is finished.
 
     A compiled module that is interrupted fails to load with an error of its own, and a callback of the import system
     swallows the exception. A handler of signals. The timer lives on in a program in the place of this one:
@@ -22,7 +38,7 @@ def interrupt(number: int, frame: FrameType | None) -> None:
         KeyboardInterrupt: Always, now or later.
     """
     while frame is not None:
-        if frame.f_code.co_filename.startswith("<frozen importlib"):
+        if frame.f_code in _WHOLE or frame.f_code.co_filename.startswith("<frozen importlib"):
             signal.setitimer(signal.ITIMER_REAL, _LATER)
             return
         frame = frame.f_back
