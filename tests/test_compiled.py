@@ -1,6 +1,7 @@
 """Functions compiled ahead of time do what numba's do, and are used where they are current."""
 
 import json
+import multiprocessing
 import os
 import pickle
 import subprocess
@@ -10,8 +11,9 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from hsv import ahead_of_time, precompiled
+from hsv import ahead_of_time, compiled, precompiled
 from hsv.compiled import CompiledFunction, bound, njit
+from hsv.elementary import arcsine, exponential, tangent
 from hsv.precompiled import NotAheadOfTimeError, types_of
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly, fly_loop
@@ -105,6 +107,24 @@ def test_what_is_recorded_is_not_compiled_meanwhile(index):
     assert [name.rpartition(".")[2] for name, _ in calls] == ["remainder", "text"]
     assert text._dispatcher is None and remainder._dispatcher is not None  # a named argument is numba's
     remainder._dispatcher = None
+
+
+def test_entries_of_several_processes_are_those_of_one(index):
+    def entries(processes):
+        with ahead_of_time.recording(processes) as calls:
+            assert exponential(0.0) == 1.0 and tangent(0.0) == arcsine(0.0) == 0.0
+        return {key: compile_entry()[1] for key, compile_entry in calls.items()}
+
+    alone = entries(1)
+    assert [name for name, _ in alone] == [f"hsv.elementary.{each}" for each in ("exponential", "tangent", "arcsine")]
+    assert list(entries(2).items()) == list(alone.items())
+
+
+def test_an_error_meanwhile_ends_what_compiles(index):
+    with pytest.raises(ValueError, match="stop"), ahead_of_time.recording(2) as calls:
+        exponential(0.0)
+        raise ValueError("stop")
+    assert multiprocessing.active_children() == [] and compiled.instead is None and len(calls) == 1
 
 
 def test_an_error_of_python_is_raised_and_inlined_functions_are_called(index):

@@ -148,16 +148,17 @@ def _sum(weights, rows, total):
 @pytest.mark.parametrize("blocks", [0, 1, 3])
 def test_a_weighted_sum_has_the_bits_of_sums_in_the_order_of_the_rows(blocks):
     drawn = np.random.default_rng(5)
-    rows = drawn.standard_normal((7, blocks * WIDTH)) * 10.0 ** drawn.integers(-9, 9, (7, blocks * WIDTH))
+    size = blocks * lanes.BLOCK
+    rows = drawn.standard_normal((7, size)) * 10.0 ** drawn.integers(-9, 9, (7, size))
     weights = drawn.standard_normal((7, WIDTH))
     rows[:, :1], weights[:, 0] = -0.0, 1.0  # the sum of zeros below zero is zero
-    expected = np.empty((rows.shape[1], WIDTH))
+    expected = np.empty((size, WIDTH))
     for flight in range(WIDTH):
         lanes.weighted_sum(weights[:, flight], rows, expected[:, flight])
-        alone = np.empty(rows.shape[1])
+        alone = np.empty(size)
         _sum(np.ascontiguousarray(weights[:, flight]), rows, alone)
         assert alone.tobytes() == expected[:, flight].tobytes()
-    together = LaneArray.zeros(rows.shape[1])
+    together = LaneArray.zeros(size)
     _sum(LaneArray(weights), rows, together)
     assert together.array.tobytes() == expected.tobytes()
 

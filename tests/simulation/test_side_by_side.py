@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from flights import components
 
-from hsv.campaign import sample_runner
 from hsv.campaign.campaign import plan
 from hsv.campaign.sample_runner import SampleRunner
 from hsv.campaign.tube_levels import TubeLevels
@@ -109,9 +108,7 @@ def test_flights_of_different_lengths_or_designs_are_not_taken():
     assert not FlightGroup.takes([first])
 
 
-@pytest.mark.parametrize("groups", [1, 3])
-def test_a_campaign_flies_its_samples_as_each_alone(groups, monkeypatch):
-    monkeypatch.setattr(sample_runner, "_GROUPS", groups)
+def test_a_campaign_flies_its_samples_as_each_alone():
     campaign = plan("case2", method="sobol", samples=2 * WIDTH, factors={"tube.tau": (0.9, 1.0)})
     runner = SampleRunner(campaign)
     flights = range(2 * WIDTH)

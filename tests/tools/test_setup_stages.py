@@ -1,12 +1,24 @@
 """Commands that set-up runs, and the paths that it rewrites."""
 
+import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from hsv_setup import console
 from hsv_setup.console import SetupError, Stage
 from hsv_setup.relocate import relocate
+
+SLOW = [sys.executable, "-u", "-c", "import os, time; print('process', os.getpid()); time.sleep(60); print('done')"]
+FAILING = [sys.executable, "-c", "import sys; print('reason'); sys.exit(3)"]
+
+
+def runs(stage):
+    """Tell whether the process of SLOW, which its log names, runs; if it has begun at all."""
+    begun = [line.split()[1] for line in stage.log.read_text().splitlines() if line.startswith("process ")]
+    return any(Path("/proc", number).exists() for number in begun)
 
 
 @pytest.fixture
@@ -18,7 +30,7 @@ def stage(tmp_path, monkeypatch):
 
 def test_a_failed_command_is_quoted_with_its_log(stage):
     with pytest.raises(SetupError) as failure:
-        stage.run([sys.executable, "-c", "import sys; print('reason'); sys.exit(3)"], env={})
+        stage.run(FAILING, env={})
     assert "'Trial' failed (exit code 3)" in str(failure.value)
     assert "    reason\n" in str(failure.value)
     assert str(failure.value).endswith("log/setup/trial.log")
@@ -29,6 +41,40 @@ def test_output_of_a_command_goes_to_the_log_only(stage, capfd):
     stage.done("well")
     assert "detail" in stage.log.read_text()
     assert capfd.readouterr().out.startswith("Trial: well (")
+
+
+def test_a_command_that_fails_beside_ends_the_others_at_once(stage):
+    other = Stage("Other", "other")
+    with (
+        pytest.raises(SetupError, match=r"'Other' failed \(exit code 3\)"),
+        other.running(FAILING, env={}),
+        stage.running(SLOW, env={}),
+    ):
+        pass
+    assert not runs(stage) and "done" not in stage.log.read_text().splitlines()
+
+
+def test_an_error_ends_the_command_beside(stage):
+    with pytest.raises(ValueError, match="stop"), stage.running(SLOW, env={}):
+        while not runs(stage):
+            pass
+        raise ValueError("stop")
+    assert not runs(stage)
+
+
+def test_ctrl_c_in_the_moment_of_a_start_leaves_nothing_behind(stage, monkeypatch):
+    started = []
+
+    class Popen(subprocess.Popen):
+        def __init__(self, *arguments, **named):
+            super().__init__(*arguments, **named)
+            started.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(subprocess, "Popen", Popen)
+    with pytest.raises(KeyboardInterrupt):
+        stage.run(SLOW, env={})
+    assert [process.poll() is None for process in started] == [False]
 
 
 def test_relocation_rewrites_the_builders_paths_once(tmp_path):

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from hsv_setup.console import Stage
 from hsv_setup.environment import PYTHON
-from hsv_setup.paths import ROOT, STAMPS, fingerprint, read_stamp, write_stamp
+from hsv_setup.paths import LOG, ROOT, STAMPS, fingerprint, read_stamp, write_stamp
 
 _LIBRARY = ROOT / "src" / "hsv" / "hsv"
 _PROGRAM = _LIBRARY / "warm.py"
@@ -30,8 +30,9 @@ def _sources() -> list[Path]:
 
 
 def _caches() -> list[Path]:
-    numba = [path for suffix in ("nbi", "nbc") for path in _LIBRARY.rglob(f"__pycache__/*.{suffix}")]
-    return [*numba, *_INDEX.parent.glob("ahead_of_time.*.so"), *_INDEX.parent.glob(_INDEX.name)]
+    """Return what was compiled, with what was left half written where that was cut off."""
+    library = [path for pattern in ("*.so*", "json*") for path in _INDEX.parent.glob(f"{_INDEX.stem}.{pattern}")]
+    return [*_LIBRARY.rglob("__pycache__/*.nb[ic]*"), *library]
 
 
 def _key() -> str:
@@ -59,3 +60,9 @@ def warm(env: Mapping[str, str], stage: Stage) -> None:
     paths = [str(_LIBRARY.parent), *filter(None, [env.get("PYTHONPATH")])]
     stage.run([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)})
     write_stamp(_STAMP, _key())
+
+
+def outcome() -> str:
+    """Return what was compiled, in words; without a library compiled ahead of time all works, but starts slowly."""
+    lacking = "" if _INDEX.exists() or not _PROGRAM.exists() else f", nothing ahead of time (see {LOG.name}/setup)"
+    return f"byte code and numerical code compiled{lacking}"

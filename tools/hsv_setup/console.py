@@ -8,13 +8,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 from hsv_setup.paths import LOG, ROOT
 
 _TAIL_LINES = 30
 _POLL_PERIOD = 0.2  # s
+_GRACE = 3.0  # s
 
 
 class SetupError(Exception):
@@ -28,6 +30,7 @@ class Stage:
         self.title = title
         self.log = LOG / "setup" / f"{log_name}.log"
         self._start = time.monotonic()
+        self._end: float | None = None
         self._live = sys.stdout.isatty()
         self.log.parent.mkdir(parents=True, exist_ok=True)
         self.log.write_text("")
@@ -44,7 +47,7 @@ class Stage:
 
     @property
     def _elapsed(self) -> float:
-        return time.monotonic() - self._start
+        return (self._end or time.monotonic()) - self._start
 
     def run(
         self,
@@ -55,10 +58,11 @@ class Stage:
         """Run a command into the log; `progress` turns the log so far into the live detail.
 
         Raises:
-            SetupError: the command failed; names the log and quotes its end.
+            SetupError: the command failed, or one that runs beside it; names the log and quotes its end.
         """
         with self.running(command, env, progress):
             pass
+        self._end = None
 
     @contextmanager
     def running(
@@ -70,32 +74,52 @@ class Stage:
         """Run a command as :meth:`run` does, beside what is done in the block; its end is waited for behind it.
 
         Raises:
-            SetupError: the command failed; names the log and quotes its end.
+            SetupError: as there; commands that are run in the block tell it, too.
         """
+        process: subprocess.Popen[bytes] | None = None
         with self.log.open("ab") as out:
             out.write(("+ " + " ".join(map(str, command)) + "\n").encode())
             out.flush()
-            # Its own session, so that compilers started further down end with it.
-            process = subprocess.Popen(
-                list(map(str, command)),
-                cwd=ROOT,
-                env=dict(env),
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
             try:
+                with _interrupted_later():
+                    # Its own session, so that compilers started further down end with it.
+                    process = subprocess.Popen(
+                        list(map(str, command)),
+                        cwd=ROOT,
+                        env=dict(env),
+                        stdin=subprocess.DEVNULL,
+                        stdout=out,
+                        stderr=subprocess.STDOUT,
+                        start_new_session=True,
+                    )
+                _running[self] = process
                 yield
                 while process.poll() is None:
+                    for stage in _running:
+                        stage._look()
                     time.sleep(_POLL_PERIOD)
                     if self._live:
                         self._show(progress(self.log.read_text(errors="replace")))
+                self._look()
             except BaseException:
-                _stop(process)
+                if process:
+                    _stop(process)
                 raise
-        if process.returncode != 0:
-            raise SetupError(self._failure(f"exit code {process.returncode}"))
+            finally:
+                _running.pop(self, None)
+
+    def _look(self) -> None:
+        """Note when the command has ended.
+
+        Raises:
+            SetupError: it has failed.
+        """
+        code = _running[self].poll()
+        if code is None:
+            return
+        self._end = self._end or time.monotonic()
+        if code != 0:
+            raise SetupError(self._failure(f"exit code {code}"))
 
     def _failure(self, reason: str) -> str:
         tail = self.log.read_text(errors="replace").splitlines()[-_TAIL_LINES:]
@@ -105,10 +129,33 @@ class Stage:
         return f"{what}. The end of {log}:\n{quoted}\nFull log: {log}"
 
 
+_running: dict[Stage, subprocess.Popen[bytes]] = {}
+"""The commands that run, beside one another."""
+
+
+@contextmanager
+def _interrupted_later() -> Iterator[None]:
+    """Let Ctrl-C, or being asked to end, come behind the block: what is started in it is then known."""
+    came: list[tuple[int, FrameType | None]] = []
+    numbers = signal.SIGINT, signal.SIGTERM
+    before = {number: signal.signal(number, lambda *signalled: came.append(signalled)) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if came:
+        raise KeyboardInterrupt
+
+
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    for number, wait_timeout in ((signal.SIGINT, 3.0), (signal.SIGKILL, 3.0)):
-        try:
-            os.killpg(process.pid, number)
-            process.wait(timeout=wait_timeout)
-        except (ProcessLookupError, subprocess.TimeoutExpired):
-            continue
+    try:
+        _send(process, signal.SIGINT)
+    finally:  # also where Ctrl-C comes once more
+        _send(process, signal.SIGKILL)
+
+
+def _send(process: subprocess.Popen[bytes], number: int) -> None:
+    with suppress(ProcessLookupError, subprocess.TimeoutExpired):
+        os.killpg(process.pid, number)
+        process.wait(timeout=_GRACE)

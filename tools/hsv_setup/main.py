@@ -70,7 +70,7 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
                 compiled.warm(env, caches)
                 completion.write(environment.PYTHON, env, caches)
                 bytecode.compile_sources(environment.PYTHON, env, caches)
-                caches.done("byte code and numerical code compiled")
+                caches.done(compiled.outcome())
         if rebuilding:
             built.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
     print(f"Set up ({time.monotonic() - start:.1f} s). To use it in this shell: source env.sh", flush=True)

@@ -17,7 +17,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -28,6 +28,7 @@ import numpy as np
 from llvmlite import binding, ir
 from numba import cfunc, njit, typeof, types
 from numba.core import cgutils
+from numba.core.caching import IndexDataCacheFile
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -90,12 +91,34 @@ def recording(processes: int = 1) -> Iterator[Calls]:
         finally:
             noted = False
 
-    with ProcessPoolExecutor(processes, get_context("spawn")) if processes > 1 else nullcontext() as pool:
-        compiled.instead = call
-        try:
-            yield calls
-        finally:
-            compiled.instead = None
+    context = get_context("spawn")
+    pool = ProcessPoolExecutor(processes, context, _save_in_turn, (context.Lock(),)) if processes > 1 else None
+    compiled.instead = call
+    try:
+        yield calls
+    except BaseException:
+        if pool:
+            pool.shutdown(cancel_futures=True)
+        raise
+    finally:
+        compiled.instead = None
+        if pool:
+            pool.shutdown()
+
+
+def _save_in_turn(lock: Any) -> None:
+    """Let this process save what it compiles only while it has the ``lock``: numba's index of a function has none.
+
+    Of two functions with different arguments that are saved at the same time, one could be taken for the other.
+    """
+    file: Any = IndexDataCacheFile
+    save = file.save
+
+    def alone(*arguments: Any) -> None:
+        with lock:
+            save(*arguments)
+
+    file.save = alone
 
 
 def build(calls: Calls) -> int:

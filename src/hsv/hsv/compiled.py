@@ -28,7 +28,7 @@ ENABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") == "0"
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 instead: Callable[[CompiledFunction, tuple[Any, ...], dict[str, Any]], Any] | None = None
-"""Given every call, and returns what it returns, while it is found out what to compile ahead of time."""
+"""If set, called in place of every compiled function: with the function, its arguments and its named arguments."""
 
 
 class CompiledFunction:

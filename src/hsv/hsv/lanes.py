@@ -1,4 +1,4 @@
-"""Several flights in one vector register: a number type for compiled functions whose value is one number a lane.
+"""Several flights in vector registers: a number type for compiled functions whose value is one number a lane.
 
 A function that is written for numbers and arrays is compiled for :class:`LaneArray` as well, and then computes what it
 computes for one flight for several of them. Each lane has the bits that it would have alone: additions,
@@ -6,8 +6,8 @@ multiplications, divisions and roots are rounded lane by lane, and nothing is re
 written with :func:`choose`, :func:`every`, :func:`least` and :func:`most`, which of a single number are what they say;
 an ``if`` does not take a comparison of lanes.
 
-What these functions are of lanes is in :mod:`hsv.lane_overloads`, and the type itself, with the number of lanes of this
-processor, in :mod:`hsv.lane_types`.
+What these functions are of lanes is in :mod:`hsv.lane_overloads`, and the type itself, with the numbers that a register
+of this processor holds and the lanes, twice as many, in :mod:`hsv.lane_types`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = [
 
 
 BLOCK = 8
-"""What the lanes of any processor divide."""
+"""What the numbers that a register of any processor holds divide."""
 
 
 def every(condition: Any) -> Any:
@@ -77,8 +77,8 @@ def with_lane(value: Any, index: int, number: float) -> Any:
 def weighted_sum(weights: Any, rows: Any, total: Any) -> None:
     """Write into ``total`` (e) the sum of the ``rows`` (r, e) by their ``weights`` (r), added in their order.
 
-    ``rows`` are contiguous, and e is a multiple of :data:`BLOCK`: of numbers as many neighbours as a processor has
-    lanes are computed at once.
+    ``rows`` are contiguous, and e is a multiple of :data:`BLOCK`: of numbers as many neighbours as a register
+    holds are computed at once.
     """
     for e in range(rows.shape[1]):
         total[e] = 0.0

@@ -22,7 +22,7 @@ from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario
 
-_PROCESSES = 4
+_MOST_PROCESSES = 4
 """At most: each takes half a gigabyte of memory, and the largest function a fifth of the time of all."""
 
 
@@ -44,16 +44,23 @@ def warm() -> None:
         runner.outcome(own.flight.data(), own.level, own.fingerprint)
 
 
+def _ahead_of_time(processes: int) -> None:
+    with recording(processes) as calls:
+        warm()
+    build(calls)
+
+
 if __name__ == "__main__":
     reason = why_none()
     try:
         if not reason:
-            with recording(min(_PROCESSES, os.cpu_count() or 1)) as calls:
-                warm()
-            build(calls)
-    except (OSError, subprocess.CalledProcessError, AttributeError, BrokenExecutor) as error:
-        # No compiler to link with, a llvmlite before 0.44, no memory: only to start a command or node takes longer.
+            try:
+                _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1))
+            except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
+                _ahead_of_time(1)
+    except (OSError, subprocess.CalledProcessError, AttributeError) as error:
+        # No compiler to link with, or a llvmlite before 0.44: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)
     if reason:
         print(f"python -m hsv.warm: nothing compiled ahead of time: {reason}", file=sys.stderr)
-        warm()  # by numba alone
+        warm()  # compiled by numba when it is called

@@ -23,7 +23,7 @@ from hsv.simulation.scenario import Scenario, scenario_at_means, scenario_table,
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
 _BATCHES = 256
-_BATCH_LIMITS = (32, 256)
+_BATCH_LIMITS = (32, 256)  # multiples of the flights side by side on any processor, as all sizes in between
 
 MOST_SAMPLES = 10**7
 
@@ -97,7 +97,7 @@ class Campaign:
     def batch(self) -> int:
         """Flights a batch, the unit that is flown and stored at once."""
         low, high = _BATCH_LIMITS
-        return max(low, min(high, self.samples // _BATCHES))
+        return max(low, min(high, self.samples // _BATCHES // low * low))
 
     @property
     def batches(self) -> int:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 
 from hsv.documents import read_text
 from hsv.errors import CampaignError, DocumentError, RunError
+from hsv.interruption import uninterrupted
 
 AGAIN_AFTER = 5.0
 """Seconds after which the workers of a host are started again."""
@@ -156,12 +157,16 @@ class _Workers:
         now = time.monotonic()
         if self._process is None:
             if now >= self._due:
-                self._process = _Process(self._words)
+                self._start()
         elif why := self._process.ended:
             if why != self._said:
                 self._say(f"{self._host.name}: no workers ({why}), trying again every {AGAIN_AFTER:g} s")
             self.stop()
             self._said, self._due = why, now + AGAIN_AFTER
+
+    @uninterrupted
+    def _start(self) -> None:
+        self._process = _Process(self._words)
 
     def stop(self) -> None:
         """End the connection, and with it the workers."""
@@ -191,10 +196,16 @@ def cluster(
     command = read_ssh(ssh)
     goal = f"tcp://{address}:{port}"
     with ExitStack() as stack:
+
+        @uninterrupted
+        def start(words: Sequence[str]) -> _Process:
+            process = _Process(words)
+            stack.callback(process.stop)
+            return process
+
         if _answers(address, port):
             raise CampaignError(f"port = {port}: in use, expected a free port of this machine")
-        scheduler = _Process([sys.executable, *_SCHEDULER, "--host", address, "--port", str(port)])
-        stack.callback(scheduler.stop)
+        scheduler = start([sys.executable, *_SCHEDULER, "--host", address, "--port", str(port)])
         while not _answers(address, port):
             if why := scheduler.ended:
                 raise CampaignError(f"scheduler {goal}: does not start ({why}), expected an address of this machine")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,6 @@ from hsv.control.controller import Controller
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
 from hsv.lane_types import WIDTH
-from hsv.sha256_lanes import LANES, WORTHWHILE
 from hsv.simulation.closed_loop import Components, Flight, fly
 from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import FlightData, flight_metrics
@@ -26,9 +25,6 @@ from hsv.simulation.side_by_side import FlightGroup, FlightsSideBySide
 from hsv.vehicle.envelope import in_model_range
 
 Outcome = dict[str, float | bool | str | None]
-
-_GROUPS = max(1, LANES // WIDTH) if WORTHWHILE else 1
-"""Groups of flights side by side whose fingerprints are computed at a time."""
 
 
 class Flown(NamedTuple):
@@ -54,7 +50,6 @@ class SampleRunner:
         self._variants = FlightVariants(self.scenario, campaign.design)
         parts = self._variants.unchanged
         self._levels = TubeLevels(parts)
-        self._groups: list[FlightGroup] = []
         self.period = parts.plant.period
         """Control period, s."""
         self.steps = parts.plant.steps
@@ -82,30 +77,21 @@ class SampleRunner:
         Raises:
             ScenarioError: As above.
         """
-        flown: list[FlightsSideBySide] = []
         for start in range(0, len(flights), WIDTH):
             drawn = zip(flights[start : start + WIDTH], samples[start : start + WIDTH], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
-            together = FlightGroup.takes(components)
-            if together:
-                flown.append(self._group(len(flown)).fly(components))
-            if len(flown) == _GROUPS or not together:
-                yield from self._told(flown)
-                flown = []
-            if not together:
+            if FlightGroup.takes(components):
+                yield from self._told(self._group.fly(components))
+            else:
                 yield from map(self._flown_or_error, components)
-        yield from self._told(flown)
 
-    def _group(self, number: int) -> FlightGroup:
-        """Return one of the groups, whose memory is kept."""
-        if number == len(self._groups):
-            self._groups.append(FlightGroup(self.steps))
-        return self._groups[number]
+    @cached_property
+    def _group(self) -> FlightGroup:
+        return FlightGroup(self.steps)  # whose memory is kept
 
-    def _told(self, groups: Sequence[FlightsSideBySide]) -> Iterator[Flown]:
-        flights = [flight for group in groups for flight in group.flights]
-        levels = [level for group in groups for level in self._levels.worst_of(group)]
-        return map(Flown, flights, levels, fingerprints([flight.history.flown for flight in flights]))
+    def _told(self, group: FlightsSideBySide) -> Iterator[Flown]:
+        digests = fingerprints([flight.history.flown for flight in group.flights])
+        return map(Flown, group.flights, self._levels.worst_of(group), digests)
 
     def _flown_alone(self, components: Components) -> Flown:
         flight = fly(components)
@@ -144,7 +130,7 @@ class SampleRunner:
         pieces = [replace(parts, plant=plant)] * WIDTH
         if not FlightGroup.takes(pieces):
             return [self._flown_alone(pieces[0])]
-        return list(self._told([FlightGroup(steps).fly(pieces) for _ in range(_GROUPS)]))
+        return list(self._told(FlightGroup(steps).fly(pieces)))
 
     @property
     def controller(self) -> Controller:

@@ -40,7 +40,7 @@ class FlightsSideBySide(NamedTuple):
 
 
 class FlightGroup:
-    """Flies up to :data:`hsv.lanes.WIDTH` flights side by side, and keeps the memory for that."""
+    """Flies up to :data:`hsv.lane_types.WIDTH` flights side by side, and keeps the memory for that."""
 
     def __init__(self, steps: int) -> None:
         """Make room for flights of so many control periods."""
