@@ -21,9 +21,9 @@ _WHOLE: set[CodeType] = set()
 def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
     """Let an interruption of ``function``, a short one, come when it has returned.
 
-    A process that is started is then known to who is to end it, whenever Ctrl-C comes. In effect where interruptions are
-    taken by :func:`take_interrupts`; :func:`hsv.threads.ctrl_c_held_back` is for what takes longer, and for processes
-    that are never to receive Ctrl-C.
+    A process that is started is then known to who is to end it, whenever Ctrl-C comes. It takes effect where
+    :func:`take_interrupts` was called. What takes longer, or starts processes that are never to receive Ctrl-C, is done
+    within :func:`hsv.threads.ctrl_c_held_back`.
     """
     _WHOLE.add(function.__code__)
     return function
