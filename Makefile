@@ -26,7 +26,7 @@ run: setup ## set up, then fly a scenario over DDS (SCENARIO=case1, ARGS="...")
 
 test: lint ## set up, check the sources, run all tests (ARGS="-k trim" chooses)
 	@source ./env.sh && if [ -n '$(ARGS)' ]; then exec python3 -m pytest $(ARGS); fi; \
-	python3 -m pytest -n auto -m "not (graph or long or fuzz or full_ros or portability)" && exec python3 -m pytest -n auto --dist loadfile -m "graph and not long"
+	python3 -m pytest -n auto -m "not (graph or long or fuzz or full_ros or portability)" && exec python3 -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "graph and not long"
 
 test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damaged" chooses)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m long $(ARGS)
@@ -81,7 +81,7 @@ lint: setup ## set up, then check style and types
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@source ./env.sh && python3 -m pytest -n auto -m "not (reference or long or fuzz or full_ros or portability or graph)" && \
-	python3 -m pytest -n auto --dist loadfile -m "graph and not (reference or long)" && python3 tools/references.py
+	python3 -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "graph and not (reference or long)" && python3 tools/references.py
 
 # Without a package index everything else is measured all the same.
 bench: setup ## set up, then measure this machine; replaces the table in docs/benchmarks.md (ARGS="--scale 0.5")

@@ -34,6 +34,9 @@ SILENT_AFTER = 30.0
 SETTLED_AFTER = 3.0
 """Seconds without a change in the topics after which all that there are are known."""
 
+WHOLE_AFTER = 1.0
+"""The same where all nodes of a graph are known."""
+
 SAY_AFTER = 5.0
 """Seconds of waiting before the first message about it, and between messages."""
 
@@ -101,10 +104,16 @@ class GraphClient(Node):
         """Return the full names of the known nodes that subscribe ``topic``, except this one."""
         return self._others(self.get_subscriptions_info_by_topic(topic))
 
-    def settle(self, whole: Callable[[], object]) -> None:
-        """Wait until all of a graph is known, which ``whole`` says, or nothing new comes for a while."""
+    def settle(self, whole: Callable[[], object], enough: Callable[[], object]) -> None:
+        """Wait until nothing new comes for a while, a shorter one where the graph is ``whole``, or there is ``enough``.
+
+        Beside a whole graph there are others that take part in its topics: a recorder, or who watches.
+        """
         standstill = Standstill()
-        while not whole() and standstill.look(self._endpoints()) < SETTLED_AFTER:
+        while not enough():
+            still = standstill.look(self._endpoints())
+            if still >= (WHOLE_AFTER if whole() else SETTLED_AFTER):
+                return
             rclpy.spin_once(self, timeout_sec=_LOOK)
 
     def _endpoints(self) -> list[tuple[str, int, int]]:

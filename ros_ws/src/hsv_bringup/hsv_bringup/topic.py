@@ -83,22 +83,25 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
         RunError: No node of a graph is there.
     """
 
+    def enough() -> bool:
+        return bool(wanted and client.count_publishers(wanted))
+
     def found() -> bool:
         return (
-            bool(wanted and client.count_publishers(wanted))
+            enough()
             or any(map(client.publishers_of, TOPICS))
             or any(node_in_role(client, role) for role in graph())
         )
 
     def whole() -> bool:
-        return bool(wanted and client.count_publishers(wanted)) or all(
+        return all(
             len(client.subscribers_of(topic)) >= count and client.publishers_of(topic)
             for topic, count in _SUBSCRIBERS.items()
         )
 
     if not client.wait_for(found, "a node of the graph", _PUBLISHED):
         raise RunError(f"no node of the graph in {client.where}: expected hsv run, or nodes started by hand there")
-    client.settle(whole)
+    client.settle(whole, enough)
     return dict(client.get_topic_names_and_types())
 
 
