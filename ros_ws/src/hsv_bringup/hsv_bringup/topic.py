@@ -87,11 +87,7 @@ def _topics(client: GraphClient, wanted: str = "") -> dict[str, list[str]]:
         return bool(wanted and client.count_publishers(wanted))
 
     def found() -> bool:
-        return (
-            enough()
-            or any(map(client.publishers_of, TOPICS))
-            or any(node_in_role(client, role) for role in graph())
-        )
+        return enough() or any(map(client.publishers_of, TOPICS)) or any(node_in_role(client, role) for role in graph())
 
     def whole() -> bool:
         return all(
