@@ -70,10 +70,6 @@ ELSEWHERE = {
     ),
     ("docs/benchmarks.md", "hsv bench --only controllers"): "tests/cli/test_bench.py",
     ("docs/benchmarks.md", "hsv bench --only montecarlo"): "tests/cli/test_bench.py",
-    (
-        "docs/benchmarks.md",
-        "hsv bench --only startup --only in_process --only graph --only montecarlo --scale 0.3",
-    ): "tests/cli/test_bench.py",
     ("docs/benchmarks.md", "hsv bench --json > before.json"): "tests/cli/test_bench.py",
     ("docs/figures/index.md", "hsv figures --out docs/figures"): "tests/study/test_figures.py",
     ("docs/installation.md", "$ python3 -m venv venv"): "tests/packaging/test_wheel.py",
