@@ -133,7 +133,7 @@ EXEMPT = {
     "simulation/metrics.py": "what is said of a flight, after it",
     "simulation/curves.py": "the same",
     "simulation/fingerprint.py": "a digest",
-    "sha256_lanes.py": "the same",
+    "sha256_pairs.py": "the same",
     "documents.py": "reads files",
     "threads.py": "runs flights in threads",
     "compiled.py": "says how functions are compiled",

@@ -13,6 +13,7 @@ from hsv.lane_types import (
     LanesType,
     MaskType,
     all_of,
+    flat_element,
     neighbours,
     one_lane,
     powers_of_two,
@@ -104,16 +105,20 @@ def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
         return of_numbers
 
     def of_lanes(weights: Any, rows: Any, total: Any) -> None:
-        # Four sums at a time: an addition waits for the one before it in its sum.
-        for e in range(0, rows.shape[1], 4):
-            a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        size = rows.shape[1]
+        # Six sums at a time: an addition waits for the one before it in its sum, and the registers hold no more.
+        for e in range(0, size, 6):
+            s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for r in range(len(rows)):
-                weight = weights[r]
-                a += weight * rows[r, e]
-                b += weight * rows[r, e + 1]
-                c += weight * rows[r, e + 2]
-                d += weight * rows[r, e + 3]
-            total[e], total[e + 1], total[e + 2], total[e + 3] = a, b, c, d
+                weight, place = weights[r], r * size + e
+                s0 += weight * flat_element(rows, place)
+                s1 += weight * flat_element(rows, place + 1)
+                s2 += weight * flat_element(rows, place + 2)
+                s3 += weight * flat_element(rows, place + 3)
+                s4 += weight * flat_element(rows, place + 4)
+                s5 += weight * flat_element(rows, place + 5)
+            total[e], total[e + 1], total[e + 2] = s0, s1, s2
+            total[e + 3], total[e + 4], total[e + 5] = s3, s4, s5
 
     return of_lanes
 

@@ -447,6 +447,17 @@ def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
 
 
 @_intrinsic
+def flat_element(typing_context: Any, array: Any, index: Any) -> Any:
+    """Return the number of a contiguous array of float64 at a flat ``index``, which is not counted from the end."""
+
+    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
+        given, place = arguments
+        return builder.load(builder.gep(context.make_array(called.args[0])(context, builder, given).data, [place]))
+
+    return types.float64(array, types.intp), generate
+
+
+@_intrinsic
 def write_neighbours(typing_context: Any, array: Any, start: Any, value: Any) -> Any:
     """Write lanes to :data:`REGISTER` numbers of a contiguous array of float64, from the flat index ``start`` on."""
 
@@ -464,7 +475,8 @@ def powers_of_two(typing_context: Any, whole: Any) -> Any:
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         kind = _vector(_WORD, whole.count)
-        exponent = builder.fptosi(arguments[0], kind)
+        # By way of 32 bits, for which AVX2 has an instruction.
+        exponent = builder.sext(builder.fptosi(arguments[0], _vector(ir.IntType(32), whole.count)), kind)
         biased = builder.add(exponent, ir.Constant(kind, [1023] * whole.count))
         return builder.bitcast(builder.shl(biased, ir.Constant(kind, [52] * whole.count)), arguments[0].type)
 

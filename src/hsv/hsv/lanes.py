@@ -35,8 +35,8 @@ __all__ = [
 ]
 
 
-BLOCK = 8
-"""What the numbers that a register of any processor holds divide."""
+BLOCK = 24
+"""A multiple of the numbers that a register of any processor holds, and of the sums that lanes compute at a time."""
 
 
 def every(condition: Any) -> Any:

@@ -12,6 +12,7 @@ import tomllib
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -39,27 +40,23 @@ def fingerprint(flown: np.ndarray) -> str:
         if (unknown := np.isnan(rows)).any():
             rows = np.where(unknown, np.nan, rows)
         digest.update(rows.data)
-    return _written(digest.hexdigest())
+    return _written(digest.digest())
 
 
 def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
-    """Return the fingerprint of each of several flights, rows as :func:`fingerprint` takes them, side by side."""
+    """Return the fingerprint of each of several flights, rows as :func:`fingerprint` takes them, two at a time."""
     # Here, as most that know of a fingerprint have one flight.
-    from hsv.sha256_lanes import LANES, WORTHWHILE, digests
+    from hsv.sha256_pairs import AVAILABLE, digests
 
-    found: list[str] = []
-    for start in range(0, len(flown), LANES):
-        some = flown[start : start + LANES]
-        # All lanes take as long as half of them: of fewer flights one after the other is faster.
-        if WORTHWHILE and len(some) > LANES // 2:
-            found += [_written(digest.hex()) for digest in digests(some)]
-        else:
-            found += map(fingerprint, some)
-    return found
+    if not AVAILABLE:
+        return [fingerprint(rows) for rows in flown]
+    pairs = (flown[start : start + 2] for start in range(0, len(flown), 2))
+    found = (map(_written, digests(pair)) if len(pair) == 2 else map(fingerprint, pair) for pair in pairs)
+    return list(chain.from_iterable(found))
 
 
-def _written(digest: str) -> str:
-    return f"v{FORMAT}:{digest}"
+def _written(digest: bytes) -> str:
+    return f"v{FORMAT}:{digest.hex()}"
 
 
 def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
