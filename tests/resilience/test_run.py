@@ -52,7 +52,7 @@ def test_interrupted_it_goes_on_where_it_was(campaign, whole, tmp_path):
 def test_a_killed_worker_loses_nothing_and_two_bring_what_one_does(campaign, whole, tmp_path):
     store, killed = CaseStore(tmp_path), []
     with make_executor(2) as workers:
-        pids = list(workers._client.run(os.getpid).values())
+        pids = workers.pids()
 
         def kill(done):
             if done and not killed:

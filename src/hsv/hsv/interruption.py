@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
 import signal
 import sys
 from collections.abc import Callable
@@ -13,6 +15,8 @@ R = TypeVar("R")
 
 _LATER = 0.02
 """Seconds after which it is tried once more where nothing could be raised, or what was raised was swallowed."""
+
+_PR_SET_PDEATHSIG = 1
 
 _WHOLE: set[CodeType] = set()
 """What is not interrupted before it is finished."""
@@ -53,6 +57,14 @@ def take_interrupts() -> None:
         signal.signal(number, interrupt)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
     sys.unraisablehook = _interrupt_again
+
+
+def end_with_parent(parent: int) -> None:
+    """Let this process, a child of ``parent``, be terminated when that ends; only Linux can."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+        if os.getppid() != parent:  # it has ended already
+            os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _interrupt_again(unraisable: Any) -> None:

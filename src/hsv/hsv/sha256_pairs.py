@@ -19,7 +19,7 @@ from hsv.compiled import ENABLED
 
 
 def _has_instructions() -> bool:
-    chosen = config.CPU_FEATURES
+    chosen: str | None = vars(config)["CPU_FEATURES"]
     return "+sha" in chosen.split(",") if chosen is not None else bool(binding.get_host_cpu_features().get("sha"))
 
 
@@ -71,7 +71,7 @@ def digests(arrays: Sequence[np.ndarray]) -> list[bytes]:
         end[left] = 0x80
         end[last * _NUMBERS - 1] = np.uint64(64 * size).byteswap()
     # None of these numbers is NaN: lengths are whole multiples of 64, so that the exponent has zeros.
-    _absorb_both(state, ends, blocks)
+    _absorb_both(state, [*ends], blocks)
     return [own[np.argsort(_ORDER)].astype(">u4").tobytes() for own in state]
 
 

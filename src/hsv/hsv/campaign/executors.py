@@ -1,33 +1,33 @@
-"""Execution back ends of campaigns: this process, or the workers of a Dask cluster on one machine or on many."""
+"""Execution back ends of campaigns: this process, others of this machine, or the workers of a Dask cluster."""
 
 from __future__ import annotations
 
-import logging
+import multiprocessing
 import os
+import signal
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import Any, Protocol
 
 from hsv.campaign.program import check_workers
 from hsv.campaign.scheduler import connected
 from hsv.errors import CampaignError, RunError, reason
+from hsv.interruption import end_with_parent
 from hsv.threads import ctrl_c_held_back
 
 _AHEAD = 4
 """Batches per core that are queued at the workers: enough that none is idle, few enough that a lost worker costs
 little."""
 
-_LOCAL = {
-    # Without Dask's MALLOC_TRIM_THRESHOLD_, with which every flight's arrays are given back and faulted in again.
-    "distributed.nanny.pre-spawn-environ": {f"{name}_NUM_THREADS": 1 for name in ("OMP", "MKL", "OPENBLAS")},
-    # What only a dashboard shows, and the watch over memory that flights do not pile up.
-    "distributed.worker.profile.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.system-monitor.interval": "5s",
-    **{f"distributed.worker.memory.{limit}": False for limit in ("target", "spill", "pause", "terminate")},
-}
-"""Settings of workers on this machine; together they give a sixth more flights a second."""
+_TRIES = 4
+"""Workers with which the same batch may be lost."""
+
+_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
+"""Environment of a worker: there are as many as processors."""
 
 
 Job = Callable[[str, int], bytes]
@@ -57,6 +57,115 @@ class SerialExecutor:
         """Yield number and content of each batch."""
         for batch in batches:
             yield batch, job(text, batch)
+
+
+class ProcessExecutor:
+    """Flies the batches in processes of this machine, each with a queue of its own; one that is lost is replaced."""
+
+    def __init__(self, workers: int) -> None:
+        """Start so many processes; who made this calls :meth:`close`.
+
+        Raises:
+            RunError: One of them does not start.
+        """
+        self._workers = [_Worker() for _ in range(workers)]
+        try:
+            self.pids()
+        except BrokenProcessPool as error:
+            self.close()
+            raise RunError(f"campaign: a worker process does not start ({error})") from error
+
+    @property
+    def cores(self) -> int:
+        """Number of processes."""
+        return len(self._workers)
+
+    def pids(self) -> list[int]:
+        """Return the process identifiers of the workers, which have started then."""
+        return [worker.pid.result() for worker in self._workers]
+
+    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
+        """Yield number and content of each batch.
+
+        Raises:
+            RunError: Workers die of a batch again and again.
+        """
+        waiting, lost = iter(batches), Counter[int]()
+        running: dict[Future[bytes], tuple[int, int]] = {}
+
+        def submit(place: int, some: Iterable[int]) -> None:
+            for batch in some:
+                running[self._workers[place].submit(job, text, batch)] = place, batch
+
+        def recover(place: int) -> None:
+            """Give what a lost worker had not finished to the one in its place."""
+            theirs = {future: batch for future, (at, batch) in running.items() if at == place}
+            lost.update(theirs.values())
+            if max(lost.values()) >= _TRIES:
+                raise RunError(f"campaign: several workers died of the same batch; {_KEPT}")
+            for future in theirs:
+                del running[future]
+            submit(place, theirs.values())
+
+        for place in [*range(self.cores)] * _AHEAD:
+            submit(place, islice(waiting, 1))
+        try:
+            while running:
+                for future in wait(running, return_when=FIRST_COMPLETED).done & running.keys():
+                    place, batch = running[future]
+                    if isinstance(future.exception(), BrokenProcessPool):
+                        recover(place)
+                        break
+                    del running[future]
+                    submit(place, islice(waiting, 1))
+                    yield batch, future.result()
+        finally:
+            for future in running:
+                future.cancel()
+
+    def kill(self) -> None:
+        """End the processes at once: what they fly may take minutes."""
+        for worker in self._workers:
+            with suppress(BrokenProcessPool, ProcessLookupError):
+                os.kill(worker.pid.result(), signal.SIGKILL)
+
+    def close(self) -> None:
+        """Wait until the processes have ended."""
+        for worker in self._workers:
+            worker.close()
+
+
+class _Worker:
+    """A process that does one thing after the other, and never receives Ctrl-C; lost, it is started again."""
+
+    def __init__(self) -> None:
+        self._start()
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(1, context, end_with_parent, (os.getpid(),))
+        before = {name: os.environ.get(name) for name in _ONE_THREAD}
+        with ctrl_c_held_back():
+            os.environ.update(_ONE_THREAD)
+            try:
+                self.pid = self._pool.submit(os.getpid)  # the process starts with its first job
+            finally:
+                for name, value in before.items():
+                    if value is None:
+                        del os.environ[name]
+                    else:
+                        os.environ[name] = value
+
+    def submit(self, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        try:
+            return self._pool.submit(job, *arguments)
+        except BrokenProcessPool:
+            self.close()
+            self._start()
+            return self._pool.submit(job, *arguments)
+
+    def close(self) -> None:
+        self._pool.shutdown(cancel_futures=True)
 
 
 class DaskExecutor:
@@ -131,21 +240,11 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
     if workers == 1:
         yield SerialExecutor()
         return
-    import dask
-    from distributed import Client, LocalCluster
-
-    with dask.config.set(_LOCAL), ExitStack() as stack:
-        with ctrl_c_held_back():
-            cluster = stack.enter_context(
-                LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                    # Without it every scheduler asks for the same port, and a second campaign would be told so.
-                    scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},
-                    silence_logs=logging.CRITICAL,
-                )
-            )
-            client = stack.enter_context(Client(cluster, set_as_default=False))
-        yield DaskExecutor(client)
+    flying = ProcessExecutor(workers)
+    try:
+        yield flying
+    except BaseException:
+        flying.kill()
+        raise
+    finally:
+        flying.close()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import socket
@@ -12,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -31,7 +31,7 @@ from hsv.graph.description import (
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
-from hsv.interruption import uninterrupted
+from hsv.interruption import end_with_parent, uninterrupted
 
 GRACE = 20.0
 """Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""
@@ -44,8 +44,6 @@ _LOOK = 0.02
 
 _FLYING = (PLANT, COMPOSED)
 """Processes that report the steps of the flight."""
-
-_PR_SET_PDEATHSIG = 1
 
 
 def executable(node: NodeDescription) -> Path:
@@ -234,7 +232,8 @@ class Launcher:
             errors="replace",
             # Ctrl-C in the terminal goes to this process alone, which ends the nodes in order.
             start_new_session=True,
-            preexec_fn=_die_with_parent,
+            # Where the launcher itself is killed, the nodes must not fly on without it.
+            preexec_fn=partial(end_with_parent, os.getpid()),
         )
         process = _Process(description, popen)
         process.reader = threading.Thread(target=self._read, args=(process,), daemon=True)
@@ -289,8 +288,3 @@ def claim_graph(nodes: Sequence[NodeDescription], namespace: str) -> socket.sock
 
 def _landed(process: _Process, code: int) -> bool:
     return process.description in _FLYING and code in LANDED
-
-
-def _die_with_parent() -> None:
-    # Where the launcher itself is killed, the nodes must not fly on without it.
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
