@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 from typing import Annotated, Any
@@ -17,6 +17,8 @@ import hsv
 from hsv.cli.extras import missing_extra
 from hsv.cli.output import Interrupted, console, report_error
 from hsv.errors import HsvError, RunError, reason
+
+_HELP = ("-h", "--help")
 
 _INTERRUPTED = 130
 
@@ -74,14 +76,19 @@ COMMANDS = (
 """Names of the commands; each is in a module of this name, with underscores, a function or a group of commands."""
 
 
-def application(names: Sequence[str] = COMMANDS) -> typer.Typer:
-    """Return the command line with commands of these names, whose modules are imported."""
+def application(names: Sequence[str] = COMMANDS, *, listed: bool = False) -> typer.Typer:
+    """Return the command line with commands of these names, whose modules are imported.
+
+    Args:
+        names: Of the commands.
+        listed: Whether they are only listed with what they do: to make out their options takes longer than the rest.
+    """
     app = typer.Typer(
         name="hsv",
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={"help_option_names": [*_HELP]},
         epilog="Exit codes: " + "; ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items()) + ".",
     )
     app.callback()(options)
@@ -93,13 +100,20 @@ def application(names: Sequence[str] = COMMANDS) -> typer.Typer:
             app.add_typer(command, name=name)
             groups.append(command)
         else:
-            app.command()(command)
+            app.command(name)(_without_options(command) if listed else command)
     for group in groups:
         for registered in group.registered_commands:
             # Folded to the terminal only: typer keeps the line breaks of the source in all paragraphs but the first.
             paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
             registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     return app
+
+
+def _without_options(command: Callable[..., Any]) -> Callable[[], None]:
+    def listed() -> None: ...
+
+    listed.__doc__ = command.__doc__
+    return listed
 
 
 def _version(wanted: bool) -> None:
@@ -124,7 +138,7 @@ def main() -> None:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         words = sys.argv[1:] or ["--help"]
         # One command is wanted: the modules of all, and what typer makes of them, take as long as numpy.
-        app = application(words[:1]) if words[0] in COMMANDS else application()
+        app = application(words[:1] if words[0] in COMMANDS else COMMANDS, listed=words[0] in _HELP)
         code = app(words, prog_name="hsv", standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
