@@ -29,6 +29,7 @@ LOCKS: dict[str, tuple[list[str], list[str]]] = {
     # The ROS wheels are compiled against numpy 2.4; requirements-ros.txt holds setuptools back.
     "constraints.txt": (
         [
+            "requirements-setup.txt",
             "requirements-ros.txt",
             "requirements.txt",
             "requirements-viewers.txt",

@@ -15,7 +15,7 @@ import os
 import shlex
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
@@ -51,8 +51,8 @@ _nothing = ctypes.c_char()
 # To be linked here as well, where entries are not called.
 binding.add_symbol("hsv_array", ctypes.addressof(_nothing))
 
-Compiled = tuple[str, Result] | None
-"""Code of an entry and what it returns, or nothing where that cannot be handed over."""
+Compiled = tuple[bytes, Result] | None
+"""Object file of an entry and what it returns, or nothing where that cannot be handed over."""
 
 Calls = dict[tuple[str, tuple[str, ...]], Callable[[], Compiled]]
 """What returns an entry, by the function's name and the types of arguments as the index names them."""
@@ -80,10 +80,8 @@ def recording(processes: int = 1) -> Iterator[Calls]:
         if key is None:
             return function.dispatcher(*arguments, **named)
         if key not in calls:
-            kinds = tuple(map(typeof, arguments))
-            calls[key] = (
-                pool.submit(_entry_if_any, function, kinds).result if pool else partial(_entry_if_any, function, kinds)
-            )
+            compile_entry = partial(_entry_if_any, function, tuple(map(typeof, arguments)), _symbol(len(calls)))
+            calls[key] = pool.submit(compile_entry).result if pool else compile_entry
         noted = True
         try:
             with np.errstate(all="ignore"):  # as in compiled functions
@@ -130,15 +128,15 @@ def build(calls: Calls) -> int:
         OSError, subprocess.CalledProcessError: There is no C compiler to link with, or no place for the library.
     """
     functions: dict[str, list[tuple[tuple[str, ...], str, Result]]] = {}
-    library = binding.parse_assembly("")
+    objects = []
     for number, ((name, key), compile_entry) in enumerate(calls.items()):
         entry = compile_entry()
         if entry is None:
             continue
-        symbol, (code, result) = f"hsv_{number}", entry
-        library.link_in(_with_one_symbol(code, symbol))
-        functions.setdefault(name, []).append((key, symbol, result))
-    linked = _linked(library)
+        compiled_entry, result = entry
+        objects.append(compiled_entry)
+        functions.setdefault(name, []).append((key, _symbol(number), result))
+    linked = _linked(objects)
     contents = hashlib.sha256(linked).hexdigest()
     target = INDEX.with_name(f"ahead_of_time.{contents[:16]}.so")
     INDEX.parent.mkdir(parents=True, exist_ok=True)
@@ -194,11 +192,17 @@ def _replace(path: Path, content: bytes) -> None:
     temporary.replace(path)
 
 
-def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...]) -> Compiled:
+def _symbol(number: int) -> str:
+    """Return the name of an entry in the library."""
+    return f"hsv_{number}"
+
+
+def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...], symbol: str) -> Compiled:
     try:
-        return _entry(function, arguments)
+        code, result = _entry(function, arguments)
     except NumbaError:
         return None
+    return _machine().emit_object(_with_one_symbol(code, symbol)), result
 
 
 def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result]:
@@ -414,13 +418,15 @@ def _machine() -> Any:
     )
 
 
-def _linked(library: Any) -> bytes:
-    """Return the shared library of a module."""
+def _linked(objects: Sequence[bytes]) -> bytes:
+    """Return the shared library of object files."""
     with TemporaryDirectory() as folder:
-        objects, target = Path(folder, "entries.o"), Path(folder, "library.so")
-        objects.write_bytes(_machine().emit_object(library))
+        target = Path(folder, "library.so")
+        files = [Path(folder, f"{number}.o") for number in range(len(objects))]
+        for file, content in zip(files, objects, strict=True):
+            file.write_bytes(content)
         compiler = shlex.split(os.environ.get("CC") or "cc")
         # Python's functions are those of the process that loads it.
-        command: list[str | Path] = [*compiler, "-O2", "-shared", "-fPIC", "-o", target, objects, _RUN_TIME]
+        command: list[str | Path] = [*compiler, "-O2", "-shared", "-fPIC", "-o", target, *files, _RUN_TIME]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return target.read_bytes()

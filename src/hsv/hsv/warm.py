@@ -15,6 +15,7 @@ from hsv.ahead_of_time import build, recording
 from hsv.campaign.campaign import plan
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
+from hsv.control.estimator_parameters import PROCESS_PARAMETERS
 from hsv.precompiled import why_none
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
@@ -26,10 +27,14 @@ _MOST_PROCESSES = 4
 """At most: each takes half a gigabyte of memory, and the largest function a fifth of the time of all."""
 
 
+_SOON_DONE = {"duration": 0.1, **{parameter.name: 1.0 for parameter in PROCESS_PARAMETERS}}
+"""A short flight, with noise of which an estimator's gain is found in a quarter of the iterations."""
+
+
 def warm() -> None:
     """Step every component and fly every compiled loop once."""
     for name in ("case1", "case1_active", "case1_realistic", "case1_hard_sensors"):
-        components = assemble(flight_parameters(load_scenario(name)) | {"duration": 0.1})
+        components = assemble(flight_parameters(load_scenario(name)) | _SOON_DONE)
         flown = fly(components).data()
         flight_metrics(flown)
         columns: dict[str, Any] = {
