@@ -28,7 +28,7 @@ REQUIRED = [
     "zstandard>=0.23,<0.26",
 ]
 EXTRAS = {
-    "campaign": ["dask>=2025.1,<2027", "distributed>=2025.1,<2027", "pyarrow>=18,<27"],
+    "campaign": ["distributed>=2025.1,<2027", "pyarrow>=18,<27"],
     "design": ["clarabel>=0.10,<0.12", "cvxpy>=1.6,<2"],
     "live": ["foxglove-sdk>=0.20,<0.31", "websockets>=14,<18"],
     "report": ["jinja2>=3.1,<4", "markupsafe>=2.1.3,<4", "matplotlib>=3.9,<4"],

@@ -23,7 +23,6 @@ KEYS |= {"typer": "python3-typer", "yaml": "python3-yaml"}
 WITHOUT_KEY = {
     "clarabel",
     "cvxpy",
-    "dask",
     "distributed",
     "foxglove",
     "lz4",

@@ -5,7 +5,6 @@ from __future__ import annotations
 EXTRAS = {
     "clarabel": "design",
     "cvxpy": "design",
-    "dask": "campaign",
     "distributed": "campaign",
     "foxglove": "live",
     "jinja2": "report",

@@ -132,13 +132,15 @@ def options(
 
 def main() -> None:
     """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
-    if "_HSV_COMPLETE" in os.environ:
+    completing = "_HSV_COMPLETE" in os.environ
+    if completing:
         completion_init()  # a shell asks for the words that may come next
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         words = sys.argv[1:] or ["--help"]
         # One command is wanted: the modules of all, and what typer makes of them, take as long as numpy.
-        app = application(words[:1] if words[0] in COMMANDS else COMMANDS, listed=words[0] in _HELP)
+        listed = words[0] in _HELP and not completing
+        app = application(words[:1] if words[0] in COMMANDS else COMMANDS, listed=listed)
         code = app(words, prog_name="hsv", standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
