@@ -6,6 +6,7 @@ import tempfile
 import time
 from functools import cache
 from pathlib import Path
+from statistics import median
 
 from hsv.bench.c_flight import FLAGS, CFlight
 from hsv.bench.figure import Figure, interleaved
@@ -22,13 +23,19 @@ from hsv.simulation.scenario import load_scenario
 
 
 def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:
-    """Return the pace of ``workers`` against as many times that of one, flights of Case 1, workers warm."""
+    """Return the pace of ``workers`` against as many times that of one, flights of Case 1, workers warm.
+
+    Beside it stands what the C build gains in the same way, which is what the processors allow.
+    """
     paces: dict[int, list[float]] = {1: [], workers: []}
+    paces_c: dict[int, list[float]] = {1: [], workers: []}
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         for repeat in range(repeats):
             for count, measured in paces.items():
                 measured.append(_pace(Path(folder), count, samples, repeat))
+                paces_c[count].append(_pace_c(count, samples // 4))
     one = tuple(workers * pace for pace in paces[1])
+    gained_c = median(many / (workers * single) for many, single in zip(paces_c[workers], paces_c[1], strict=True))
     return [
         Figure(
             "montecarlo",
@@ -39,6 +46,7 @@ def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure
             one,
             "least",
             0.95,
+            note=f"the C build alone {gained_c:.3g}",
         )
     ]
 
@@ -113,6 +121,16 @@ def _fly_c(text: str, batch: int) -> bytes:
     for _ in sample_runner(text).campaign.flights(batch):
         _c_flight().fly()
     return b""
+
+
+def _pace_c(workers: int, samples: int) -> float:
+    """Return the flights a second of the C build alone, on so many warm workers."""
+    campaign = plan("case1", samples=samples)
+    with make_executor(workers) as flying:
+        list(flying.fly(_build_c, campaign.text, range(workers)))
+        started = time.perf_counter()
+        list(flying.fly(_fly_c, campaign.text, range(campaign.batches)))
+        return samples / (time.perf_counter() - started)
 
 
 def _pace(folder: Path, workers: int, samples: int, repeat: int) -> float:
