@@ -5,6 +5,7 @@ import socket
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 from distributed import LocalCluster
@@ -128,3 +129,45 @@ def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_addr
 def test_an_impossible_number_of_workers_is_refused(workers):
     with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), make_executor(workers):
         pass
+
+
+def end_of_the_third(text, batch):
+    """Fly a batch; with the third the worker ends."""
+    if batch == 3:
+        os._exit(1)
+    return b""
+
+
+def length_of(text, batch):
+    """Fly a batch."""
+    return str(len(text)).encode()
+
+
+def test_a_batch_that_ends_every_worker_ends_the_campaign_and_not_the_executor():
+    with make_executor(2) as workers:
+        with pytest.raises(RunError, match="several workers died of the same batch"):
+            list(workers.fly(end_of_the_third, "", range(8)))
+        assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+
+
+def test_workers_killed_while_they_wait_are_replaced():
+    with make_executor(2) as workers:
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGKILL)
+            wait_until(lambda pid=pid: not alive(pid))
+        assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
+
+
+def test_an_executor_leaves_environment_and_no_process_behind():
+    before = dict(os.environ)
+    with make_executor(2) as workers:
+        pids = workers.pids()
+    assert dict(os.environ) == before and not any(map(alive, pids))
+
+
+def alive(pid):
+    """Tell whether a process runs, or has ended and is still to be waited for."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False

@@ -63,22 +63,23 @@ class ProcessExecutor:
     """Flies the batches in processes of this machine, each with a queue of its own; one that is lost is replaced."""
 
     def __init__(self, workers: int) -> None:
-        """Start so many processes; who made this calls :meth:`close`.
+        """Make an executor of so many processes, which :meth:`start` starts and :meth:`close` ends."""
+        self.cores = workers
+        self._workers: list[_Worker] = []
+
+    def start(self) -> None:
+        """Start the processes; Ctrl-C takes effect when all have started.
 
         Raises:
             RunError: One of them does not start.
         """
-        self._workers = [_Worker() for _ in range(workers)]
-        try:
-            self.pids()
-        except BrokenProcessPool as error:
-            self.close()
-            raise RunError(f"campaign: a worker process does not start ({error})") from error
-
-    @property
-    def cores(self) -> int:
-        """Number of processes."""
-        return len(self._workers)
+        with ctrl_c_held_back():
+            for _ in range(self.cores):
+                self._workers.append(_Worker())
+            try:
+                self.pids()
+            except BrokenProcessPool as error:
+                raise RunError(f"campaign: a worker process does not start ({error})") from error
 
     def pids(self) -> list[int]:
         """Return the process identifiers of the workers, which have started then."""
@@ -242,6 +243,7 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
         return
     flying = ProcessExecutor(workers)
     try:
+        flying.start()
         yield flying
     except BaseException:
         flying.kill()
