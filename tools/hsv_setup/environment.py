@@ -78,24 +78,28 @@ def install_rest(route: Route, env: Mapping[str, str], stage: Stage) -> None:
 
 
 def _install_installer(route: Route, env: Mapping[str, str], stage: Stage) -> None:
-    """Install uv, which installs in a fifth of pip's time, unless pip's settings name an index, which uv does not read.
+    """Install uv, which installs in a fifth of pip's time; where there is none for this machine, pip installs.
 
-    Nothing depends on it: where there is none for this machine, pip installs.
+    It does not read pip's settings, so it is not used where these name an index.
     """
     settings = subprocess.run([PYTHON, "-m", "pip", "config", "list"], env=dict(env), capture_output=True, text=True)
     if not re.search(r"^\S+\.(index-url|no-index)=", settings.stdout, re.MULTILINE):
         with suppress(SetupError):
             _install_by_pip(route, ["--requirement", "requirements-setup.txt"], env, stage)
+            return
+    _UV.unlink(missing_ok=True)  # of an earlier set-up
 
 
 def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
     # Copies, because some of what is installed is changed, and links would change uv's cache.
     uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--link-mode", "copy"]
     if route.wheels and _UV.exists():
-        with suppress(SetupError):
+        try:
             stage.run([*uv, "--constraint", route.constraints, "--no-build-isolation", *wanted], env)
-            wanted = ()
-    if wanted:
+        except SetupError:
+            _UV.unlink()  # it would fail again
+            _install_by_pip(route, wanted, env, stage)
+    else:
         _install_by_pip(route, wanted, env, stage)
     compile_packages(PYTHON, env, stage)
 

@@ -23,11 +23,14 @@ _AHEAD = 4
 """Batches per core that are queued at the workers: enough that none is idle, few enough that a lost worker costs
 little."""
 
+_AHEAD_HERE = 2
+"""The same of processes of this machine: one that flies, and one that waits."""
+
 _TRIES = 4
-"""Workers with which the same batch may be lost."""
+"""Workers that die of the same batch, or with it in their queue, before the campaign ends."""
 
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
-"""Environment of a worker: there are as many as processors."""
+"""Environment of a worker: one thread each, as there are as many workers as processors."""
 
 
 Job = Callable[[str, int], bytes]
@@ -82,7 +85,7 @@ class ProcessExecutor:
                 raise RunError(f"campaign: a worker process does not start ({error})") from error
 
     def pids(self) -> list[int]:
-        """Return the process identifiers of the workers, which have started then."""
+        """Return the process identifiers of the workers, once they have started."""
         return [worker.pid.result() for worker in self._workers]
 
     def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
@@ -98,31 +101,19 @@ class ProcessExecutor:
             for batch in some:
                 running[self._workers[place].submit(job, text, batch)] = place, batch
 
-        def recover(place: int) -> None:
-            """Give what a lost worker had not finished to the one in its place."""
-            theirs = {future: batch for future, (at, batch) in running.items() if at == place}
-            lost.update(theirs.values())
-            if max(lost.values()) >= _TRIES:
-                raise RunError(f"campaign: several workers died of the same batch; {_KEPT}")
-            for future in theirs:
-                del running[future]
-            submit(place, theirs.values())
-
-        for place in [*range(self.cores)] * _AHEAD:
+        for place in [*range(self.cores)] * _AHEAD_HERE:
             submit(place, islice(waiting, 1))
-        try:
-            while running:
-                for future in wait(running, return_when=FIRST_COMPLETED).done & running.keys():
-                    place, batch = running[future]
-                    if isinstance(future.exception(), BrokenProcessPool):
-                        recover(place)
-                        break
-                    del running[future]
+        while running:
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                place, batch = running.pop(future)
+                if not isinstance(future.exception(), BrokenProcessPool):
                     submit(place, islice(waiting, 1))
                     yield batch, future.result()
-        finally:
-            for future in running:
-                future.cancel()
+                    continue
+                lost[batch] += 1
+                if lost[batch] >= _TRIES:
+                    raise RunError(f"campaign: several workers died of the same batch; {_KEPT}")
+                submit(place, [batch])
 
     def kill(self) -> None:
         """End the processes at once: what they fly may take minutes."""
