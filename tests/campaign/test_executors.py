@@ -4,6 +4,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -148,6 +149,38 @@ def test_a_batch_that_ends_every_worker_ends_the_campaign_and_not_the_executor()
         with pytest.raises(RunError, match="several workers died of the same batch"):
             list(workers.fly(end_of_the_third, "", range(8)))
         assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+
+
+def a_large_answer(text, batch):
+    """Fly a batch whose content is far more than a pipe holds."""
+    return bytes(3_000_000)
+
+
+def test_workers_killed_in_the_middle_of_an_answer_are_replaced():
+    with make_executor(2) as workers:
+        answers = workers.fly(a_large_answer, "", range(6))
+        next(answers)
+        time.sleep(0.3)  # nobody reads: both are in the middle of the next answer
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGKILL)
+        assert sum(len(content) == 3_000_000 for _, content in answers) == 5
+
+
+class UnportableError(Exception):
+    """An error that cannot be made again of its arguments."""
+
+    def __init__(self, a, b):
+        super().__init__(a + b)
+
+
+def an_unportable_error(text, batch):
+    """Fail with an error that does not arrive in another process."""
+    raise UnportableError("so", "long")
+
+
+def test_an_error_that_cannot_be_pickled_is_told():
+    with make_executor(2) as workers, pytest.raises(RunError, match="UnportableError: solong"):
+        list(workers.fly(an_unportable_error, "", range(2)))
 
 
 def test_workers_killed_while_they_wait_are_replaced():

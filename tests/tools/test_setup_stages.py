@@ -1,5 +1,6 @@
 """Commands that set-up runs, and the paths that it rewrites."""
 
+import re
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ FAILING = [sys.executable, "-c", "import sys; print('reason'); sys.exit(3)"]
 
 def runs(stage):
     """Tell whether the process of SLOW, which its log names, runs; if it has begun at all."""
-    begun = [line.split()[1] for line in stage.log.read_text().splitlines() if line.startswith("process ")]
+    begun = re.findall(r"^process (\d+)\n", stage.log.read_text(), re.MULTILINE)  # it is written in pieces
     return any(Path("/proc", number).exists() for number in begun)
 
 

@@ -77,6 +77,7 @@ class Stage:
             SetupError: as there; commands that are run in the block tell it, too.
         """
         process: subprocess.Popen[bytes] | None = None
+        self._end = None
         with self.log.open("ab") as out:
             out.write(("+ " + " ".join(map(str, command)) + "\n").encode())
             out.flush()

@@ -87,7 +87,12 @@ def _install_installer(route: Route, env: Mapping[str, str], stage: Stage) -> No
         with suppress(SetupError):
             _install_by_pip(route, ["--requirement", "requirements-setup.txt"], env, stage)
             return
-    _UV.unlink(missing_ok=True)  # of an earlier set-up
+    _remove_installer(env, stage)  # of an earlier set-up
+
+
+def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
+    if _UV.exists():
+        stage.run([PYTHON, "-m", "pip", "--disable-pip-version-check", "uninstall", "--yes", "uv"], env)
 
 
 def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
@@ -97,7 +102,7 @@ def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage:
         try:
             stage.run([*uv, "--constraint", route.constraints, "--no-build-isolation", *wanted], env)
         except SetupError:
-            _UV.unlink()  # it would fail again
+            _remove_installer(env, stage)  # it would fail again
             _install_by_pip(route, wanted, env, stage)
     else:
         _install_by_pip(route, wanted, env, stage)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
-from collections import Counter
+import pickle
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from itertools import islice
-from typing import Any, Protocol
+from multiprocessing.connection import Connection, wait
+from typing import Any, Protocol, cast
 
 from hsv.campaign.program import check_workers
 from hsv.campaign.scheduler import connected
@@ -24,10 +23,10 @@ _AHEAD = 4
 little."""
 
 _AHEAD_HERE = 2
-"""The same of processes of this machine: one that flies, and one that waits."""
+"""The same for the processes of this machine: one batch flying, one waiting."""
 
 _TRIES = 4
-"""Workers that die of the same batch, or with it in their queue, before the campaign ends."""
+"""Workers that may die while they fly the same batch, less one."""
 
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
 """Environment of a worker: one thread each, as there are as many workers as processors."""
@@ -66,81 +65,96 @@ class ProcessExecutor:
     """Flies the batches in processes of this machine, each with a queue of its own; one that is lost is replaced."""
 
     def __init__(self, workers: int) -> None:
-        """Make an executor of so many processes, which :meth:`start` starts and :meth:`close` ends."""
+        """Make an executor with this many processes; :meth:`start` starts them, :meth:`close` waits for their end."""
         self.cores = workers
         self._workers: list[_Worker] = []
 
     def start(self) -> None:
-        """Start the processes; Ctrl-C takes effect when all have started.
+        """Start the processes.
 
         Raises:
-            RunError: One of them does not start.
+            RunError: One of them cannot be started.
         """
-        with ctrl_c_held_back():
-            for _ in range(self.cores):
-                self._workers.append(_Worker())
-            try:
-                self.pids()
-            except BrokenProcessPool as error:
-                raise RunError(f"campaign: a worker process does not start ({error})") from error
+        for _ in range(self.cores):
+            self._workers.append(_Worker())
 
-    def pids(self) -> list[int]:
-        """Return the process identifiers of the workers, once they have started."""
-        return [worker.pid.result() for worker in self._workers]
+    def pids(self) -> list[int | None]:
+        """Return the process identifiers of the workers."""
+        return [worker.process.pid for worker in self._workers]
 
     def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
         """Yield number and content of each batch.
 
         Raises:
-            RunError: Workers die of a batch again and again.
+            RunError: The same batch was lost with several workers.
         """
         waiting, lost = iter(batches), Counter[int]()
-        running: dict[Future[bytes], tuple[int, int]] = {}
-
-        def submit(place: int, some: Iterable[int]) -> None:
-            for batch in some:
-                running[self._workers[place].submit(job, text, batch)] = place, batch
-
-        for place in [*range(self.cores)] * _AHEAD_HERE:
-            submit(place, islice(waiting, 1))
-        while running:
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                place, batch = running.pop(future)
-                if not isinstance(future.exception(), BrokenProcessPool):
-                    submit(place, islice(waiting, 1))
-                    yield batch, future.result()
-                    continue
-                lost[batch] += 1
-                if lost[batch] >= _TRIES:
-                    raise RunError(f"campaign: several workers died of the same batch; {_KEPT}")
-                submit(place, [batch])
+        try:
+            for worker in self._workers:
+                worker.begin(job, text)
+            for worker in self._workers * _AHEAD_HERE:
+                worker.give(islice(waiting, 1))
+            while busy := {worker.connection: worker for worker in self._workers if worker.queue}:
+                for connection in wait([*busy]):
+                    worker = busy[cast(Connection, connection)]
+                    try:
+                        answer = worker.connection.recv()
+                    except (EOFError, OSError):
+                        again = [*worker.queue]
+                        lost[again[0]] += 1
+                        code = worker.restart()
+                        if lost[again[0]] >= _TRIES:
+                            died = f"several workers died of the same batch, at last with exit code {code}"
+                            raise RunError(f"campaign: {died}; {_KEPT}") from None
+                        worker.begin(job, text)
+                        worker.give(again)
+                        continue
+                    batch = worker.queue.popleft()
+                    worker.give(islice(waiting, 1))
+                    if isinstance(answer, Exception):
+                        raise answer
+                    yield batch, answer
+        except Exception:
+            # What others fly is not wanted any more, and the executor may be used again.
+            for worker in self._workers:
+                if worker.queue:
+                    worker.restart()
+            raise
 
     def kill(self) -> None:
         """End the processes at once: what they fly may take minutes."""
         for worker in self._workers:
-            with suppress(BrokenProcessPool, ProcessLookupError):
-                os.kill(worker.pid.result(), signal.SIGKILL)
+            worker.process.kill()
 
     def close(self) -> None:
         """Wait until the processes have ended."""
         for worker in self._workers:
-            worker.close()
+            worker.connection.close()
+        for worker in self._workers:
+            worker.process.join()
 
 
 class _Worker:
-    """A process that does one thing after the other, and never receives Ctrl-C; lost, it is started again."""
+    """A process that flies one batch after the other, and never receives Ctrl-C."""
 
     def __init__(self) -> None:
+        self.queue: deque[int] = deque()
+        """Batches that it has been given, and has not answered."""
         self._start()
 
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(1, context, end_with_parent, (os.getpid(),))
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
         with ctrl_c_held_back():
             os.environ.update(_ONE_THREAD)
             try:
-                self.pid = self._pool.submit(os.getpid)  # the process starts with its first job
+                self.connection, its_end = context.Pipe()
+                # Closed here: the connection then ends with the process, also in the middle of an answer.
+                with its_end:
+                    self.process = context.Process(target=_serve, args=(its_end, os.getpid()))
+                    self.process.start()
+            except OSError as error:
+                raise RunError(f"campaign: a worker process cannot be started ({reason(error)})") from error
             finally:
                 for name, value in before.items():
                     if value is None:
@@ -148,16 +162,52 @@ class _Worker:
                     else:
                         os.environ[name] = value
 
-    def submit(self, job: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        try:
-            return self._pool.submit(job, *arguments)
-        except BrokenProcessPool:
-            self.close()
-            self._start()
-            return self._pool.submit(job, *arguments)
+    def begin(self, job: Job, text: str) -> None:
+        """Say what is to be flown; it waits for that, and has no batch."""
+        with suppress(OSError):  # it has ended, as is noticed when it should answer
+            self.connection.send((job, text))
 
-    def close(self) -> None:
-        self._pool.shutdown(cancel_futures=True)
+    def give(self, batches: Iterable[int]) -> None:
+        """Let it fly ``batches``, after those that it has."""
+        for batch in batches:
+            self.queue.append(batch)
+            with suppress(OSError):
+                self.connection.send(batch)
+
+    def restart(self) -> int | None:
+        """End the process, if it has not ended, and start another, without batches; return the exit code."""
+        self.process.join(0.1)
+        self.process.kill()
+        self.process.join()
+        code = self.process.exitcode
+        self.connection.close()
+        self.queue.clear()
+        self._start()
+        return code
+
+
+def _serve(connection: Connection, parent: int) -> None:
+    """Fly what the ``parent`` asks for, until it closes the connection."""
+    end_with_parent(parent)
+    with suppress(EOFError, OSError):
+        while True:
+            asked = connection.recv()
+            if isinstance(asked, tuple):
+                job, text = asked
+                continue
+            try:
+                answer = job(text, asked)
+            except Exception as error:
+                answer = _portable(error)
+            connection.send(answer)
+
+
+def _portable(error: Exception) -> Exception:
+    """Return an error that arrives in another process: not all can be made again of their arguments."""
+    try:
+        return cast(Exception, pickle.loads(pickle.dumps(error)))
+    except Exception:
+        return RunError(f"{type(error).__name__}: {error}")
 
 
 class DaskExecutor:
