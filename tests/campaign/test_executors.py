@@ -183,6 +183,12 @@ def test_an_error_that_cannot_be_pickled_is_told():
         list(workers.fly(an_unportable_error, "", range(2)))
 
 
+def test_batches_that_nobody_took_are_not_taken_for_those_of_the_next_campaign():
+    with make_executor(2) as workers:
+        next(workers.fly(a_large_answer, "", range(6)))
+        assert dict(workers.fly(length_of, "text", range(6))) == dict.fromkeys(range(6), b"4")
+
+
 def test_workers_killed_while_they_wait_are_replaced():
     with make_executor(2) as workers:
         for pid in workers.pids():
@@ -202,5 +208,5 @@ def alive(pid):
     """Tell whether a process runs, or has ended and is still to be waited for."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except FileNotFoundError:
+    except (FileNotFoundError, ProcessLookupError):
         return False

@@ -30,7 +30,8 @@ def identity(route: Route, python: Interpreter) -> str:
 
 def contents(route: Route) -> str:
     """Return a fingerprint of all that decides what is installed."""
-    files = [ROOT / name for name in (*route.requirements, "requirements-setup.txt", route.constraints)]
+    installer = ["requirements-setup.txt"] if route.wheels else []
+    files = [ROOT / name for name in (*route.requirements, *installer, route.constraints)]
     files += [_HERE / "environment.py", _HERE / "bytecode.py", _HERE / "relocate.py"]
     return fingerprint(*(path.read_bytes() for path in files))
 
@@ -96,7 +97,7 @@ def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
 
 
 def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
-    # Copies, because some of what is installed is changed, and links would change uv's cache.
+    # Copies: some installed files are changed later, and a link would change uv's cache as well.
     uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--link-mode", "copy"]
     if route.wheels and _UV.exists():
         try:

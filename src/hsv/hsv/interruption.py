@@ -60,7 +60,7 @@ def take_interrupts() -> None:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let this process, a child of ``parent``, be terminated when that ends; only Linux can."""
+    """Have Linux terminate this process, a child of ``parent``, when the thread that started it ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already

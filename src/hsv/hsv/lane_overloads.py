@@ -106,7 +106,7 @@ def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
 
     def of_lanes(weights: Any, rows: Any, total: Any) -> None:
         size = rows.shape[1]
-        # Six sums at a time: an addition waits for the one before it in its sum, and the registers hold no more.
+        # Six sums at a time: each addition needs the one before it in its sum, and AVX2 has no registers for more.
         for e in range(0, size, 6):
             s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
             for r in range(len(rows)):

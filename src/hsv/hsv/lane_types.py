@@ -448,7 +448,7 @@ def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
 
 @_intrinsic
 def flat_element(typing_context: Any, array: Any, index: Any) -> Any:
-    """Return the number of a contiguous array of float64 at a flat ``index``, which is not counted from the end."""
+    """Return the number of a contiguous array of float64 at a flat ``index``, not negative."""
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         given, place = arguments
@@ -475,7 +475,7 @@ def powers_of_two(typing_context: Any, whole: Any) -> Any:
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         kind = _vector(_WORD, whole.count)
-        # By way of 32 bits, for which AVX2 has an instruction.
+        # Through 32 bits: AVX2 has no conversion to 64.
         exponent = builder.sext(builder.fptosi(arguments[0], _vector(ir.IntType(32), whole.count)), kind)
         biased = builder.add(exponent, ir.Constant(kind, [1023] * whole.count))
         return builder.bitcast(builder.shl(biased, ir.Constant(kind, [52] * whole.count)), arguments[0].type)

@@ -36,7 +36,7 @@ __all__ = [
 
 
 BLOCK = 24
-"""A multiple of the numbers that a register of any processor holds, and of the sums that lanes compute at a time."""
+"""A common multiple of the numbers in a register of any processor (4, 8) and of the sums of lanes at a time (6)."""
 
 
 def every(condition: Any) -> Any:

@@ -1,4 +1,4 @@
-"""SHA-256 of two arrays at a time with the SHA instructions of x86-64, each with the digest it has alone.
+"""SHA-256 of two arrays at a time with the SHA instructions of x86-64, the digests are those of :mod:`hashlib`.
 
 FIPS 180-4. Each instruction computes two rounds of a digest and waits for the two before; the processor meanwhile
 computes those of the other digest, so that two arrays take hardly longer than one.
@@ -33,7 +33,7 @@ _INITIAL = (0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A, 0x510E527F, 0x9B0568
 """H(0), section 5.3.3: a ... h."""
 
 _ORDER = (5, 4, 1, 0, 7, 6, 3, 2)
-"""Which of a ... h each word is of the two registers in which the instructions keep them: f e b a and h g d c."""
+"""Order of a ... h in the two registers of the instructions: f e b a, and h g d c."""
 
 _CONSTANTS = (
     *(0x428A2F98, 0x71374491, 0xB5C0FBCF, 0xE9B5DBA5, 0x3956C25B, 0x59F111F1, 0x923F82A4, 0xAB1C5ED5),
@@ -62,7 +62,7 @@ def digests(arrays: Sequence[np.ndarray]) -> list[bytes]:
     state = np.array([[_INITIAL[i] for i in _ORDER]] * 2, np.uint32)
     sizes = [array.size for array in arrays]
     _absorb_both(state, arrays, [size // _NUMBERS for size in sizes])
-    # What is left of each, a bit that ends it, and its length in bits, big-endian: in one block or in two.
+    # Padding: the remaining numbers, a 1 bit, zeros, and the length in bits, big-endian; one block or two.
     ends = np.zeros((2, 2 * _NUMBERS), "<u8")
     blocks = [1 if size % _NUMBERS < _NUMBERS - 1 else 2 for size in sizes]
     for end, array, size, last in zip(ends, arrays, sizes, blocks, strict=True):
@@ -70,7 +70,7 @@ def digests(arrays: Sequence[np.ndarray]) -> list[bytes]:
         end[:left] = array.reshape(-1)[size - left :].view(np.uint64)
         end[left] = 0x80
         end[last * _NUMBERS - 1] = np.uint64(64 * size).byteswap()
-    # None of these numbers is NaN: lengths are whole multiples of 64, so that the exponent has zeros.
+    # The length is never taken for a NaN: it is a multiple of 64, so its exponent bits are not all ones.
     _absorb_both(state, [*ends], blocks)
     return [own[np.argsort(_ORDER)].astype(">u4").tobytes() for own in state]
 
@@ -143,7 +143,7 @@ def _rounds(builder: Any, states: list[list[Any]], words: list[list[Any]]) -> li
                 w.append(_call(builder, "x86.sha256msg2", partial, w[-1]))
             added = builder.add(w[i // 4], ir.Constant(_WORDS, _CONSTANTS[i : i + 4]))
             for _ in range(2):
-                # Of the words the first two count, and what was f e b a is h g d c two rounds later.
+                # The instruction uses the two lower words; the old f e b a becomes the new h g d c.
                 own[:] = _call(builder, "x86.sha256rnds2", own[1], own[0], added), own[0]
                 added = _picked(builder, [added, added], (2, 3, 2, 3))
     return after

@@ -28,7 +28,7 @@ _MOST_PROCESSES = 4
 
 
 _SOON_DONE = {"duration": 0.1, **{parameter.name: 1.0 for parameter in PROCESS_PARAMETERS}}
-"""A short flight, with noise of which an estimator's gain is found in a quarter of the iterations."""
+"""A short flight, with process noise for which the estimator's gain converges in a quarter of the iterations."""
 
 
 def warm() -> None:

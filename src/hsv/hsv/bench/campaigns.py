@@ -25,7 +25,7 @@ from hsv.simulation.scenario import load_scenario
 def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:
     """Return the pace of ``workers`` against as many times that of one, flights of Case 1, workers warm.
 
-    Beside it stands what the C build gains in the same way, which is what the processors allow.
+    The note has the same ratio for the C build, which is what the processors allow.
     """
     paces: dict[int, list[float]] = {1: [], workers: []}
     paces_c: dict[int, list[float]] = {1: [], workers: []}

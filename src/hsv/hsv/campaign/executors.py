@@ -26,7 +26,7 @@ _AHEAD_HERE = 2
 """The same for the processes of this machine: one batch flying, one waiting."""
 
 _TRIES = 4
-"""Workers that may die while they fly the same batch, less one."""
+"""Workers lost with the same batch before the campaign ends."""
 
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
 """Environment of a worker: one thread each, as there are as many workers as processors."""
@@ -89,37 +89,30 @@ class ProcessExecutor:
             RunError: The same batch was lost with several workers.
         """
         waiting, lost = iter(batches), Counter[int]()
-        try:
-            for worker in self._workers:
-                worker.begin(job, text)
-            for worker in self._workers * _AHEAD_HERE:
+        for worker in self._workers:
+            worker.begin(job, text)
+        for worker in self._workers * _AHEAD_HERE:
+            worker.give(islice(waiting, 1))
+        while busy := {worker.connection: worker for worker in self._workers if worker.queue}:
+            for connection in wait([*busy]):
+                worker = busy[cast(Connection, connection)]
+                try:
+                    answer = worker.connection.recv()
+                except (EOFError, OSError):
+                    again = [*worker.queue]
+                    lost[again[0]] += 1
+                    code = worker.restart()
+                    if lost[again[0]] >= _TRIES:
+                        died = f"several workers died of the same batch, at last with exit code {code}"
+                        raise RunError(f"campaign: {died}; {_KEPT}") from None
+                    worker.begin(job, text)
+                    worker.give(again)
+                    continue
+                batch = worker.queue.popleft()
                 worker.give(islice(waiting, 1))
-            while busy := {worker.connection: worker for worker in self._workers if worker.queue}:
-                for connection in wait([*busy]):
-                    worker = busy[cast(Connection, connection)]
-                    try:
-                        answer = worker.connection.recv()
-                    except (EOFError, OSError):
-                        again = [*worker.queue]
-                        lost[again[0]] += 1
-                        code = worker.restart()
-                        if lost[again[0]] >= _TRIES:
-                            died = f"several workers died of the same batch, at last with exit code {code}"
-                            raise RunError(f"campaign: {died}; {_KEPT}") from None
-                        worker.begin(job, text)
-                        worker.give(again)
-                        continue
-                    batch = worker.queue.popleft()
-                    worker.give(islice(waiting, 1))
-                    if isinstance(answer, Exception):
-                        raise answer
-                    yield batch, answer
-        except Exception:
-            # What others fly is not wanted any more, and the executor may be used again.
-            for worker in self._workers:
-                if worker.queue:
-                    worker.restart()
-            raise
+                if isinstance(answer, Exception):
+                    raise answer
+                yield batch, answer
 
     def kill(self) -> None:
         """End the processes at once: what they fly may take minutes."""
@@ -135,7 +128,7 @@ class ProcessExecutor:
 
 
 class _Worker:
-    """A process that flies one batch after the other, and never receives Ctrl-C."""
+    """A process that flies one batch after another and never receives Ctrl-C."""
 
     def __init__(self) -> None:
         self.queue: deque[int] = deque()
@@ -163,7 +156,9 @@ class _Worker:
                         os.environ[name] = value
 
     def begin(self, job: Job, text: str) -> None:
-        """Say what is to be flown; it waits for that, and has no batch."""
+        """Say what is to be flown. Batches of an earlier flying that ended early are given up, with the process."""
+        if self.queue:
+            self.restart()
         with suppress(OSError):  # it has ended, as is noticed when it should answer
             self.connection.send((job, text))
 
@@ -176,7 +171,7 @@ class _Worker:
 
     def restart(self) -> int | None:
         """End the process, if it has not ended, and start another, without batches; return the exit code."""
-        self.process.join(0.1)
+        self.process.join(0.1)  # one that is just ending has an exit code of its own
         self.process.kill()
         self.process.join()
         code = self.process.exitcode

@@ -80,8 +80,8 @@ def application(names: Sequence[str] = COMMANDS, *, listed: bool = False) -> typ
     """Return the command line with commands of these names, whose modules are imported.
 
     Args:
-        names: Of the commands.
-        listed: Whether they are only listed with what they do: to make out their options takes longer than the rest.
+        names: Names of the commands.
+        listed: Whether only names and descriptions are needed, as for ``hsv --help``: options take most of the time.
     """
     app = typer.Typer(
         name="hsv",

@@ -12,7 +12,6 @@ import tomllib
 from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -48,11 +47,11 @@ def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
     # Here, as most that know of a fingerprint have one flight.
     from hsv.sha256_pairs import AVAILABLE, digests
 
-    if not AVAILABLE:
-        return [fingerprint(rows) for rows in flown]
-    pairs = (flown[start : start + 2] for start in range(0, len(flown), 2))
-    found = (map(_written, digests(pair)) if len(pair) == 2 else map(fingerprint, pair) for pair in pairs)
-    return list(chain.from_iterable(found))
+    found: list[str] = []
+    for start in range(0, len(flown), 2):
+        pair = [np.ascontiguousarray(rows, "<f8") for rows in flown[start : start + 2]]
+        found += map(_written, digests(pair)) if AVAILABLE and len(pair) == 2 else map(fingerprint, pair)
+    return found
 
 
 def _written(digest: bytes) -> str:
