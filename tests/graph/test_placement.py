@@ -1,0 +1,111 @@
+"""The processor that the nodes of a flight share."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from hsv.graph.exclusive import claim_processor
+from hsv.graph.launcher import Launcher, parameter_arguments
+from hsv.graph.parameter_sections import ParameterSections
+from hsv.graph.placement import CHAIN, share_processor
+from hsv.graph.preparation import prepare
+
+ALLOWED = os.sched_getaffinity(0)
+
+several_processors = pytest.mark.skipif(len(ALLOWED) < 2, reason="this machine lends one processor only")
+
+TWO_THREADS = "import sys, threading; threading.Thread(target=sys.stdin.read).start(); print(flush=True)"
+
+
+def processors(pid: int) -> list[set[int]]:
+    """Return the processors that each thread of a process may use."""
+    return [os.sched_getaffinity(int(thread.name)) for thread in Path(f"/proc/{pid}/task").iterdir()]
+
+
+@pytest.fixture
+def pids() -> Iterator[list[int]]:
+    """Two processes of two threads each."""
+    with ExitStack() as stack:
+        command = [sys.executable, "-c", TWO_THREADS]
+        pipe = subprocess.PIPE
+        started = [stack.enter_context(subprocess.Popen(command, stdin=pipe, stdout=pipe)) for _ in range(2)]
+        for process in started:
+            process.stdout.readline()
+        yield [process.pid for process in started]
+        for process in started:
+            process.stdin.close()
+
+
+@several_processors
+def test_all_threads_share_a_processor_that_no_other_flight_gets(pids: list[int]) -> None:
+    # Other test runs of this machine may fly meanwhile, and have processors.
+    held = share_processor(pids)
+    if held is None:
+        pytest.skip("other flights have all processors")
+    with held:
+        shared = [threads for pid in pids for threads in processors(pid)]
+        assert len(shared) == 4 and all(len(threads) == 1 for threads in shared)
+        (processor,) = set.union(*shared)
+        assert processor in ALLOWED
+        assert claim_processor(processor) is None
+
+
+@several_processors
+def test_where_other_flights_have_all_processors_nothing_changes(pids: list[int]) -> None:
+    with ExitStack() as others:
+        for processor in ALLOWED:
+            if held := claim_processor(processor):
+                others.enter_context(held)
+        assert share_processor(pids) is None
+        assert all(threads == ALLOWED for pid in pids for threads in processors(pid))
+
+
+def test_one_processor_is_left_to_the_system(pids: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0})
+    assert share_processor(pids) is None
+    monkeypatch.undo()
+    assert all(threads == ALLOWED for pid in pids for threads in processors(pid))
+
+
+@several_processors
+def test_a_process_that_has_ended_is_no_error(pids: list[int]) -> None:
+    ended = subprocess.Popen(["true"])
+    ended.wait()
+    if held := share_processor([ended.pid, *pids]):
+        with held:
+            assert all(len(threads) == 1 for pid in pids for threads in processors(pid))
+
+
+@several_processors
+def test_in_flight_the_nodes_of_the_chain_share_a_processor(
+    ros_environment: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in ros_environment.items():
+        monkeypatch.setenv(name, value)
+    found: dict[str, set[frozenset[int]]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        prepared = prepare("case1", bag=Path(folder, "bag"))
+        shortened = Path(folder, "duration.yaml")
+        shortened.write_text(ParameterSections({"duration": 40.0}).to_yaml(), encoding="utf-8")
+
+        def look(step: int) -> None:
+            for process in launcher._processes:
+                # The last look counts: after the first reported step, the launcher places the nodes.
+                found[process.description.name] = {frozenset(threads) for threads in processors(process.popen.pid)}
+
+        arguments = parameter_arguments([*prepared.parameter_files, shortened])
+        with Launcher(prepared.nodes, arguments, look, lambda node, text: None) as launcher:
+            launcher.wait()
+    together = set.union(*(found[name] for name in CHAIN))
+    if together == {frozenset(ALLOWED)}:
+        pytest.skip("other flights have all processors")
+    assert len(together) == 1 and len(next(iter(together))) == 1
+    assert found["recorder"] == found["nominal_trajectory"] == {frozenset(ALLOWED)}
