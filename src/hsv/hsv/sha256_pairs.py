@@ -1,4 +1,4 @@
-"""SHA-256 of two arrays at a time with the SHA instructions of x86-64, the digests are those of :mod:`hashlib`.
+"""SHA-256 of two arrays at a time with the SHA instructions of x86-64: the digests of :mod:`hashlib`.
 
 FIPS 180-4. Each instruction computes two rounds of a digest and waits for the two before; the processor meanwhile
 computes those of the other digest, so that two arrays take hardly longer than one.

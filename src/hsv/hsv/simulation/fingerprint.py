@@ -44,7 +44,7 @@ def fingerprint(flown: np.ndarray) -> str:
 
 def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
     """Return the fingerprint of each of several flights, rows as :func:`fingerprint` takes them, two at a time."""
-    # Here, as most that know of a fingerprint have one flight.
+    # Imported here, because most who use this module have one flight.
     from hsv.sha256_pairs import AVAILABLE, digests
 
     found: list[str] = []
