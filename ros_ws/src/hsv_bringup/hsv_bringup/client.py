@@ -21,6 +21,7 @@ from hsv.graph.exclusive import is_published
 from hsv.graph.standstill import Standstill
 from hsv.json_text import json_text
 from hsv_node import roles
+from hsv_node.ending import ends_with
 from hsv_node.main import take_signals
 from hsv_node.messages import type_name
 from hsv_node.qos import LATCHED
@@ -196,23 +197,29 @@ def run_client(
     name = parser.prog
     parser.add_argument("--prog", action=_Prog, help=argparse.SUPPRESS)
     options = parser.parse_args(remove_ros_args(given)[1:])
+    clients: list[GraphClient] = []
+    code = 1
     try:
         take_signals(signal.default_int_handler)
         rclpy.init(args=given, signal_handler_options=rclpy.SignalHandlerOptions.NO)
-        act(GraphClient(name), options)
+        clients.append(GraphClient(name))
+        act(clients[0], options)
         sys.stdout.flush()
-        return 0
+        code = 0
     except KeyboardInterrupt:
-        return _refuse(parser.prog, "interrupted", INTERRUPTED)
+        code = _refuse(parser.prog, "interrupted", INTERRUPTED)
     except BrokenPipeError:
         # Nobody reads any more: Python must not find that out a second time at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
+        code = 1
     except HsvError as error:
-        return _refuse(parser.prog, error, 1 if isinstance(error, RunError) else 2)
+        code = _refuse(parser.prog, error, 1 if isinstance(error, RunError) else 2)
     finally:
-        with suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt), ends_with(code):
+            for client in clients:
+                client.destroy_node()
             rclpy.try_shutdown()
+    return code
 
 
 def answer(text: str, values: Mapping[str, Any], as_json: bool) -> None:

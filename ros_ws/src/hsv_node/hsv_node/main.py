@@ -17,6 +17,7 @@ from rclpy.utilities import remove_ros_args
 
 from hsv.errors import HsvError, ParameterError
 from hsv_node.arguments import check_names, shared_parameters
+from hsv_node.ending import ends_with
 from hsv_node.middleware import prefer_profiles
 from hsv_node.process import ProcessNode
 
@@ -65,7 +66,7 @@ def run_nodes(
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
     nodes: list[ProcessNode] = []
-    code = 0
+    code = 1
     try:
         executor = executor_class()
         for node in build():
@@ -96,8 +97,11 @@ def run_nodes(
             except HsvError as error:
                 # A full disk is found out by the write that fails, and then by this one: said once.
                 code = code or _refuse(name, error)
-            node.destroy_node()
-        rclpy.try_shutdown()
+        sys.stdout.flush()
+        with ends_with(code):
+            for node in nodes:
+                node.destroy_node()
+            rclpy.try_shutdown()
     return code
 
 
