@@ -1,4 +1,4 @@
-"""Exclusive roles in a ROS domain: one run per namespace, and one publisher per topic.
+"""Exclusive roles: in a ROS domain, one run per namespace and one publisher per topic; one flight per processor.
 
 Each is a name that one process of this machine can bind, an abstract socket: taken at once, before the second has sent
 anything, and free as soon as its process is gone, however that ended. On other machines of the same domain nothing is
@@ -46,6 +46,11 @@ def claim_node(domain: int, name: str) -> socket.socket | None:
     return _bound("hsv_node", domain, name)
 
 
+def claim_processor(number: int) -> socket.socket | None:
+    """Return what keeps a processor of this machine to one flight while it is open; None if another flight has it."""
+    return _bound("hsv_processor", number, "")
+
+
 def is_published(domain: int, topic: str) -> bool:
     """Tell whether a node of this machine has claimed ``topic``."""
     # To bind it would refuse a node that claims it in the same instant.
@@ -57,17 +62,17 @@ def is_published(domain: int, topic: str) -> bool:
     return True
 
 
-def _address(kind: str, domain: int, name: str) -> str:
-    text = f"{kind}_{domain}{name}"
+def _address(kind: str, number: int, name: str) -> str:
+    text = f"{kind}_{number}{name}"
     if len(text) > _LONGEST_NAME:
-        text = f"{kind}_{domain}_{hashlib.sha256(name.encode()).hexdigest()}"
+        text = f"{kind}_{number}_{hashlib.sha256(name.encode()).hexdigest()}"
     return f"\0{text}"
 
 
-def _bound(kind: str, domain: int, name: str) -> socket.socket | None:
+def _bound(kind: str, number: int, name: str) -> socket.socket | None:
     held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        held.bind(_address(kind, domain, name))
+        held.bind(_address(kind, number, name))
     except OSError:
         held.close()
         return None

@@ -10,6 +10,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -29,6 +30,7 @@ from hsv.graph.description import (
     resolved,
 )
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
+from hsv.graph.placement import CHAIN, share_processor
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
 from hsv.interruption import end_with_parent, uninterrupted
@@ -135,12 +137,13 @@ class Launcher:
         self._on_line = on_line
         self._on_snapshot = on_snapshot
         self._wait_timeout = max(wait_timeout, HUNG_AFTER)
-        self._flying = False
+        self._flying = self._placed = False
+        self._claims = ExitStack()
         self._processes: list[_Process] = []
 
     def __enter__(self) -> Launcher:
         paths = [executable(node) for node in self._nodes]
-        self._claim = claim_graph(self._nodes, self._namespace)
+        self._claims.enter_context(claim_graph(self._nodes, self._namespace))
         try:
             for description, path in zip(self._nodes, paths, strict=True):
                 self._start(description, path)
@@ -153,7 +156,7 @@ class Launcher:
 
     def __exit__(self, *_: object) -> None:
         self.stop()
-        self._claim.close()
+        self._claims.close()
 
     def wait(self) -> int:
         """Wait for the last node to finish and return its exit code: 0, or that of a flight that diverged.
@@ -167,6 +170,8 @@ class Launcher:
         """
         *others, last = self._processes
         while True:
+            if self._flying and not self._placed:
+                self._place()
             for process in others:
                 code = process.popen.poll()
                 if code is None or _landed(process, code):
@@ -185,6 +190,13 @@ class Launcher:
                     return code
                 raise self._failure(last, code)
             time.sleep(_LOOK)
+
+    def _place(self) -> None:
+        """Have the nodes that wait for one another share a processor, once they need no more of them to start."""
+        self._placed = True
+        chain = [process.popen.pid for process in self._processes if process.description.name in CHAIN]
+        if len(chain) > 1 and (held := share_processor(chain)):
+            self._claims.enter_context(held)
 
     def _await_first_words(self, process: _Process) -> None:
         """Wait until who watches has said where, and so sees the flight from its start; not where it fails or hangs."""
