@@ -6,6 +6,7 @@ import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from types import FrameType
 
 import rclpy
@@ -97,7 +98,9 @@ def run_nodes(
             except HsvError as error:
                 # A full disk is found out by the write that fails, and then by this one: said once.
                 code = code or _refuse(name, error)
-        sys.stdout.flush()
+        # Lost where the process is ended. Who reads it may be gone: that Python says at its end.
+        with suppress(OSError):
+            sys.stdout.flush()
         with ends_with(code):
             for node in nodes:
                 node.destroy_node()
