@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 
 import pytest
 
+from hsv.graph.standstill import HUNG_AFTER
+from hsv_node.ending import LEAVE_WITHIN
 
-def run(script: str) -> subprocess.CompletedProcess[str]:
+
+def run(script: str, environment: dict[str, str] | None = None) -> subprocess.CompletedProcess[str]:
     """Run a script that has said its answer and then leaves; one that hung would fail here."""
-    begin = "import ctypes, sys, time\nfrom hsv_node.ending import ends_with\nprint('the answer', flush=True)\n"
-    return subprocess.run([sys.executable, "-c", begin + script], capture_output=True, text=True, timeout=120)
+    begin = (
+        "import ctypes, resource, sys, time\nfrom hsv_node.ending import ends_with\nprint('the answer', flush=True)\n"
+    )
+    command = [sys.executable, "-c", begin + script]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
 
 
 @pytest.mark.parametrize("code", [0, 2, 130])
@@ -22,10 +29,84 @@ def test_a_process_that_waits_with_the_interpreter_locked_ends_with_its_code(cod
 
 
 def test_a_process_that_has_left_in_time_goes_on():
-    done = run("with ends_with(7, within=0.3): pass\ntime.sleep(1)\nsys.exit(3)")
+    done = run("with ends_with(7, within=2): pass\ntime.sleep(3)\nsys.exit(3)")
     assert (done.returncode, done.stderr) == (3, "")
 
 
 def test_an_error_is_not_hidden():
     done = run("with ends_with(0): raise ValueError('lost')")
     assert done.returncode == 1 and "ValueError: lost" in done.stderr
+
+
+def test_without_a_timer_a_process_leaves_all_the_same():
+    refused = "resource.setrlimit(resource.RLIMIT_SIGPENDING, (0, 0))\n"
+    done = run(refused + "with ends_with(7, within=0.2): time.sleep(1)\nsys.exit(3)")
+    assert (done.returncode, done.stderr) == (3, "")
+
+
+def test_a_node_that_cannot_leave_is_ended_before_it_is_said_to_hang():
+    assert LEAVE_WITHIN < HUNG_AFTER
+
+
+SPY = """
+from contextlib import contextmanager
+from pathlib import Path
+import json
+import hsv_bringup.client, hsv_node.main
+from hsv.errors import ParameterError
+from hsv_bringup.client import OneLineParser, run_client
+from hsv_bringup.flow_executor import BatchExecutor, FlowExecutor
+from hsv_node.main import EventsExecutor, run_node
+from hsv_node.process import ProcessNode
+
+def participants():
+    # Each has a thread for its events.
+    return sum((thread / "comm").read_text().startswith("dds.ev.") for thread in Path("/proc/self/task").iterdir())
+
+seen = {}
+
+@contextmanager
+def spy(code):
+    seen.update(code=code, before=participants())
+    with ends_with(code):
+        yield
+    seen["after"] = participants()
+
+hsv_bringup.client.ends_with = hsv_node.main.ends_with = spy
+
+class Short(ProcessNode):
+    def __init__(self):
+        super().__init__("short")
+        self.polls = 0
+
+    def poll(self):
+        self.polls += 1
+        if self.polls == 3:
+            self.finish(4)
+
+class Refused(ProcessNode):
+    def __init__(self):
+        super().__init__("refused")
+        self.itself = self
+        raise ParameterError("parameter gain = 0: expected more")
+
+def ask(client, options):
+    raise ParameterError("no")
+"""
+"""What leaving has seen: the exit code that it was given, and the middleware's participants before and after it."""
+
+
+@pytest.mark.graph
+@pytest.mark.parametrize(
+    ("leave", "code"),
+    [
+        *[(f"run_node(Short, 'short', ['short'], {name}Executor)", 4) for name in ("Events", "Batch", "Flow")],
+        ("run_node(Refused, 'refused', ['refused'])", 2),
+        ("run_client(OneLineParser(prog='ask'), ask, ['ask'])", 2),
+    ],
+)
+def test_the_middleware_is_left_while_the_timer_runs(ros_environment, leave, code):
+    done = run(f"{SPY}\nreturned = {leave}\nprint(json.dumps(seen))\nsys.exit(returned)", ros_environment)
+    seen = json.loads(done.stdout.splitlines()[-1])
+    assert done.returncode == seen["code"] == code
+    assert (seen["before"], seen["after"]) == (1, 0)

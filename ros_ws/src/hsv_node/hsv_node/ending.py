@@ -6,8 +6,8 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-LEAVE_WITHIN = 10.0
-"""Seconds for what takes some milliseconds; less than what ``hsv run`` gives its nodes to end."""
+LEAVE_WITHIN = 3.0
+"""Seconds for what takes some milliseconds; less than the standstill after which ``hsv run`` says that a node hangs."""
 
 _MONOTONIC = 1
 _NEW_THREAD = 2
@@ -27,42 +27,26 @@ class _Event(ctypes.Structure):
     )
 
 
-class _Times(ctypes.Structure):
-    """``struct itimerspec``: seconds and nanoseconds of the period, and until the timer runs down."""
-
-    _fields_ = (
-        ("period_s", ctypes.c_long),
-        ("period_ns", ctypes.c_long),
-        ("first_s", ctypes.c_long),
-        ("first_ns", ctypes.c_long),
-    )
-
-
 @contextmanager
 def ends_with(code: int, within: float = LEAVE_WITHIN) -> Iterator[None]:
-    """End the process with ``code`` where what stands inside takes longer than ``within`` seconds.
+    """End the process with exit code ``code`` if the body takes longer than ``within`` seconds.
 
-    For the destruction of nodes, when everything else is done. Fast DDS 2.14 can wait there for ever: a thread that
-    has just received word of another participant, and the one that takes the listener away, wait for one another. That
-    happens below rclpy with the interpreter locked, so that no thread or signal handler of Python can end it; a timer
-    of the operating system can.
-
-    Raises:
-        OSError: The operating system refuses the timer.
+    For the destruction of nodes, when everything else is done and written. Fast DDS 2.14 can wait there for ever: a
+    thread that has just received word of another participant, and the one that removes the listener, wait for each
+    other. That happens below rclpy with the interpreter locked, so that no thread or signal handler of Python can end
+    it; a timer of the operating system can. Where the system refuses the timer, the body runs without it.
     """
-    library = ctypes.CDLL(None, use_errno=True)
+    library = ctypes.CDLL(None)
     exit_now = ctypes.cast(library._exit, ctypes.c_void_p)
     event = _Event(value=code, notification=_NEW_THREAD, function=exit_now.value)
-    times = _Times(first_s=int(within), first_ns=int(within % 1 * 1e9))
     timer = ctypes.c_void_p()
-    _check(library.timer_create(_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)))
+    if library.timer_create(_MONOTONIC, ctypes.byref(event), ctypes.byref(timer)):
+        yield
+        return
+    # struct itimerspec: the period, which is none, and the time until it runs down, in seconds and nanoseconds.
+    times = (ctypes.c_long * 4)(0, 0, int(within), int(within % 1 * 1e9))
+    library.timer_settime(timer, 0, times, None)
     try:
-        _check(library.timer_settime(timer, 0, ctypes.byref(times), None))
         yield
     finally:
-        _check(library.timer_delete(timer))
-
-
-def _check(result: int) -> None:
-    if result:
-        raise OSError(ctypes.get_errno(), "timer of the operating system")
+        library.timer_delete(timer)

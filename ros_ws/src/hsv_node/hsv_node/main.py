@@ -67,6 +67,7 @@ def run_nodes(
     stop: list[int] = []
     take_signals(lambda received, _frame: stop.append(received))
     nodes: list[ProcessNode] = []
+    executor: Executor | None = None
     code = 1
     try:
         executor = executor_class()
@@ -98,12 +99,17 @@ def run_nodes(
             except HsvError as error:
                 # A full disk is found out by the write that fails, and then by this one: said once.
                 code = code or _refuse(name, error)
-        # Lost where the process is ended. Who reads it may be gone: that Python says at its end.
+        # Output would be lost if the process is ended here. If its reader is gone, Python reports that at exit.
         with suppress(OSError):
             sys.stdout.flush()
         with ends_with(code):
+            # The executor keeps its nodes, and a node whose constructor has failed keeps itself until it is collected:
+            # the participant of the middleware is destroyed with the last of them.
+            if executor is not None:
+                executor.shutdown()
             for node in nodes:
                 node.destroy_node()
+            gc.collect()
             rclpy.try_shutdown()
     return code
 
