@@ -192,7 +192,7 @@ class Launcher:
             time.sleep(_LOOK)
 
     def _place(self) -> None:
-        """Have the nodes that wait for one another share a processor, once they need no more of them to start."""
+        """Keep the nodes that wait for one another on one processor, once they have started, for which they use all."""
         self._placed = True
         chain = [process.popen.pid for process in self._processes if process.description.name in CHAIN]
         if len(chain) > 1 and (held := share_processor(chain)):

@@ -41,10 +41,18 @@ def share_processor(pids: Iterable[int]) -> socket.socket | None:
         if held is None:
             continue
         for pid in pids:
-            # A process or a thread may end at any time.
-            with suppress(OSError):
-                for thread in Path("/proc", str(pid), "task").iterdir():
-                    with suppress(OSError):
-                        os.sched_setaffinity(int(thread.name), {processor})
+            _keep_to(processor, pid)
         return held
     return None
+
+
+def _keep_to(processor: int, pid: int) -> None:
+    kept: set[Path] = set()
+    # A process or a thread may end at any time.
+    with suppress(OSError):
+        # One that a thread starts before it is kept itself may still use all processors.
+        while new := set(Path(f"/proc/{pid}/task").iterdir()) - kept:
+            for thread in new:
+                with suppress(OSError):
+                    os.sched_setaffinity(int(thread.name), {processor})
+            kept |= new
