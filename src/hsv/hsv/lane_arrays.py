@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+
+_LINE = 64
+"""Bytes of a line of the caches: what a register holds is of one line where an array begins with one."""
+
+
+def _empty(shape: Sequence[int]) -> np.ndarray:
+    """Return room for numbers that begins with a line."""
+    numbers = math.prod(shape)
+    memory = np.empty(numbers + _LINE // 8)
+    start = -memory.ctypes.data % _LINE // 8
+    return memory[start : start + numbers].reshape(shape)
 
 
 class LaneArray:
@@ -32,12 +44,15 @@ class LaneArray:
         """Return zeros, as many lanes as there are flights side by side."""
         from hsv.lane_types import WIDTH  # imports numba
 
-        return cls(np.zeros((*((shape,) if isinstance(shape, int) else shape), WIDTH)))
+        array = _empty((*((shape,) if isinstance(shape, int) else shape), WIDTH))
+        array[:] = 0.0
+        return cls(array)
 
     @classmethod
     def of(cls, arrays: Sequence[np.ndarray]) -> LaneArray:
         """Return a copy of equal arrays, one a lane."""
-        return cls(np.stack(arrays, axis=-1).astype(float, order="C"))
+        array = _empty((*arrays[0].shape, len(arrays)))
+        return cls(np.stack(arrays, axis=-1, out=array))
 
 
 class LaneRecord:
@@ -45,5 +60,6 @@ class LaneRecord:
 
     def __init__(self, tuples: Sequence[Any]) -> None:
         self.fields = tuple(tuples[0]._fields)
-        self.array = np.array(tuples, float).T.copy()
+        self.array = _empty((len(self.fields), len(tuples)))
+        self.array[:] = np.array(tuples, float).T
         self.address = self.array.ctypes.data

@@ -8,17 +8,20 @@ from typing import Any
 from numba.extending import overload
 
 from hsv.lane_types import (
+    PART,
     REGISTER,
+    SUMS,
+    WIDTH,
     LaneArrayType,
     LanesType,
     MaskType,
     all_of,
-    flat_element,
     neighbours,
     one_lane,
     powers_of_two,
     select,
     write_neighbours,
+    write_sums,
 )
 from hsv.lane_types import with_lane as inserted
 from hsv.lanes import (
@@ -105,20 +108,9 @@ def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
         return of_numbers
 
     def of_lanes(weights: Any, rows: Any, total: Any) -> None:
-        size = rows.shape[1]
-        # Six sums at a time: each addition needs the one before it in its sum, and AVX2 has no registers for more.
-        for e in range(0, size, 6):
-            s0, s1, s2, s3, s4, s5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-            for r in range(len(rows)):
-                weight, place = weights[r], r * size + e
-                s0 += weight * flat_element(rows, place)
-                s1 += weight * flat_element(rows, place + 1)
-                s2 += weight * flat_element(rows, place + 2)
-                s3 += weight * flat_element(rows, place + 3)
-                s4 += weight * flat_element(rows, place + 4)
-                s5 += weight * flat_element(rows, place + 5)
-            total[e], total[e + 1], total[e + 2] = s0, s1, s2
-            total[e + 3], total[e + 4], total[e + 5] = s3, s4, s5
+        for part in range(0, WIDTH, PART):
+            for e in range(0, rows.shape[1], SUMS):
+                write_sums(weights, rows, total, e, part)
 
     return of_lanes
 

@@ -28,6 +28,15 @@ WIDTH = 2 * REGISTER
 """Lanes of flights side by side, of two registers: while one waits for its last result, the other one is computed."""
 
 
+SUMS, PART = (12, REGISTER) if REGISTER == 8 else (6, WIDTH)
+"""How many weighted sums are computed at a time, in how many lanes: as many as there are registers for.
+
+Each addition needs the one before it in its sum. A number that is multiplied with one register only is read from memory
+by the multiplication itself where there is AVX-512; as an instruction of its own that takes the place of an arithmetic
+one on Zen 4. AVX2 knows no such multiplication.
+"""
+
+
 class LanesType(types.Type):
     """A number a lane."""
 
@@ -447,14 +456,31 @@ def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
 
 
 @_intrinsic
-def flat_element(typing_context: Any, array: Any, index: Any) -> Any:
-    """Return the number of a contiguous array of float64 at a flat ``index``, not negative."""
+def write_sums(typing_context: Any, weights: Any, rows: Any, total: Any, first: Any, part: Any) -> Any:
+    """Write :data:`SUMS` numbers of :func:`hsv.lanes.weighted_sum`, from ``first`` on, in lanes from ``part`` on."""
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        given, place = arguments
-        return builder.load(builder.gep(context.make_array(called.args[0])(context, builder, given).data, [place]))
+        given, matrix, written, column, lane = arguments
+        numbers = context.make_array(called.args[1])(context, builder, matrix)
+        count, size = cgutils.unpack_tuple(builder, numbers.shape)
+        kind = _vector(_DOUBLE, PART)
+        sums = [cgutils.alloca_once_value(builder, ir.Constant(kind, [0.0] * PART)) for _ in range(SUMS)]
+        with cgutils.for_range(builder, count) as row:
+            place, _ = _place(context, builder, called.args[0], given, [row.index])
+            weight = _loaded(builder, builder.gep(place, [lane]), PART)
+            start = builder.gep(numbers.data, [builder.add(builder.mul(row.index, size), column)])
+            for i, total_so_far in enumerate(sums):
+                number = builder.load(builder.gep(start, [ir.Constant(_WORD, i)]))
+                product = builder.fmul(weight, _in_all_lanes(builder, number, PART))
+                builder.store(builder.fadd(builder.load(total_so_far), product), total_so_far)
+        for i, found in enumerate(sums):
+            index = builder.add(column, ir.Constant(_WORD, i))
+            place, _ = _place(context, builder, called.args[2], written, [index])
+            target = builder.bitcast(builder.gep(place, [lane]), kind.as_pointer())
+            builder.store(builder.load(found), target).align = 8
+        return context.get_dummy_value()
 
-    return types.float64(array, types.intp), generate
+    return types.none(weights, rows, total, types.intp, types.intp), generate
 
 
 @_intrinsic

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from llvmlite import binding, ir
-from numba import config, njit, types
+from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from hsv.compiled import ENABLED
+from hsv.compiled import ENABLED, njit_in_flight
 
 
 def _has_instructions() -> bool:
@@ -26,7 +26,7 @@ def _has_instructions() -> bool:
 AVAILABLE = ENABLED and _has_instructions()
 """Whether the processor that numba compiles for has these instructions."""
 
-_NUMBERS = 8
+BLOCK = 8
 """Numbers of a block of 64 bytes."""
 
 _INITIAL = (0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A, 0x510E527F, 0x9B05688C, 0x1F83D9AB, 0x5BE0CD19)
@@ -59,50 +59,63 @@ def digests(arrays: Sequence[np.ndarray]) -> list[bytes]:
 
     Of little-endian bytes, every NaN as the same one.
     """
-    state = np.array([[_INITIAL[i] for i in _ORDER]] * 2, np.uint32)
-    sizes = [array.size for array in arrays]
-    _absorb_both(state, arrays, [size // _NUMBERS for size in sizes])
+    state, sizes = initial(2), [array.size for array in arrays]
+    first, second = (array.ctypes.data for array in arrays)
+    absorb(state, first, second, sizes[0] // BLOCK, sizes[1] // BLOCK)
+    return finished(state, sizes, [array.reshape(-1)[array.size // BLOCK * BLOCK :] for array in arrays])
+
+
+def initial(count: int) -> np.ndarray:
+    """Return the states (count, 8) of digests of nothing."""
+    return np.array([[_INITIAL[i] for i in _ORDER]] * count, np.uint32)
+
+
+def finished(state: np.ndarray, sizes: Sequence[int], rests: Sequence[np.ndarray]) -> list[bytes]:
+    """Return the digests of an even number of arrays, whose whole blocks the ``state`` has taken.
+
+    Args:
+        state: Of each (arrays, 8); it is changed.
+        sizes: Of each, numbers.
+        rests: Of each, the numbers after its last whole block.
+    """
     # Padding: the remaining numbers, a 1 bit, zeros, and the length in bits, big-endian; one block or two.
-    ends = np.zeros((2, 2 * _NUMBERS), "<u8")
-    blocks = [1 if size % _NUMBERS < _NUMBERS - 1 else 2 for size in sizes]
-    for end, array, size, last in zip(ends, arrays, sizes, blocks, strict=True):
-        left = size % _NUMBERS
-        end[:left] = array.reshape(-1)[size - left :].view(np.uint64)
+    ends = np.zeros((len(sizes), 2 * BLOCK), "<u8")
+    blocks = [1 if size % BLOCK < BLOCK - 1 else 2 for size in sizes]
+    for end, size, rest, last in zip(ends, sizes, rests, blocks, strict=True):
+        left = size % BLOCK
+        end[:left] = rest[:left].view(np.uint64)
         end[left] = 0x80
-        end[last * _NUMBERS - 1] = np.uint64(64 * size).byteswap()
+        end[last * BLOCK - 1] = np.uint64(64 * size).byteswap()
     # The length is never taken for a NaN: it is a multiple of 64, so its exponent bits are not all ones.
-    _absorb_both(state, [*ends], blocks)
+    for i in range(0, len(sizes), 2):
+        absorb(state[i : i + 2], ends[i].ctypes.data, ends[i + 1].ctypes.data, blocks[i], blocks[i + 1])
     return [own[np.argsort(_ORDER)].astype(">u4").tobytes() for own in state]
 
 
-def _absorb_both(state: np.ndarray, arrays: Sequence[np.ndarray], blocks: Sequence[int]) -> None:
-    """Take into the ``state`` (2, 8) of each array so many of its ``blocks``."""
-    first, second = (array.ctypes.data for array in arrays)
-    both = min(blocks)
-    _absorb(state, first, second, 0, both)
-    for own, address, until in zip(state, (first, second), blocks, strict=True):
-        if until > both:
-            twice = np.stack([own, own])
-            _absorb(twice, address, address, both, until)
-            own[:] = twice[0]
-
-
-@njit(cache=True, nogil=True)
-def _absorb(state: np.ndarray, first: int, second: int, start: int, stop: int) -> None:
-    """Take blocks ``start`` ... ``stop`` - 1 at the addresses ``first`` and ``second`` into the ``state`` (2, 8)."""
-    for block in range(start, stop):
-        _absorb_block(state, first, second, block)
+@njit_in_flight(nogil=True)
+def absorb(state: np.ndarray, first: int, second: int, of_first: int, of_second: int) -> None:
+    """Take so many blocks at the addresses ``first`` and ``second`` into the ``state`` (2, 8)."""
+    both = min(of_first, of_second)
+    for block in range(both):
+        _absorb_block(state, first, second, block, 2)
+    for block in range(both, of_first):
+        _absorb_block(state[:1], first, first, block, 1)
+    for block in range(both, of_second):
+        _absorb_block(state[1:], second, second, block, 1)
 
 
 @_intrinsic
-def _absorb_block(typing_context: Any, state: Any, first: Any, second: Any, block: Any) -> Any:
-    """Take one block of each array into the state."""
+def _absorb_block(typing_context: Any, state: Any, first: Any, second: Any, block: Any, count: Any) -> Any:
+    """Take one block of each array, of which there are one or two (``count``), into the state."""
+    arrays = count.literal_value if isinstance(count, types.IntegerLiteral) else 0
+    if not arrays:
+        return None
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         data = context.make_array(state)(context, builder, arguments[0]).data
-        offset = builder.mul(arguments[3], ir.Constant(_PLACE, _NUMBERS))
+        offset = builder.mul(arguments[3], ir.Constant(_PLACE, BLOCK))
         slots, words = [], []
-        for i, address in enumerate(arguments[1:3]):
+        for i, address in enumerate(arguments[1 : 1 + arrays]):
             place = builder.gep(builder.inttoptr(address, _DOUBLE.as_pointer()), [offset])
             words.append([_four_words(builder, place, 2 * k) for k in range(4)])
             starts = (ir.Constant(_PLACE, 8 * i), ir.Constant(_PLACE, 8 * i + 4))
@@ -113,7 +126,7 @@ def _absorb_block(typing_context: Any, state: Any, first: Any, second: Any, bloc
                 builder.store(builder.add(a, b), slot, align=4)
         return context.get_dummy_value()
 
-    return types.none(state, types.uintp, types.uintp, types.intp), generate
+    return types.none(state, types.uintp, types.uintp, types.intp, count), generate
 
 
 def _four_words(builder: Any, place: Any, number: int) -> Any:

@@ -45,8 +45,8 @@ def warm() -> None:
             pass
     runner, envelope = SampleRunner(plan("case1")), Envelope.empty()
     for own in runner.fly_piece(5):
-        envelope.add(own.flight.data(), 5)
-        runner.outcome(own.flight.data(), own.level, own.fingerprint)
+        envelope.add(own.curves, 5)
+        runner.outcome(own)
 
 
 def _ahead_of_time(processes: int) -> None:

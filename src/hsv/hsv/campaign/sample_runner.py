@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from hsv.campaign.campaign import Campaign
+from hsv.campaign.flight_reader import FlightReader, ReadFlight
 from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.campaign.variants import FlightVariants
@@ -19,20 +19,11 @@ from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
 from hsv.lane_types import WIDTH
 from hsv.simulation.closed_loop import Components, Flight, fly
-from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import FlightData, flight_metrics
-from hsv.simulation.side_by_side import FlightGroup, FlightsSideBySide
+from hsv.simulation.side_by_side import FlightGroup
 from hsv.vehicle.envelope import in_model_range
 
 Outcome = dict[str, float | bool | str | None]
-
-
-class Flown(NamedTuple):
-    """A flight of a campaign, its worst level in the tube, where there is one, and its fingerprint."""
-
-    flight: Flight
-    level: float | None
-    fingerprint: str
 
 
 class SampleRunner:
@@ -69,7 +60,7 @@ class SampleRunner:
         """
         return fly(self._components(flight, sample))
 
-    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[Flown | ControllerError]:
+    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[ReadFlight | ControllerError]:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side where that can be.
 
         Each is valid until the next one. In place of a flight that its controller ended comes what it said.
@@ -80,24 +71,31 @@ class SampleRunner:
         for start in range(0, len(flights), WIDTH):
             drawn = zip(flights[start : start + WIDTH], samples[start : start + WIDTH], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
-            if FlightGroup.takes(components):
-                yield from self._told(self._group.fly(components))
+            if FlightReader.takes(components):
+                yield from self._reader.read(components)
+            elif FlightGroup.takes(components):
+                yield from map(self._read, self._group.fly(components))
             else:
                 yield from map(self._flown_or_error, components)
 
+    # Their memory is kept.
+
+    @cached_property
+    def _reader(self) -> FlightReader:
+        return FlightReader(self.steps, self._levels)
+
     @cached_property
     def _group(self) -> FlightGroup:
-        return FlightGroup(self.steps)  # whose memory is kept
+        return FlightGroup(self.steps)
 
-    def _told(self, group: FlightsSideBySide) -> Iterator[Flown]:
-        digests = fingerprints([flight.history.flown for flight in group.flights])
-        return map(Flown, group.flights, self._levels.worst_of(group), digests)
+    def _read(self, flight: Flight) -> ReadFlight:
+        data = flight.data()
+        return ReadFlight.of(data, self.level(data), flight.fingerprint)
 
-    def _flown_alone(self, components: Components) -> Flown:
-        flight = fly(components)
-        return Flown(flight, self.level(flight.data()), flight.fingerprint)
+    def _flown_alone(self, components: Components) -> ReadFlight:
+        return self._read(fly(components))
 
-    def _flown_or_error(self, components: Components) -> Flown | ControllerError:
+    def _flown_or_error(self, components: Components) -> ReadFlight | ControllerError:
         try:
             return self._flown_alone(components)
         except ControllerError as error:
@@ -118,7 +116,7 @@ class SampleRunner:
         """Fly the scenario itself."""
         return fly(self._variants.unchanged)
 
-    def fly_piece(self, steps: int) -> list[Flown]:
+    def fly_piece(self, steps: int) -> list[ReadFlight]:
         """Fly so many ``steps`` of the scenario itself, as often as it is flown at once.
 
         Raises:
@@ -128,9 +126,9 @@ class SampleRunner:
         plant = copy(parts.plant)
         plant.steps = steps
         pieces = [replace(parts, plant=plant)] * WIDTH
-        if not FlightGroup.takes(pieces):
+        if not FlightReader.takes(pieces):
             return [self._flown_alone(pieces[0])]
-        return list(self._told(FlightGroup(steps).fly(pieces)))
+        return FlightReader(steps, self._levels).read(pieces)
 
     @property
     def controller(self) -> Controller:
@@ -141,15 +139,15 @@ class SampleRunner:
         """Return the worst level of a flight in the tube, ``None`` where no set holds for it."""
         return self._levels.worst(flight)
 
-    def outcome(self, flight: FlightData, level: float | None, fingerprint: str | None) -> Outcome:
-        """Return what a campaign records of a flight: its end, worst tube ``level``, metrics (SI), ``fingerprint``."""
+    def outcome(self, flown: ReadFlight) -> Outcome:
+        """Return what a campaign records of a flight: its end, worst tube level, metrics (SI), fingerprint."""
         return {
-            "diverged": not in_model_range(flight.state[-1], self._variants.unchanged.plant.vehicle.angle_limit),
-            "end_time": float(flight.time[-1]),
-            "tube_level": level,
-            **flight_metrics(flight),
+            "diverged": not in_model_range(flown.last, self._variants.unchanged.plant.vehicle.angle_limit),
+            "end_time": float(flown.curves.time[-1]),
+            "tube_level": flown.level,
+            **flight_metrics(flown.curves),
             "crashed": None,
-            "fingerprint": fingerprint,
+            "fingerprint": flown.fingerprint,
         }
 
     def crashed(self, error: ControllerError) -> Outcome:

@@ -15,7 +15,8 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Job
-from hsv.campaign.sample_runner import Flown, Outcome, SampleRunner, sample_runner
+from hsv.campaign.flight_reader import ReadFlight
+from hsv.campaign.sample_runner import Outcome, SampleRunner, sample_runner
 from hsv.control.library import LibraryController
 from hsv.errors import ControllerError
 from hsv.simulation.closed_loop import watched
@@ -120,7 +121,7 @@ def _flight_time(text: str) -> float:
             started = time.perf_counter()
             pieces = runner.fly_piece(steps)
             seconds = (time.perf_counter() - started) / len(pieces)
-            if all(len(piece.flight.time) > steps for piece in pieces):
+            if all(len(piece.curves.time) > steps for piece in pieces):
                 seconds *= runner.steps / steps
             if not _SLOW < seconds < _VERY_SLOW:
                 break
@@ -136,10 +137,9 @@ def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], E
     return rows, envelope
 
 
-def _outcome(runner: SampleRunner, flown: Flown, envelope: Envelope) -> Outcome:
-    data = flown.flight.data()
-    envelope.add(data, runner.steps)
-    return runner.outcome(data, flown.level, flown.fingerprint)
+def _outcome(runner: SampleRunner, flown: ReadFlight, envelope: Envelope) -> Outcome:
+    envelope.add(flown.curves, runner.steps)
+    return runner.outcome(flown)
 
 
 def row(sample: Sequence[float], flight: int, seed: int, campaign: Campaign, outcome: dict[str, Any]) -> dict[str, Any]:

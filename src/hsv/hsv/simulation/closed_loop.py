@@ -164,40 +164,46 @@ def fly_loop(
     work: Any,
     history: Any,
     ended: np.ndarray,
+    start: int,
+    stop: int,
 ) -> int:
-    """Fly as many steps as ``history`` has rows, from state ``x`` (9); return the number of rows written.
+    """Fly the steps ``start`` ... ``stop`` - 1, the first from state ``x`` (9); return the step before which it ended.
 
-    Fewer: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without ``plant_faults``
-    the plant is ideal, and so is the ``link`` of the command, without ``estimator`` there is none; other functions are
-    compiled for these, as what is not used would take a tenth of the time. Of lanes each is a flight, whose rows are
-    written to ``ended`` (lanes), which holds those of a flight that does not diverge.
+    Before ``stop``: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without
+    ``plant_faults`` the plant is ideal, and so is the ``link`` of the command, without ``estimator`` there is none;
+    other functions are compiled for these, as what is not used would take a tenth of the time. Of lanes each is a
+    flight, whose rows are written to ``ended`` (lanes), which holds those of a flight that does not diverge.
+
+    A flight may be flown in pieces: from where the piece before stopped, with the same arguments as they were left.
 
     Args:
         faults: :class:`CommandFaults` of each lane.
         first_fault: Step before which the command arrives as it is: what a call takes is a twentieth of the loop's
             time.
+        history: Its first row is of the step ``start``.
     """
     estimate, q_f, x_r, u_r, x_n, u_n, s, wanted, returned, gain_index, memory, watch = arrays
     n, m = len(x), len(u_n)
     measurement, filter_state, defect, weights, S, new, u_feedback, total, u, actuator, x_e, estimator_work = work
-    if plant_faults is None:
-        for i in range(n):
-            measurement[i] = x[i]
-    else:
-        sense(x, plant, plant_memory, plant_faults, 0, measurement)
     vehicle, period, substeps = plant.vehicle, plant.period, plant.substeps
     lowest, highest = plant.actuators.minimum, plant.actuators.maximum
     effector, integration = plant_memory.effector, plant_memory.work
-    rest(notch, measurement[PITCH_RATE], filter_state)
     last = len(reference.state) - 1
     planned = len(nominal.gains) > 0
-    for i in range(n):
-        x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
+    if start == 0:
+        if plant_faults is None:
+            for i in range(n):
+                measurement[i] = x[i]
+        else:
+            sense(x, plant, plant_memory, plant_faults, 0, measurement)
+        rest(notch, measurement[PITCH_RATE], filter_state)
+        for i in range(n):
+            x_n[i] = measurement[i] - reference.state[min(max(-reference.first, 0), last), i] if planned else 0.0
     # Copied when another row holds: views of rows in every step take a twentieth of the loop's time.
     row = -1
     flown, beside, estimated = history
-    rows = len(flown)
-    for k in range(rows):
+    for k in range(start, stop):
+        line = k - start
         if k > 0:
             if plant_faults is None:
                 for i in range(m):
@@ -209,7 +215,7 @@ def fly_loop(
                 advance_plant(x, actuator, plant, plant_memory, plant_faults, k - 1)
                 sense(x, plant, plant_memory, plant_faults, k, measurement)
         for i in range(n):
-            flown[k, X + i] = x[i]
+            flown[line, X + i] = x[i]
             estimate[i] = measurement[i]
         if estimator is not None:
             estimate_step(estimator, x_e, k, measurement, u, estimator_work, estimate)
@@ -217,7 +223,7 @@ def fly_loop(
                 rest(notch, estimate[PITCH_RATE], filter_state)
         if plant_faults is not None:
             for i in range(n):
-                estimated[k, i] = estimate[i]
+                estimated[line, i] = estimate[i]
         due = min(max(k - reference.first, 0), last)
         if due != row:
             row = due
@@ -229,9 +235,9 @@ def fly_loop(
         for i in range(len(s)):
             s[i] = filter_state[i]
         q_f[0] = filter_step(notch, filter_state, estimate[PITCH_RATE])
-        flown[k, Q_F] = q_f[0]
+        flown[line, Q_F] = q_f[0]
         for i in range(n):
-            flown[k, X_N + i] = x_n[i]
+            flown[line, X_N + i] = x_n[i]
         called = False
         if nominal_call is not None:
             called = nominal_call.function != NOTHING
@@ -239,9 +245,9 @@ def fly_loop(
                 return -1 - k
         if planned and not called:
             gain_index[0], _ = nominal_input(nominal, x_n, u_n)
-        beside[k, GAIN_INDEX] = gain_index[0]
+        beside[line, GAIN_INDEX] = gain_index[0]
         for i in range(m):
-            flown[k, U_N + i] = u_n[i]
+            flown[line, U_N + i] = u_n[i]
         called = False
         if controller_call is not None:
             function, inputs, outputs, state, parameters = controller_call
@@ -260,9 +266,9 @@ def fly_loop(
         if not called:
             tube_step(tube, memory, watch, k, False, estimate, q_f[0], x_r, u_r, x_n, u_n, s, u_feedback, total, u)
         for i in range(m):
-            beside[k, U_UNSATURATED + i] = total[i]
+            beside[line, U_UNSATURATED + i] = total[i]
         for i in range(m):
-            flown[k, U + i] = u[i]
+            flown[line, U + i] = u[i]
         if planned:
             nominal_advance(nominal.polytope, measurement[0], measurement[1], x_n, u_n, defect, weights, S, new)
         for i in range(m):
@@ -273,26 +279,27 @@ def fly_loop(
             for i in range(len(ended)):
                 apply_command_faults(faults[i].rows, faults[i].memory, k, faults[i].seed, actuator, i)
         for i in range(m):
-            flown[k, ACTUATOR + i] = actuator[i]
+            flown[line, ACTUATOR + i] = actuator[i]
         inside = in_model_range(x, vehicle.angle_limit)
         if not every(inside):
             flying = 0
             for i in range(len(ended)):
-                if ended[i] == rows:
+                if ended[i] > k:
                     if lane(inside, i):
                         flying += 1
                     else:
                         ended[i] = k + 1
             if flying == 0:
                 return k + 1
-    return rows
+    return stop
 
 
 @lru_cache(maxsize=8)
-def _times(rows: int, period: float) -> np.ndarray:
-    times = np.arange(rows) * period
-    times.setflags(write=False)
-    return times
+def times(rows: int, period: float) -> np.ndarray:
+    """Return the simulated time (s) of so many ``rows``; who ask for as many share them."""
+    found = np.arange(rows) * period
+    found.setflags(write=False)
+    return found
 
 
 @dataclass(frozen=True)
@@ -308,7 +315,7 @@ class Flight:
     @property
     def time(self) -> np.ndarray:
         """Simulated time (n + 1), s; all flights of so many steps share it."""
-        return _times(len(self.history.state), self.period)
+        return times(len(self.history.state), self.period)
 
     @property
     def reference(self) -> np.ndarray:
@@ -450,6 +457,8 @@ def fly_into(history: History, components: Components) -> int:
             Workspace.of(np.zeros, notch.data, nominal.data),
             history._replace(estimated=None) if ideal else history,
             np.full(1, len(history.flown)),
+            0,
+            len(history.flown),
         )
     for callback in callbacks:
         if callback.error is not None:
@@ -487,6 +496,11 @@ def flight_of(components: Components, history: History) -> Flight:
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
+    reference, start = components.nominal_trajectory.reference, fault_start(components, len(history.state))
+    return Flight(plant.period, history, reference, start, status)
+
+
+def fault_start(components: Components, rows: int) -> float | None:
+    """Return when the first fault of a flight of so many ``rows`` begins (s), ``None`` where none does."""
     first = min((row.start for row in components.fault_injector.known), default=NEVER)
-    fault_start = first * plant.period if first < len(history.state) else None
-    return Flight(plant.period, history, components.nominal_trajectory.reference, fault_start, status)
+    return first * components.plant.period if first < rows else None

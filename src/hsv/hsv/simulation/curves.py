@@ -6,19 +6,24 @@ import math
 
 import numpy as np
 
-from hsv.compiled import njit
+from hsv.compiled import njit, njit_in_flight
 from hsv.simulation.metrics import SETTLING_BAND
 
 
-@njit(cache=True, nogil=True)
+@njit_in_flight(nogil=True)
 def read_flight(
-    state: np.ndarray, reference: np.ndarray, deviation: np.ndarray, command: np.ndarray, unlimited: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return curves and saturation of a :class:`hsv.simulation.metrics.FlightData`.
+    state: np.ndarray,
+    reference: np.ndarray,
+    deviation: np.ndarray,
+    command: np.ndarray,
+    unlimited: np.ndarray,
+    curves: np.ndarray,
+    saturated: np.ndarray,
+) -> None:
+    """Write ``curves`` and ``saturated`` of a :class:`hsv.simulation.metrics.FlightCurves`, or of some of its rows.
 
     In one pass: rows are wider than a line of a cache, and a cache near the processor does not hold a flight.
     """
-    curves, saturated = np.empty((10, len(state))), np.empty(command.shape, np.bool_)
     for k in range(len(state)):
         curves[0, k] = state[k, 0] - reference[k, 0]
         curves[1, k] = state[k, 1] - reference[k, 1]
@@ -28,16 +33,15 @@ def read_flight(
         curves[8, k] = abs(state[k, 2] - reference[k, 2] - deviation[k, 2])
         curves[9, k] = abs(state[k, 3] - reference[k, 3] - deviation[k, 3])
         saturated[k, 0], saturated[k, 1] = command[k, 0] != unlimited[k, 0], command[k, 1] != unlimited[k, 1]
-    return curves, saturated
 
 
-@njit(cache=True, nogil=True)
-def trapezoids(values: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return the integrals (n) of ``values`` (n + 1) from each time to the next by the trapezoidal rule."""
-    integrals = np.empty(len(values) - 1)
+@njit_in_flight(nogil=True)
+def integrate(values: np.ndarray, time: np.ndarray, magnitudes: np.ndarray, integrals: np.ndarray) -> None:
+    """Write magnitudes of ``values`` (n + 1), and their integrals (n) from each time to the next by trapezoids."""
+    for k in range(len(values)):
+        magnitudes[k] = abs(values[k])
     for k in range(len(integrals)):
-        integrals[k] = 0.5 * (values[k + 1] + values[k]) * (time[k + 1] - time[k])
-    return integrals
+        integrals[k] = 0.5 * (magnitudes[k + 1] + magnitudes[k]) * (time[k + 1] - time[k])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

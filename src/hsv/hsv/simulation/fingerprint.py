@@ -39,7 +39,7 @@ def fingerprint(flown: np.ndarray) -> str:
         if (unknown := np.isnan(rows)).any():
             rows = np.where(unknown, np.nan, rows)
         digest.update(rows.data)
-    return _written(digest.digest())
+    return written(digest.digest())
 
 
 def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
@@ -50,11 +50,12 @@ def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
     found: list[str] = []
     for start in range(0, len(flown), 2):
         pair = [np.ascontiguousarray(rows, "<f8") for rows in flown[start : start + 2]]
-        found += map(_written, digests(pair)) if AVAILABLE and len(pair) == 2 else map(fingerprint, pair)
+        found += map(written, digests(pair)) if AVAILABLE and len(pair) == 2 else map(fingerprint, pair)
     return found
 
 
-def _written(digest: bytes) -> str:
+def written(digest: bytes) -> str:
+    """Return a digest as a fingerprint is written."""
     return f"v{FORMAT}:{digest.hex()}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -133,6 +134,25 @@ def is_share(name: str) -> bool:
     return name in METRICS and METRICS[name].share
 
 
+CURVES = 10
+"""Number of the curves of a :class:`FlightCurves`."""
+
+
+class FlightCurves(NamedTuple):
+    """What metrics are made of, rows k = 0 ... n.
+
+    ``curves``, each on its own as it is read many times (10, n + 1): altitude and velocity less their references; angle
+    of attack and pitch angle; the two elastic rates; the commands; the magnitudes of what angle of attack and pitch
+    angle differ by from reference + nominal. Beside them time (s), whether each command was limited (n + 1, 2), and the
+    time of the first fault.
+    """
+
+    time: np.ndarray
+    curves: np.ndarray
+    saturated: np.ndarray
+    fault_start: float | None
+
+
 @dataclass(frozen=True)
 class FlightData:
     """Data for metrics, rows k = 0 ... n: time (s); x, x_r, x_n (9); commands, limited and unlimited (2 each).
@@ -153,38 +173,38 @@ class FlightData:
 
     @property
     def curves(self) -> np.ndarray:
-        """What is read of a flight many times, each on its own (10, n + 1).
-
-        Altitude and velocity less their references; angle of attack and pitch angle; the two elastic rates; the
-        commands; the magnitudes of what angle of attack and pitch angle differ by from reference + nominal.
-        """
-        return self._read[0]
+        """Curves of :class:`FlightCurves`."""
+        return self.read.curves
 
     @property
     def saturated(self) -> np.ndarray:
         """Whether each command was limited (n + 1, 2)."""
-        return self._read[1]
+        return self.read.saturated
 
     @cached_property
-    def _read(self) -> tuple[np.ndarray, np.ndarray]:
+    def read(self) -> FlightCurves:
+        """What metrics are made of."""
         # Here, as most that name metrics compute none: what is compiled takes a while to load.
         from hsv.simulation.curves import read_flight
 
-        return read_flight(self.state, self.reference, self.deviation, self.command, self.unlimited)
+        curves, saturated = np.empty((CURVES, len(self.state))), np.empty(self.command.shape, bool)
+        read_flight(self.state, self.reference, self.deviation, self.command, self.unlimited, curves, saturated)
+        return FlightCurves(self.time, curves, saturated, self.fault_start)
 
 
-def flight_metrics(flight: FlightData) -> dict[str, float]:
+def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
     """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
-    from hsv.simulation.curves import trapezoids
+    from hsv.simulation.curves import integrate
 
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)
+    magnitude, integrals = np.empty(len(time)), np.empty(len(time) - 1)
     for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
-        magnitude = np.abs(error)
-        values[f"{axis}_integral_absolute_error"] = float(np.sum(trapezoids(magnitude, time)))
+        integrate(error, time, magnitude, integrals)
+        values[f"{axis}_integral_absolute_error"] = float(np.sum(integrals))
         values[f"{axis}_error_maximum"] = float(np.max(magnitude))
         values[f"{axis}_end_error"] = float(error[-1])
     tube_error = curves[8:10]
@@ -193,7 +213,7 @@ def flight_metrics(flight: FlightData) -> dict[str, float]:
         start = time[faultless]
         window = slice(int(np.searchsorted(time, start - PRE_FAULT_WINDOW - 1e-9)), faultless)
         if window.start < faultless:  # of a recording with a gap before the fault there is no mean
-            mean = flight.state[window, 2:4].mean(axis=0)
+            mean = np.ascontiguousarray(curves[2:4, window].T).mean(axis=0)  # added row by row
             values["post_fault_attitude_deviation"] = float(np.max(np.abs(curves[2:4, after] - mean[:, None])))
         values["post_fault_attitude_from_nominal"] = float(np.max(tube_error[:, after]))
         for mode, rate in enumerate(curves[4:6], 1):

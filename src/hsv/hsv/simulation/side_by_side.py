@@ -31,21 +31,13 @@ from hsv.vehicle.dynamics import N_INPUTS
 Result = TypeVar("Result")
 
 
-class FlightsSideBySide(NamedTuple):
-    """Flights, the rows of all of them as :attr:`hsv.simulation.history.History.flown`, and how many each has."""
-
-    flights: list[Flight]
-    flown: LaneArray
-    rows: np.ndarray
-
-
 class FlightGroup:
     """Flies up to :data:`hsv.lane_types.WIDTH` flights side by side, and keeps the memory for that."""
 
     def __init__(self, steps: int) -> None:
         """Make room for flights of so many control periods."""
         self._rows = steps + 1
-        self._history = History.over(np.empty((WIDTH, self._rows * (FLOWN + BESIDE))), self._rows, estimated=False)
+        self._history = LaneHistory(self._rows)
 
     @staticmethod
     def takes(components: Sequence[Components]) -> bool:
@@ -56,48 +48,84 @@ class FlightGroup:
         """
         return ENABLED and 1 < len(components) <= WIDTH and all(_fits(components[0], other) for other in components)
 
-    def fly(self, components: Sequence[Components]) -> FlightsSideBySide:
+    def fly(self, components: Sequence[Components]) -> list[Flight]:
         """Return the flights of ``components``, which are valid until the next ones are flown."""
-        lanes = [*components, *[components[-1]] * (WIDTH - len(components))]
-        first = lanes[0]
-        plants, notch = [own.plant for own in lanes], first.notch_filter.data
-        nominal, tube = first.nominal_trajectory, _tube([own.controller.kernel for own in lanes])
-        memory = plants[0].memory()
-        faults = tuple(CommandFaults.of(own) for own in lanes)
         ended = np.full(WIDTH, self._rows)
-        m, s = N_INPUTS, 2 * len(notch.D)
-        zeros: Any = LaneArray.zeros
-        vehicle: Any = LaneRecord([plant.vehicle for plant in plants])
-        sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
-        memories = (zeros(len(memory_of(tube))), zeros(watch_of(tube).shape))
-        arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
-        flown, beside, _ = self._history
-        lanes_flown = LaneArray(flown, split=True)
-        fly_loop(
-            LaneArray.of([plant.initial.state for plant in plants]),
-            plants[0].data._replace(vehicle=vehicle),
-            memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
-            None,
-            None,
-            notch,
-            nominal.data,
-            None,
-            tube,
-            None,
-            None,
-            None,
-            faults,
-            min(own.first for own in faults),
-            _reference(lanes, self._rows),
-            LoopArrays(*arrays),
-            Workspace.of(zeros, notch, nominal.data),
-            (lanes_flown, LaneArray(beside, split=True), None),
-            ended,
-        )
-        flights = [
+        fly_loop(*lane_loop(components, self._rows), self._history.lanes, ended, 0, self._rows)
+        flown, beside = self._history.arrays
+        return [
             flight_of(own, History(flown[i], beside[i], None).cut(int(ended[i]))) for i, own in enumerate(components)
         ]
-        return FlightsSideBySide(flights, lanes_flown, ended)
+
+
+class LaneHistory:
+    """Memory for so many rows of :data:`hsv.lane_types.WIDTH` flights, ideal ones, as arrays and as lanes."""
+
+    def __init__(self, rows: int) -> None:
+        """Make room for so many ``rows`` of each."""
+        flown, beside, _ = History.over(np.empty((WIDTH, rows * (FLOWN + BESIDE))), rows, estimated=False)
+        self.arrays = flown, beside
+        self.lanes = LaneArray(flown, split=True), LaneArray(beside, split=True), None
+
+
+class LaneLoop(NamedTuple):
+    """The first arguments of :func:`fly_loop`, of flights side by side."""
+
+    x: LaneArray
+    plant: Any
+    plant_memory: Any
+    plant_faults: None
+    estimator: None
+    notch: Any
+    nominal: Any
+    nominal_call: None
+    tube: Any
+    controller_call: None
+    link: None
+    link_state: None
+    faults: tuple[CommandFaults, ...]
+    first_fault: int
+    reference: Any
+    arrays: LoopArrays
+    work: Workspace
+
+
+def lane_loop(components: Sequence[Components], rows: int) -> LaneLoop:
+    """Return the arguments for flights of so many ``rows``.
+
+    Where there are fewer flights than lanes, the last one flies in those that are left.
+    """
+    lanes = [*components, *[components[-1]] * (WIDTH - len(components))]
+    first = lanes[0]
+    plants, notch = [own.plant for own in lanes], first.notch_filter.data
+    nominal, tube = first.nominal_trajectory, _tube([own.controller.kernel for own in lanes])
+    memory = plants[0].memory()
+    faults = tuple(CommandFaults.of(own) for own in lanes)
+    m, s = N_INPUTS, 2 * len(notch.D)
+    zeros: Any = LaneArray.zeros
+    vehicle: Any = LaneRecord([plant.vehicle for plant in plants])
+    sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
+    memories = (zeros(len(memory_of(tube))), zeros(watch_of(tube).shape))
+    arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
+    return LaneLoop(
+        x=LaneArray.of([plant.initial.state for plant in plants]),
+        plant=plants[0].data._replace(vehicle=vehicle),
+        plant_memory=memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
+        plant_faults=None,
+        estimator=None,
+        notch=notch,
+        nominal=nominal.data,
+        nominal_call=None,
+        tube=tube,
+        controller_call=None,
+        link=None,
+        link_state=None,
+        faults=faults,
+        first_fault=min(own.first for own in faults),
+        reference=_reference(lanes, rows),
+        arrays=LoopArrays(*arrays),
+        work=Workspace.of(zeros, notch, nominal.data),
+    )
 
 
 def fly_perturbed(
@@ -121,7 +149,7 @@ def fly_perturbed(
     def of_some(some: Sequence[Mapping[str, float]]) -> list[Result]:
         varied = [components.perturbed(perturbation) for perturbation in some]
         together = FlightGroup.takes(varied)
-        flown = FlightGroup(components.plant.steps).fly(varied).flights if together else map(fly, varied)
+        flown = FlightGroup(components.plant.steps).fly(varied) if together else map(fly, varied)
         return [job(perturbation, flight) for perturbation, flight in zip(some, flown, strict=True)]
 
     groups = [perturbations[start : start + WIDTH] for start in range(0, len(perturbations), WIDTH)]

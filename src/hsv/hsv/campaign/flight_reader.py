@@ -1,0 +1,177 @@
+"""Flights side by side that are read while they are flown: of their histories a piece at a time is in memory.
+
+What a campaign keeps of a flight is read from its history four times: for the fingerprint, the level in the tube,
+metrics and envelope. The history of several flights is larger than the caches near a processor, a piece of it is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from hsv.campaign.tube_levels import TubeLevels, worst_level
+from hsv.compiled import bound, njit_in_flight
+from hsv.lane_types import WIDTH
+from hsv.lanes import LaneArray, with_lane
+from hsv.sha256_pairs import AVAILABLE, BLOCK, absorb, finished, initial
+from hsv.simulation.closed_loop import Components, fault_start, fly_loop, times
+from hsv.simulation.curves import read_flight
+from hsv.simulation.fingerprint import fingerprint, written
+from hsv.simulation.history import ACTUATOR, BESIDE, FLOWN, Q_F, U_N, U_UNSATURATED, X_N, U, X
+from hsv.simulation.metrics import CURVES, FlightCurves, FlightData
+from hsv.simulation.side_by_side import FlightGroup, LaneHistory, lane_loop
+from hsv.vehicle.dynamics import N_STATES
+
+PIECE = 17 * BLOCK
+"""Rows of a piece, whole blocks of a digest: all lanes' take half of a second-level cache of 512 KiB to 1 MiB.
+
+Of rows whose bytes are a multiple of 4096, those of all lanes would share the same few lines of the first-level cache.
+"""
+
+
+class ReadFlight(NamedTuple):
+    """What a campaign keeps of a flight: curves, last state (9), worst level in the tube, if there is one."""
+
+    curves: FlightCurves
+    last: np.ndarray
+    level: float | None
+    fingerprint: str | None
+
+    @classmethod
+    def of(cls, data: FlightData, level: float | None, fingerprint: str | None) -> Self:
+        """Return that of a flight whose history there is."""
+        return cls(data.read, data.state[-1], level, fingerprint)
+
+
+class FlightReader:
+    """Flies flights of one campaign side by side, and reads them."""
+
+    def __init__(self, steps: int, levels: TubeLevels) -> None:
+        """Make room for flights of so many control periods."""
+        self._rows, self._levels = steps + 1, levels
+        # Where Python's own digest is computed afterwards, the whole history is one piece.
+        self._history = LaneHistory(PIECE if AVAILABLE else self._rows)
+        self._curves = np.empty((WIDTH, CURVES, self._rows))
+        self._saturated = np.empty((WIDTH, self._rows, 2), bool)
+        # Of a campaign all that is passed has the same types; only gains are one array where all flights have them.
+        self._fly_and_read: dict[type, Callable[..., Any]] = {}
+
+    @staticmethod
+    def takes(components: Sequence[Components]) -> bool:
+        """Tell whether flights can be read while flown side by side: along one reference, as a group takes them."""
+        first = components[0].nominal_trajectory.reference
+        same = all(own.nominal_trajectory.reference is first for own in components)
+        return same and FlightGroup.takes(components)
+
+    def read(self, components: Sequence[Components]) -> list[ReadFlight]:
+        """Fly ``components``, along the same reference; what is returned is valid until the next ones are flown."""
+        rows, first = self._rows, components[0]
+        ended = np.full(WIDTH, rows)
+        last = np.empty((WIDTH, N_STATES))
+        state, rests = initial(WIDTH), np.zeros((WIDTH, BLOCK))
+        worst, loop = LaneArray.zeros(1), lane_loop(components, rows)
+        self._fly_and_read.setdefault(type(loop.tube.gains), bound(_fly_and_read))(
+            tuple(loop),
+            self._history.lanes,
+            self._history.arrays,
+            ended,
+            first.nominal_trajectory.reference.along(rows).state,
+            (self._levels.tube, self._levels.work(LaneArray.zeros), LaneArray.zeros(1), worst),
+            (self._curves, self._saturated, last),
+            (state, rests) if AVAILABLE else None,
+        )
+        lengths = [int(own) for own in ended]
+        if AVAILABLE:
+            digests = map(written, finished(state, [own * FLOWN for own in lengths], [*rests]))
+        else:
+            digests = map(fingerprint, (own[:n] for own, n in zip(self._history.arrays[0], lengths, strict=True)))
+        found = []
+        for i, (own, n, digest) in enumerate(zip(components, lengths, digests, strict=False)):
+            curves = FlightCurves(
+                times(n, own.plant.period), self._curves[i, :, :n], self._saturated[i, :n], fault_start(own, n)
+            )
+            level = float(worst.array[0, i]) if self._levels.defined else None
+            found.append(ReadFlight(curves, last[i], level, digest))
+        return found
+
+
+@njit_in_flight(nogil=True)
+def _fly_and_read(
+    loop: Any,
+    lane_history: Any,
+    history: Any,
+    ended: np.ndarray,
+    reference: np.ndarray,
+    levels: Any,
+    kept: Any,
+    digest: Any,
+) -> None:
+    """Fly a piece, read it, and fly the next one, until the flights end.
+
+    Args:
+        loop: First arguments of :func:`hsv.simulation.closed_loop.fly_loop`.
+        lane_history: The history of a piece as it takes it.
+        history: The same as arrays (lanes, rows of a piece, columns).
+        ended: Rows of each flight (lanes); holds those of a flight that does not diverge.
+        reference: x_r (n + 1, 9).
+        levels: Tube, scratch and rows for :func:`hsv.campaign.tube_levels.worst_level`, and what it writes to.
+        kept: Curves, saturation and last state of each flight.
+        digest: State of each flight's digest, and numbers after its last whole block, or ``None``.
+    """
+    tube, work, lengths, worst = levels
+    flown = lane_history[0]
+    rows, size, stop = len(reference), len(flown), 0
+    while stop < rows:
+        start, stop = stop, min(stop + size, rows)
+        reached = fly_loop(*loop, lane_history, ended, start, stop)  # type: ignore[call-arg]
+        if len(tube[2]) > 0:
+            for i in range(len(ended)):
+                lengths[0] = with_lane(lengths[0], i, float(ended[i]))
+            worst_level(tube, work, reference, flown, flown, X_N, lengths, worst, start)
+        for i in range(len(ended)):
+            _read_piece(i, start, min(stop, ended[i]), ended[i], history, reference, kept)
+        if digest is not None:
+            for i in range(0, len(ended), 2):
+                _digest_piece(i, start, stop, ended, history[0], digest)
+        if reached < stop:
+            break
+
+
+@njit_in_flight()
+def _read_piece(lane: int, start: int, stop: int, rows: int, history: Any, reference: np.ndarray, kept: Any) -> None:
+    """Read the steps ``start`` ... ``stop`` - 1 of a flight of so many ``rows``; there may be none."""
+    n = stop - start
+    if n <= 0:
+        return
+    curves, saturated, last = kept
+    own, beside = history[0][lane, :n], history[1][lane, :n]
+    read_flight(
+        own[:, X:Q_F],
+        reference[start:stop],
+        own[:, X_N:U_N],
+        own[:, U:ACTUATOR],
+        beside[:, U_UNSATURATED:BESIDE],
+        curves[lane, :, start:stop],
+        saturated[lane, start:stop],
+    )
+    if stop == rows:
+        for i in range(len(last[lane])):
+            last[lane, i] = own[n - 1, X + i]
+
+
+@njit_in_flight()
+def _digest_piece(lane: int, start: int, stop: int, ended: np.ndarray, flown: np.ndarray, digest: Any) -> None:
+    """Take the steps ``start`` ... ``stop`` - 1 of the flights of two lanes into their digests, as far as they fly."""
+    state, rests = digest
+    first, second = flown[lane], flown[lane + 1]
+    n, m = (max(min(stop, ended[lane]) - start, 0) * FLOWN, max(min(stop, ended[lane + 1]) - start, 0) * FLOWN)
+    absorb(state[lane : lane + 2], first.ctypes.data, second.ctypes.data, n // BLOCK, m // BLOCK)
+    # There are none but at the end.
+    for j in range(n % BLOCK):
+        number = n - n % BLOCK + j
+        rests[lane, j] = first[number // FLOWN, number % FLOWN]
+    for j in range(m % BLOCK):
+        number = m - m % BLOCK + j
+        rests[lane + 1, j] = second[number // FLOWN, number % FLOWN]
