@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-_LINE = 64
-"""Bytes of a line of the caches: what a register holds is of one line where an array begins with one."""
+_LINE = 8
+"""Numbers of a line of the caches: what a register holds is of one line where an array begins with one."""
 
 
-def _empty(shape: Sequence[int]) -> np.ndarray:
+def _empty(shape: tuple[int, ...]) -> np.ndarray:
     """Return room for numbers that begins with a line."""
-    numbers = math.prod(shape)
-    memory = np.empty(numbers + _LINE // 8)
-    start = -memory.ctypes.data % _LINE // 8
-    return memory[start : start + numbers].reshape(shape)
+    more = np.empty((shape[0] + _LINE, *shape[1:]))
+    start = -more.ctypes.data // more.itemsize % _LINE
+    return more.ravel()[start : start + more[_LINE:].size].reshape(shape)
 
 
 class LaneArray:
