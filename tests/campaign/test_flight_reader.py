@@ -57,21 +57,38 @@ def test_each_that_diverges_ends_on_its_own(instructions, monkeypatch):
     assert max(check(reader, [parts.perturbed({"moment_elevator": -0.85})] * WIDTH)) < 1001
 
 
-def test_gains_of_all_and_of_each():
-    parts = components("case2", duration=5.0)
-    flights = [parts.perturbed({"mass": 0.01 * i}) for i in range(WIDTH)]
-    varied = [components("case2", duration=5.0, feedback__tau=[0.9 + 0.005 * i]).controller for i in range(WIDTH)]
-    reader = reader_of(parts)
-    for _ in range(2):
-        check(reader, flights)
-        check(reader, [replace(own, controller=law) for own, law in zip(flights, varied, strict=True)])
-
-
 def test_without_a_set_there_is_no_level():
     parts = components("case1_no_notch", duration=2.0)
     assert all(read.level is None for read in reader_of(parts).read([parts, parts.perturbed({"mass": 0.05})]))
 
 
-def test_flights_along_different_references_are_not_taken():
+def test_flights_along_different_references_or_with_different_gains_are_not_taken():
     first, second = components("case1", duration=1.0), components("case1", duration=1.0)
-    assert FlightReader.takes([first, first]) and not FlightReader.takes([first, second])
+    assert FlightReader.takes([first, first]) and not FlightReader.takes([])
+    assert not FlightReader.takes([first, replace(first, nominal_trajectory=second.nominal_trajectory)])
+    assert not FlightReader.takes([first, replace(first, controller=second.controller)])
+
+
+@pytest.mark.parametrize("lane", [0, WIDTH // 2 + 1])
+def test_a_flight_that_ends_with_a_piece(lane):
+    parts = components("case1", duration=20.0)
+
+    def diverging(loss):
+        return parts.perturbed({"moment_elevator": loss})
+
+    early, late, rows = -0.85, -0.2, 0  # the weaker the elevator, the sooner
+    while rows != PIECE:
+        loss = (early + late) / 2
+        assert early < loss < late, "no flight ends there"
+        rows = len(fly(diverging(loss)).time)
+        early, late = (loss, late) if rows < PIECE else (early, loss)
+    flights = [parts] * WIDTH
+    flights[lane] = diverging(loss)
+    assert check(reader_of(parts), flights) == [PIECE if i == lane else 1001 for i in range(WIDTH)]
+    assert check(reader_of(parts), [diverging(loss)] * WIDTH) == [PIECE] * WIDTH
+
+
+def test_flights_of_another_length_are_an_error():
+    first = components("case1", duration=1.0)
+    with pytest.raises(ValueError, match="50 steps: expected 100"):
+        reader_of(components("case1", duration=2.0)).read([first, first])

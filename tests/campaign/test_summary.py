@@ -71,7 +71,8 @@ def test_envelopes_hold_every_flight(results, planned):
 
     runner, envelope = SampleRunner(planned()), results.envelope
     curves = [
-        signals(runner.fly(flight, sample).data()) for flight, sample in enumerate(runner.sampler.draw(range(44))[0])
+        signals(runner.fly(flight, sample).data().flight_curves)
+        for flight, sample in enumerate(runner.sampler.draw(range(44))[0])
     ]
     assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=1) for c in curves], axis=0))
     assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=1) for c in curves], axis=0))
@@ -79,8 +80,9 @@ def test_envelopes_hold_every_flight(results, planned):
 
 
 def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
-    flown = fly(components("case1", duration=3.0)).data()
-    flown.state[140:, 6] = np.nan
+    data = fly(components("case1", duration=3.0)).data()
+    data.state[140:, 6] = np.nan
+    flown = data.flight_curves
     envelope = Envelope.empty(50)
     envelope.add(flown, 150)
     envelope.add(flown, 150)

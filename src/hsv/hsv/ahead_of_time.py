@@ -28,7 +28,6 @@ import numpy as np
 from llvmlite import binding, ir
 from numba import cfunc, njit, typeof, types
 from numba.core import cgutils
-from numba.core.caching import IndexDataCacheFile
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -89,8 +88,7 @@ def recording(processes: int = 1) -> Iterator[Calls]:
         finally:
             noted = False
 
-    context = get_context("spawn")
-    pool = ProcessPoolExecutor(processes, context, _save_in_turn, (context.Lock(),)) if processes > 1 else None
+    pool = ProcessPoolExecutor(processes, get_context("spawn"), _compile_for_a_library) if processes > 1 else None
     compiled.instead = call
     try:
         yield calls
@@ -104,19 +102,8 @@ def recording(processes: int = 1) -> Iterator[Calls]:
             pool.shutdown()
 
 
-def _save_in_turn(lock: Any) -> None:
-    """Let this process save what it compiles only while it has the ``lock``: numba's index of a function has none.
-
-    Of two functions with different arguments that are saved at the same time, one could be taken for the other.
-    """
-    file: Any = IndexDataCacheFile
-    save = file.save
-
-    def alone(*arguments: Any) -> None:
-        with lock:
-            save(*arguments)
-
-    file.save = alone
+def _compile_for_a_library() -> None:
+    compiled.for_a_library = True
 
 
 def build(calls: Calls) -> int:

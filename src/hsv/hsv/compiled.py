@@ -31,6 +31,10 @@ instead: Callable[[CompiledFunction, tuple[Any, ...], dict[str, Any]], Any] | No
 """If set, called in place of every compiled function: with the function, its arguments and its named arguments."""
 
 
+for_a_library = False
+"""Set where functions are compiled for the library alone: without what Python calls them by, and not kept by numba."""
+
+
 class CompiledFunction:
     """A function that is compiled; in functions compiled by numba it stands for what numba makes of it."""
 
@@ -54,6 +58,8 @@ class CompiledFunction:
             compile_with = import_module("numba").njit
             # The wrapper by which C would call it takes a tenth of the time to compile, and nobody does.
             options = self.targetoptions | {"no_cfunc_wrapper": True}
+            if for_a_library:
+                options |= {"no_cpython_wrapper": True, "cache": False}
             try:
                 self._dispatcher = compile_with(**options)(self.py_func)
             except RuntimeError:  # there is no folder to keep what is compiled in

@@ -7,12 +7,15 @@ from typing import Any
 
 import numpy as np
 
+BLOCK = 24
+"""A common multiple of the numbers in a register of any processor (4, 8) and of the sums of lanes at a time (6, 12)."""
+
 _LINE = 8
 """Numbers of a line of the caches: what a register holds is of one line where an array begins with one."""
 
 
 def _empty(shape: tuple[int, ...]) -> np.ndarray:
-    """Return room for numbers that begins with a line."""
+    """Return room for numbers that begins with a line: a part of some more rows, of at least a number each."""
     more = np.empty((shape[0] + _LINE, *shape[1:]))
     start = -more.ctypes.data // more.itemsize % _LINE
     return more.ravel()[start : start + more[_LINE:].size].reshape(shape)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from numba import float64
 from numba.extending import overload
 
 from hsv.lane_types import (
@@ -106,6 +107,13 @@ def _weighted_sum(weights: Any, rows: Any, total: Any) -> Any:
                 write_neighbours(total, e, some)
 
         return of_numbers
+
+    together = all(
+        isinstance(kind, LaneArrayType) and kind.ndim == 1 and kind.count == WIDTH and not kind.split
+        for kind in (weights, total)
+    )
+    if not (together and rows.ndim == 2 and rows.layout == "C" and rows.dtype == float64):
+        return None
 
     def of_lanes(weights: Any, rows: Any, total: Any) -> None:
         for part in range(0, WIDTH, PART):

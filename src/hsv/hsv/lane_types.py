@@ -19,7 +19,7 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
 
-from hsv.lane_arrays import LaneArray, LaneRecord
+from hsv.lane_arrays import BLOCK, LaneArray, LaneRecord
 
 REGISTER = 8 if binding.get_host_cpu_features().get("avx512f") else 4
 """Numbers that a vector register of this processor holds."""
@@ -29,12 +29,13 @@ WIDTH = 2 * REGISTER
 
 
 SUMS, PART = (12, REGISTER) if REGISTER == 8 else (6, WIDTH)
-"""How many weighted sums are computed at a time, in how many lanes: as many as there are registers for.
+"""How many weighted sums are computed at a time, and in how many lanes.
 
-Each addition needs the one before it in its sum. A number that is multiplied with one register only is read from memory
-by the multiplication itself where there is AVX-512; as an instruction of its own that takes the place of an arithmetic
-one on Zen 4. AVX2 knows no such multiplication.
+Each addition waits for the one before it in its sum, so there are as many sums as there are registers for. With AVX-512
+a multiplication can read its factor from memory, for one register. For two registers the factor is loaded by an
+instruction of its own, which on Zen 4 takes the place of an addition or a multiplication.
 """
+assert BLOCK % SUMS == 0
 
 
 class LanesType(types.Type):

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from hsv.compiled import njit_in_flight
-from hsv.lane_arrays import LaneArray, LaneRecord
+from hsv.lane_arrays import BLOCK, LaneArray, LaneRecord
 
 __all__ = [
     "BLOCK",
@@ -33,10 +33,6 @@ __all__ = [
     "weighted_sum",
     "with_lane",
 ]
-
-
-BLOCK = 24
-"""A common multiple of the numbers in a register of any processor (4, 8) and of the sums of lanes at a time (6)."""
 
 
 def every(condition: Any) -> Any:

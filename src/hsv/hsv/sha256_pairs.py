@@ -93,14 +93,14 @@ def finished(state: np.ndarray, sizes: Sequence[int], rests: Sequence[np.ndarray
 
 
 @njit_in_flight(nogil=True)
-def absorb(state: np.ndarray, first: int, second: int, of_first: int, of_second: int) -> None:
-    """Take so many blocks at the addresses ``first`` and ``second`` into the ``state`` (2, 8)."""
-    both = min(of_first, of_second)
+def absorb(state: np.ndarray, first: int, second: int, blocks_of_first: int, blocks_of_second: int) -> None:
+    """Take blocks at two addresses, whose memory the caller keeps, into the ``state`` (2, 8)."""
+    both = min(blocks_of_first, blocks_of_second)
     for block in range(both):
         _absorb_block(state, first, second, block, 2)
-    for block in range(both, of_first):
+    for block in range(both, blocks_of_first):
         _absorb_block(state[:1], first, first, block, 1)
-    for block in range(both, of_second):
+    for block in range(both, blocks_of_second):
         _absorb_block(state[1:], second, second, block, 1)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from hsv.compiled import njit
 from hsv.lanes import LaneArray, choose, every
-from hsv.simulation.metrics import FlightCurves, FlightData
+from hsv.simulation.metrics import FlightCurves
 
 WINDOWS = 400
 """Windows into which a flight is cut; of each, least and largest value are kept, so that no peak is lost."""
@@ -37,7 +37,7 @@ SIGNALS = (
 )
 
 
-def signals(flight: FlightData | FlightCurves) -> np.ndarray:
+def signals(flight: FlightCurves) -> np.ndarray:
     """Return the curves of a flight (signals, steps)."""
     return flight.curves[: len(SIGNALS)]
 
@@ -84,7 +84,7 @@ class Envelope:
         shape = windows, len(SIGNALS)
         return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
 
-    def add(self, flight: FlightData | FlightCurves, steps: int) -> None:
+    def add(self, flight: FlightCurves, steps: int) -> None:
         """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
         starts = window_starts(steps, len(self.count))
         lanes = LaneArray(self.low), LaneArray(self.high), LaneArray(self.total)

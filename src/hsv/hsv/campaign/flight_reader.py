@@ -6,7 +6,7 @@ metrics and envelope. The history of several flights is larger than the caches n
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -25,14 +25,15 @@ from hsv.simulation.side_by_side import FlightGroup, LaneHistory, lane_loop
 from hsv.vehicle.dynamics import N_STATES
 
 PIECE = 17 * BLOCK
-"""Rows of a piece, whole blocks of a digest: all lanes' take half of a second-level cache of 512 KiB to 1 MiB.
+"""Rows of a piece, which are whole blocks of a digest.
 
-Of rows whose bytes are a multiple of 4096, those of all lanes would share the same few lines of the first-level cache.
+The pieces of 8 lanes take half of a second-level cache of 512 KiB, those of 16 lanes half of one of 1 MiB. Were the
+bytes of a piece a multiple of 4096, the same row of all lanes would compete for a few lines of the first-level cache.
 """
 
 
-class ReadFlight(NamedTuple):
-    """What a campaign keeps of a flight: curves, last state (9), worst level in the tube, if there is one."""
+class FlightReading(NamedTuple):
+    """What is read of a flight: curves, last state (9), worst level in the tube where there is one, fingerprint."""
 
     curves: FlightCurves
     last: np.ndarray
@@ -41,8 +42,8 @@ class ReadFlight(NamedTuple):
 
     @classmethod
     def of(cls, data: FlightData, level: float | None, fingerprint: str | None) -> Self:
-        """Return that of a flight whose history there is."""
-        return cls(data.read, data.state[-1], level, fingerprint)
+        """Return it of a flight whose whole history there is."""
+        return cls(data.flight_curves, data.state[-1], level, fingerprint)
 
 
 class FlightReader:
@@ -55,25 +56,30 @@ class FlightReader:
         self._history = LaneHistory(PIECE if AVAILABLE else self._rows)
         self._curves = np.empty((WIDTH, CURVES, self._rows))
         self._saturated = np.empty((WIDTH, self._rows, 2), bool)
-        # Of a campaign all that is passed has the same types; only gains are one array where all flights have them.
-        self._fly_and_read: dict[type, Callable[..., Any]] = {}
+        # All that is passed has the same types, for all flights that are taken.
+        self._fly_and_read = bound(_fly_and_read)
 
     @staticmethod
     def takes(components: Sequence[Components]) -> bool:
-        """Tell whether flights can be read while flown side by side: along one reference, as a group takes them."""
-        first = components[0].nominal_trajectory.reference
-        same = all(own.nominal_trajectory.reference is first for own in components)
-        return same and FlightGroup.takes(components)
+        """Tell whether a :class:`FlightGroup` takes flights, and they have one reference and one set of gains."""
+        shared = {(id(own.nominal_trajectory.reference), id(own.controller.kernel)) for own in components}
+        return FlightGroup.takes(components) and len(shared) == 1
 
-    def read(self, components: Sequence[Components]) -> list[ReadFlight]:
-        """Fly ``components``, along the same reference; what is returned is valid until the next ones are flown."""
+    def read(self, components: Sequence[Components]) -> list[FlightReading]:
+        """Fly ``components``, which are taken; what is returned is valid until the next ones are flown.
+
+        Raises:
+            ValueError: They last longer or shorter than the reader has room for, or are more than there are lanes.
+        """
         rows, first = self._rows, components[0]
+        if len(components) > WIDTH or first.plant.steps + 1 != rows:
+            raise ValueError(f"{len(components)} flights of {first.plant.steps} steps: expected {rows - 1} steps")
         ended = np.full(WIDTH, rows)
         last = np.empty((WIDTH, N_STATES))
         state, rests = initial(WIDTH), np.zeros((WIDTH, BLOCK))
-        worst, loop = LaneArray.zeros(1), lane_loop(components, rows)
-        self._fly_and_read.setdefault(type(loop.tube.gains), bound(_fly_and_read))(
-            tuple(loop),
+        worst = LaneArray.zeros(1)
+        self._fly_and_read(
+            lane_loop(components, rows),
             self._history.lanes,
             self._history.arrays,
             ended,
@@ -82,18 +88,18 @@ class FlightReader:
             (self._curves, self._saturated, last),
             (state, rests) if AVAILABLE else None,
         )
-        lengths = [int(own) for own in ended]
+        lengths = [int(own) for own in ended[: len(components)]]
         if AVAILABLE:
-            digests = map(written, finished(state, [own * FLOWN for own in lengths], [*rests]))
+            digests = map(written, finished(state, [int(own) * FLOWN for own in ended], [*rests]))
         else:
-            digests = map(fingerprint, (own[:n] for own, n in zip(self._history.arrays[0], lengths, strict=True)))
+            digests = map(fingerprint, (own[:n] for own, n in zip(self._history.arrays[0], lengths, strict=False)))
         found = []
         for i, (own, n, digest) in enumerate(zip(components, lengths, digests, strict=False)):
             curves = FlightCurves(
                 times(n, own.plant.period), self._curves[i, :, :n], self._saturated[i, :n], fault_start(own, n)
             )
             level = float(worst.array[0, i]) if self._levels.defined else None
-            found.append(ReadFlight(curves, last[i], level, digest))
+            found.append(FlightReading(curves, last[i], level, digest))
         return found
 
 
@@ -112,8 +118,8 @@ def _fly_and_read(
 
     Args:
         loop: First arguments of :func:`hsv.simulation.closed_loop.fly_loop`.
-        lane_history: The history of a piece as it takes it.
-        history: The same as arrays (lanes, rows of a piece, columns).
+        lane_history: The history of a piece, in lanes.
+        history: The same memory as arrays (lanes, rows of a piece, columns).
         ended: Rows of each flight (lanes); holds those of a flight that does not diverge.
         reference: x_r (n + 1, 9).
         levels: Tube, scratch and rows for :func:`hsv.campaign.tube_levels.worst_level`, and what it writes to.
@@ -125,17 +131,19 @@ def _fly_and_read(
     rows, size, stop = len(reference), len(flown), 0
     while stop < rows:
         start, stop = stop, min(stop + size, rows)
-        reached = fly_loop(*loop, lane_history, ended, start, stop)  # type: ignore[call-arg]
+        fly_loop(*loop, lane_history, ended, start, stop)  # type: ignore[call-arg]
         if len(tube[2]) > 0:
-            for i in range(len(ended)):
+            for i in range(len(ended)):  # which a flight that diverged in this piece has just changed
                 lengths[0] = with_lane(lengths[0], i, float(ended[i]))
             worst_level(tube, work, reference, flown, flown, X_N, lengths, worst, start)
+        latest = 0
         for i in range(len(ended)):
+            latest = max(latest, ended[i])
             _read_piece(i, start, min(stop, ended[i]), ended[i], history, reference, kept)
         if digest is not None:
             for i in range(0, len(ended), 2):
                 _digest_piece(i, start, stop, ended, history[0], digest)
-        if reached < stop:
+        if latest <= stop:
             break
 
 
@@ -168,7 +176,7 @@ def _digest_piece(lane: int, start: int, stop: int, ended: np.ndarray, flown: np
     first, second = flown[lane], flown[lane + 1]
     n, m = (max(min(stop, ended[lane]) - start, 0) * FLOWN, max(min(stop, ended[lane + 1]) - start, 0) * FLOWN)
     absorb(state[lane : lane + 2], first.ctypes.data, second.ctypes.data, n // BLOCK, m // BLOCK)
-    # There are none but at the end.
+    # Only the last piece of a flight ends within a block.
     for j in range(n % BLOCK):
         number = n - n % BLOCK + j
         rests[lane, j] = first[number // FLOWN, number % FLOWN]

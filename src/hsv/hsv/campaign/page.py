@@ -266,7 +266,7 @@ def _picture(results: Results, flights: Mapping[str, Flight]) -> Picture:
 
 
 def _curve(flight: Flight, windows: np.ndarray, index: int) -> np.ndarray:
-    curve = signals(flight.data())[index]
+    curve = signals(flight.data().flight_curves)[index]
     return np.asarray(curve[windows[windows < len(curve)]])
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.campaign.flight_reader import ReadFlight
+from hsv.campaign.flight_reader import FlightReading
 from hsv.campaign.sample_runner import Outcome
 from hsv.campaign.summary import Results
 from hsv.campaign.table import OUTCOMES
@@ -47,7 +47,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
     try:
         flown = runner.fly(flight, runner.sample(flight))
         data = flown.data()
-        repeated = runner.outcome(ReadFlight.of(data, runner.level(data), flown.fingerprint))
+        repeated = runner.outcome(FlightReading.of(data, runner.level(data), flown.fingerprint))
     except ControllerError as error:
         repeated = runner.crashed(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
@@ -84,7 +84,7 @@ def replay_over_dds(
     data = flight_data(recorded)
     # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
     data = replace(data, time=np.arange(len(data.time)) * runner.period)
-    repeated = runner.outcome(ReadFlight.of(data, runner.level(data), flight_fingerprint(recorded)))
+    repeated = runner.outcome(FlightReading.of(data, runner.level(data), flight_fingerprint(recorded)))
     told = not (
         measurement_errors(joined(recorded, equipment_topics(recorded)))
         or prepared.scenario.equipment.get(ESTIMATOR_ENABLED.name)

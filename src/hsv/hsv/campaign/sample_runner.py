@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from hsv.campaign.campaign import Campaign
-from hsv.campaign.flight_reader import FlightReader, ReadFlight
+from hsv.campaign.flight_reader import FlightReader, FlightReading
 from hsv.campaign.sampling import Sampler
 from hsv.campaign.tube_levels import TubeLevels
 from hsv.campaign.variants import FlightVariants
@@ -19,6 +19,7 @@ from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
 from hsv.lane_types import WIDTH
 from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.simulation.side_by_side import FlightGroup
 from hsv.vehicle.envelope import in_model_range
@@ -60,7 +61,7 @@ class SampleRunner:
         """
         return fly(self._components(flight, sample))
 
-    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[ReadFlight | ControllerError]:
+    def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlightReading | ControllerError]:
         """Fly ``flights`` with their ``samples`` (flights, factors), side by side where that can be.
 
         Each is valid until the next one. In place of a flight that its controller ended comes what it said.
@@ -74,28 +75,29 @@ class SampleRunner:
             if FlightReader.takes(components):
                 yield from self._reader.read(components)
             elif FlightGroup.takes(components):
-                yield from map(self._read, self._group.fly(components))
+                flown = self._group.fly(components)
+                digests = fingerprints([flight.history.flown for flight in flown])
+                yield from map(self._reading, flown, digests)
             else:
                 yield from map(self._flown_or_error, components)
 
-    # Their memory is kept.
-
     @cached_property
     def _reader(self) -> FlightReader:
-        return FlightReader(self.steps, self._levels)
+        return FlightReader(self.steps, self._levels)  # whose memory is kept
 
     @cached_property
     def _group(self) -> FlightGroup:
-        return FlightGroup(self.steps)
+        return FlightGroup(self.steps)  # whose memory is kept
 
-    def _read(self, flight: Flight) -> ReadFlight:
+    def _reading(self, flight: Flight, digest: str) -> FlightReading:
         data = flight.data()
-        return ReadFlight.of(data, self.level(data), flight.fingerprint)
+        return FlightReading.of(data, self.level(data), digest)
 
-    def _flown_alone(self, components: Components) -> ReadFlight:
-        return self._read(fly(components))
+    def _flown_alone(self, components: Components) -> FlightReading:
+        flight = fly(components)
+        return self._reading(flight, flight.fingerprint)
 
-    def _flown_or_error(self, components: Components) -> ReadFlight | ControllerError:
+    def _flown_or_error(self, components: Components) -> FlightReading | ControllerError:
         try:
             return self._flown_alone(components)
         except ControllerError as error:
@@ -116,7 +118,7 @@ class SampleRunner:
         """Fly the scenario itself."""
         return fly(self._variants.unchanged)
 
-    def fly_piece(self, steps: int) -> list[ReadFlight]:
+    def fly_piece(self, steps: int) -> list[FlightReading]:
         """Fly so many ``steps`` of the scenario itself, as often as it is flown at once.
 
         Raises:
@@ -139,7 +141,7 @@ class SampleRunner:
         """Return the worst level of a flight in the tube, ``None`` where no set holds for it."""
         return self._levels.worst(flight)
 
-    def outcome(self, flown: ReadFlight) -> Outcome:
+    def outcome(self, flown: FlightReading) -> Outcome:
         """Return what a campaign records of a flight: its end, worst tube level, metrics (SI), fingerprint."""
         return {
             "diverged": not in_model_range(flown.last, self._variants.unchanged.plant.vehicle.angle_limit),

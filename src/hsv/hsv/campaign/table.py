@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 from hsv.campaign.campaign import Campaign
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Job
-from hsv.campaign.flight_reader import ReadFlight
+from hsv.campaign.flight_reader import FlightReading
 from hsv.campaign.sample_runner import Outcome, SampleRunner, sample_runner
 from hsv.control.library import LibraryController
 from hsv.errors import ControllerError
@@ -137,7 +137,7 @@ def _rows(runner: SampleRunner, flights: range) -> tuple[list[dict[str, Any]], E
     return rows, envelope
 
 
-def _outcome(runner: SampleRunner, flown: ReadFlight, envelope: Envelope) -> Outcome:
+def _outcome(runner: SampleRunner, flown: FlightReading, envelope: Envelope) -> Outcome:
     envelope.add(flown.curves, runner.steps)
     return runner.outcome(flown)
 

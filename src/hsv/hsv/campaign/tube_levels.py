@@ -32,18 +32,18 @@ def worst_level(
 ) -> None:
     """Write into ``worst`` (1) the largest level of the steps before ``rows`` (1).
 
-    A flight may be read in pieces, one after the other; ``state`` and ``deviation`` begin with the step ``start``.
+    A flight may be read in pieces, one after the other.
 
     Args:
         tube: Filter, P (s, s) and c (s).
         work: Scratch, three arrays: of the error (s) and of the filters (2 s each); the filters are kept.
         reference: x_r (n + 1, 9) from the first step on.
         state: Has x in its first columns.
-        deviation: Has x_n in its columns from the ``first`` on.
-        first: See there.
-        rows: Of each lane, how many steps the flight has.
+        deviation: Has x_n in its columns from ``first`` on.
+        first: Column of the first component of x_n in ``deviation``.
+        rows: Number of steps of the flight, or of the flight of each lane (1).
         worst: Not a number where a level is none.
-        start: See there.
+        start: Step of the first row of ``state`` and ``deviation``.
     """
     notch, shape, centre = tube
     error, actual, planned = work

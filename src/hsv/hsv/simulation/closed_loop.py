@@ -167,9 +167,9 @@ def fly_loop(
     start: int,
     stop: int,
 ) -> int:
-    """Fly the steps ``start`` ... ``stop`` - 1, the first from state ``x`` (9); return the step before which it ended.
+    """Fly the steps ``start`` ... ``stop`` - 1, the first from state ``x`` (9); return the one after the last flown.
 
-    Before ``stop``: the flight diverged. Below zero, -1 - k: a block that was called failed in step k. Without
+    Before ``stop``: all flights have diverged. Below zero, -1 - k: a block that was called failed in step k. Without
     ``plant_faults`` the plant is ideal, and so is the ``link`` of the command, without ``estimator`` there is none;
     other functions are compiled for these, as what is not used would take a tenth of the time. Of lanes each is a
     flight, whose rows are written to ``ended`` (lanes), which holds those of a flight that does not diverge.
@@ -296,7 +296,7 @@ def fly_loop(
 
 @lru_cache(maxsize=8)
 def times(rows: int, period: float) -> np.ndarray:
-    """Return the simulated time (s) of so many ``rows``; who ask for as many share them."""
+    """Return the simulated time (s) of so many ``rows``, shared by all callers that ask for as many."""
     found = np.arange(rows) * period
     found.setflags(write=False)
     return found

@@ -174,15 +174,15 @@ class FlightData:
     @property
     def curves(self) -> np.ndarray:
         """Curves of :class:`FlightCurves`."""
-        return self.read.curves
+        return self.flight_curves.curves
 
     @property
     def saturated(self) -> np.ndarray:
         """Whether each command was limited (n + 1, 2)."""
-        return self.read.saturated
+        return self.flight_curves.saturated
 
     @cached_property
-    def read(self) -> FlightCurves:
+    def flight_curves(self) -> FlightCurves:
         """What metrics are made of."""
         # Here, as most that name metrics compute none: what is compiled takes a while to load.
         from hsv.simulation.curves import read_flight

@@ -51,7 +51,7 @@ class FlightGroup:
     def fly(self, components: Sequence[Components]) -> list[Flight]:
         """Return the flights of ``components``, which are valid until the next ones are flown."""
         ended = np.full(WIDTH, self._rows)
-        fly_loop(*lane_loop(components, self._rows), self._history.lanes, ended, 0, self._rows)
+        fly_loop(*lane_loop(components, self._rows), self._history.lanes, ended, 0, self._rows)  # type: ignore[call-arg]
         flown, beside = self._history.arrays
         return [
             flight_of(own, History(flown[i], beside[i], None).cut(int(ended[i]))) for i, own in enumerate(components)
@@ -68,30 +68,8 @@ class LaneHistory:
         self.lanes = LaneArray(flown, split=True), LaneArray(beside, split=True), None
 
 
-class LaneLoop(NamedTuple):
-    """The first arguments of :func:`fly_loop`, of flights side by side."""
-
-    x: LaneArray
-    plant: Any
-    plant_memory: Any
-    plant_faults: None
-    estimator: None
-    notch: Any
-    nominal: Any
-    nominal_call: None
-    tube: Any
-    controller_call: None
-    link: None
-    link_state: None
-    faults: tuple[CommandFaults, ...]
-    first_fault: int
-    reference: Any
-    arrays: LoopArrays
-    work: Workspace
-
-
-def lane_loop(components: Sequence[Components], rows: int) -> LaneLoop:
-    """Return the arguments for flights of so many ``rows``.
+def lane_loop(components: Sequence[Components], rows: int) -> tuple[Any, ...]:
+    """Return the first arguments of :func:`fly_loop`, for flights side by side of so many ``rows``.
 
     Where there are fewer flights than lanes, the last one flies in those that are left.
     """
@@ -107,24 +85,24 @@ def lane_loop(components: Sequence[Components], rows: int) -> LaneLoop:
     sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
     memories = (zeros(len(memory_of(tube))), zeros(watch_of(tube).shape))
     arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
-    return LaneLoop(
-        x=LaneArray.of([plant.initial.state for plant in plants]),
-        plant=plants[0].data._replace(vehicle=vehicle),
-        plant_memory=memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
-        plant_faults=None,
-        estimator=None,
-        notch=notch,
-        nominal=nominal.data,
-        nominal_call=None,
-        tube=tube,
-        controller_call=None,
-        link=None,
-        link_state=None,
-        faults=faults,
-        first_fault=min(own.first for own in faults),
-        reference=_reference(lanes, rows),
-        arrays=LoopArrays(*arrays),
-        work=Workspace.of(zeros, notch, nominal.data),
+    return (
+        LaneArray.of([plant.initial.state for plant in plants]),
+        plants[0].data._replace(vehicle=vehicle),
+        memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
+        None,
+        None,
+        notch,
+        nominal.data,
+        None,
+        tube,
+        None,
+        None,
+        None,
+        faults,
+        min(own.first for own in faults),
+        _reference(lanes, rows),
+        LoopArrays(*arrays),
+        Workspace.of(zeros, notch, nominal.data),
     )
 
 
