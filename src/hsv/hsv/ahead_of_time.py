@@ -26,8 +26,9 @@ from typing import Any
 
 import numpy as np
 from llvmlite import binding, ir
-from numba import cfunc, njit, typeof, types
+from numba import cfunc, config, njit, typeof, types
 from numba.core import cgutils
+from numba.core.caching import IndexDataCacheFile
 from numba.core.errors import NumbaError, TypingError
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -88,22 +89,40 @@ def recording(processes: int = 1) -> Iterator[Calls]:
         finally:
             noted = False
 
-    pool = ProcessPoolExecutor(processes, get_context("spawn"), _compile_for_a_library) if processes > 1 else None
-    compiled.instead = call
-    try:
-        yield calls
-    except BaseException:
-        if pool:
-            pool.shutdown(cancel_futures=True)
-        raise
-    finally:
-        compiled.instead = None
-        if pool:
-            pool.shutdown()
+    with TemporaryDirectory() as folder:
+        context = get_context("spawn")
+        start = _compile_for_the_library, (context.Lock(), folder)
+        pool = ProcessPoolExecutor(processes, context, *start) if processes > 1 else None
+        compiled.instead = call
+        try:
+            yield calls
+        except BaseException:
+            if pool:
+                pool.shutdown(cancel_futures=True)
+            raise
+        finally:
+            compiled.instead = None
+            if pool:
+                pool.shutdown()
 
 
-def _compile_for_a_library() -> None:
+def _compile_for_the_library(lock: Any, folder: str) -> None:
+    """Let this process compile for the library alone, and keep in ``folder`` what the others need as well.
+
+    It saves only while it has the ``lock``: of two functions with different arguments that are saved at the same time,
+    one could be taken for the other, as numba's index of a function has no lock.
+    """
     compiled.for_a_library = True
+    settings: Any = config
+    settings.CACHE_DIR = folder
+    file: Any = IndexDataCacheFile
+    save = file.save
+
+    def alone(*arguments: Any) -> None:
+        with lock:
+            save(*arguments)
+
+    file.save = alone
 
 
 def build(calls: Calls) -> int:

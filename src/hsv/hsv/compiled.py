@@ -32,7 +32,7 @@ instead: Callable[[CompiledFunction, tuple[Any, ...], dict[str, Any]], Any] | No
 
 
 for_a_library = False
-"""Set where functions are compiled for the library alone: without what Python calls them by, and not kept by numba."""
+"""Set where functions are compiled for the library alone: without that by which Python calls them."""
 
 
 class CompiledFunction:
@@ -59,7 +59,7 @@ class CompiledFunction:
             # The wrapper by which C would call it takes a tenth of the time to compile, and nobody does.
             options = self.targetoptions | {"no_cfunc_wrapper": True}
             if for_a_library:
-                options |= {"no_cpython_wrapper": True, "cache": False}
+                options["no_cpython_wrapper"] = True
             try:
                 self._dispatcher = compile_with(**options)(self.py_func)
             except RuntimeError:  # there is no folder to keep what is compiled in
