@@ -163,6 +163,29 @@ def test_a_weighted_sum_has_the_bits_of_sums_in_the_order_of_the_rows(blocks):
     assert together.array.tobytes() == expected.tobytes()
 
 
+@pytest.mark.parametrize("wrong", ["split weights", "split total", "fewer lanes", "rows of Fortran's order"])
+def test_a_weighted_sum_refuses_what_it_would_read_wrongly(wrong):
+    weights, total, rows = LaneArray.zeros(7), LaneArray.zeros(lanes.BLOCK), np.zeros((7, lanes.BLOCK))
+    if wrong == "split weights":
+        weights = LaneArray(np.zeros((WIDTH, 7)), split=True)
+    elif wrong == "split total":
+        total = LaneArray(np.zeros((WIDTH, lanes.BLOCK)), split=True)
+    elif wrong == "fewer lanes":
+        weights, total = (LaneArray(np.zeros((n, WIDTH // 2))) for n in (7, lanes.BLOCK))
+    else:
+        rows = np.asfortranarray(rows)
+    with pytest.raises(TypingError):
+        _sum(weights, rows, total)
+
+
+@pytest.mark.parametrize("shape", [1, 7, (3, 5)])
+def test_arrays_of_lanes_begin_with_a_line_of_the_cache(shape):
+    zeros = LaneArray.zeros(shape)
+    copied = LaneArray.of([np.full(shape, float(i)) for i in range(3)])
+    assert zeros.address % 64 == copied.address % 64 == 0
+    assert not zeros.array.any() and (copied.array == [0.0, 1.0, 2.0]).all()
+
+
 def test_an_array_of_lanes_is_no_number():
     with pytest.raises(TypingError):
         njit()(lambda x: lane(x, 0))(LaneArray.zeros(1))

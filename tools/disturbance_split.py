@@ -21,7 +21,7 @@ from hsv.design.tube_problem import channel_model
 from hsv.design.verification.checks import Subject
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
-from hsv.simulation.closed_loop import Flight
+from hsv.simulation.flight import Flight
 from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
 
 DESIGNS = ("baseline", "tight", "derived")

@@ -40,7 +40,7 @@ from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest,
 _WORD = ir.IntType(64)
 _TUPLE: Any = types.BaseTuple
 _RUN_TIME = PACKAGE / "run_time.c"
-_OWN = ("hsv.ahead_of_time", "hsv.compiled", "hsv.lane_types", "hsv.precompiled")
+_OWN = ("hsv.ahead_of_time", "hsv.compiled", "hsv.lane_instructions", "hsv.lane_types", "hsv.precompiled")
 """Modules that say how functions are compiled and called."""
 
 _IN_ORDER = {"C": 0x1, "F": 0x2, "A": 0}

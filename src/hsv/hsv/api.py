@@ -16,8 +16,8 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Flight
 from hsv.simulation.closed_loop import fly as fly_components
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import METRICS
 from hsv.simulation.scenario import Scenario
 from hsv.simulation.scenario import load_scenario as load

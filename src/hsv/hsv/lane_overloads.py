@@ -8,14 +8,9 @@ from typing import Any
 from numba import float64
 from numba.extending import overload
 
-from hsv.lane_types import (
+from hsv.lane_instructions import (
     PART,
-    REGISTER,
     SUMS,
-    WIDTH,
-    LaneArrayType,
-    LanesType,
-    MaskType,
     all_of,
     neighbours,
     one_lane,
@@ -24,7 +19,8 @@ from hsv.lane_types import (
     write_neighbours,
     write_sums,
 )
-from hsv.lane_types import with_lane as inserted
+from hsv.lane_instructions import with_lane as inserted
+from hsv.lane_types import REGISTER, WIDTH, LaneArrayType, LanesType, MaskType
 from hsv.lanes import (
     choose,
     every,

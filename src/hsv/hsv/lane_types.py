@@ -17,25 +17,15 @@ from numba.core import cgutils
 from numba.core.imputils import lower_builtin, lower_cast, lower_getattr_generic
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
-from numba.extending import NativeValue, intrinsic, models, register_model, typeof_impl, unbox
+from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
 
-from hsv.lane_arrays import BLOCK, LaneArray, LaneRecord
+from hsv.lane_arrays import LaneArray, LaneRecord
 
 REGISTER = 8 if binding.get_host_cpu_features().get("avx512f") else 4
 """Numbers that a vector register of this processor holds."""
 
 WIDTH = 2 * REGISTER
 """Lanes of flights side by side, of two registers: while one waits for its last result, the other one is computed."""
-
-
-SUMS, PART = (12, REGISTER) if REGISTER == 8 else (6, WIDTH)
-"""How many weighted sums are computed at a time, and in how many lanes.
-
-Each addition waits for the one before it in its sum, so there are as many sums as there are registers for. With AVX-512
-a multiplication can read its factor from memory, for one register. For two registers the factor is loaded by an
-instruction of its own, which on Zen 4 takes the place of an addition or a multiplication.
-"""
-assert BLOCK % SUMS == 0
 
 
 class LanesType(types.Type):
@@ -86,26 +76,24 @@ class LaneRecordType(types.Type):
         super().__init__(f"LaneRecord({fields}, {count})")
 
 
-_intrinsic: Any = intrinsic
-"""Without the first argument, which numba puts in."""
-
-_DOUBLE, _WORD = ir.DoubleType(), ir.IntType(64)
+DOUBLE, WORD = ir.DoubleType(), ir.IntType(64)
 
 
-def _vector(kind: Any, count: int) -> Any:
+def vector_of(kind: Any, count: int) -> Any:
+    """Return the type of a vector of ``count`` elements of a ``kind``."""
     return ir.VectorType(kind, count)
 
 
 @register_model(LanesType)
 class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _vector(_DOUBLE, kind.count))
+        super().__init__(manager, kind, vector_of(DOUBLE, kind.count))
 
 
 @register_model(MaskType)
 class _MaskModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _vector(ir.IntType(1), kind.count))
+        super().__init__(manager, kind, vector_of(ir.IntType(1), kind.count))
 
 
 @register_model(LaneArrayType)
@@ -160,21 +148,22 @@ def _unbox_record(kind: Any, value: Any, c: Any) -> NativeValue:
     return NativeValue(made._getvalue(), is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
 
 
-def _in_all_lanes(builder: Any, value: Any, count: int) -> Any:
-    undefined = ir.Constant(_vector(value.type, count), ir.Undefined)
+def in_all_lanes(builder: Any, value: Any, count: int) -> Any:
+    """Return a vector with the same ``value`` in all elements."""
+    undefined = ir.Constant(vector_of(value.type, count), ir.Undefined)
     first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
-    return builder.shuffle_vector(first, undefined, ir.Constant(_vector(ir.IntType(32), count), [0] * count))
+    return builder.shuffle_vector(first, undefined, ir.Constant(vector_of(ir.IntType(32), count), [0] * count))
 
 
 @lower_cast(types.Float, LanesType)
 @lower_cast(types.Integer, LanesType)
 def _lanes_of_number(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
-    return _in_all_lanes(builder, context.cast(builder, value, given, types.float64), wanted.count)
+    return in_all_lanes(builder, context.cast(builder, value, given, types.float64), wanted.count)
 
 
 @lower_cast(types.Boolean, MaskType)
 def _mask_of_truth(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
-    return _in_all_lanes(builder, context.cast(builder, value, given, types.boolean), wanted.count)
+    return in_all_lanes(builder, context.cast(builder, value, given, types.boolean), wanted.count)
 
 
 def _common(kind: type, plain: Any, arguments: Sequence[Any]) -> Any:
@@ -184,16 +173,18 @@ def _common(kind: type, plain: Any, arguments: Sequence[Any]) -> Any:
     return found[0] if fits else None
 
 
-def _lanes_among(arguments: Sequence[Any]) -> Any:
+def lanes_among(arguments: Sequence[Any]) -> Any:
+    """Return the type of lanes among types, where all others are of numbers; ``None`` elsewhere."""
     return _common(LanesType, (types.Float, types.Integer), arguments)
 
 
-def _mask_among(arguments: Sequence[Any]) -> Any:
+def mask_among(arguments: Sequence[Any]) -> Any:
+    """Return the mask among types, where all others are of truth values; ``None`` elsewhere."""
     return _common(MaskType, (types.Boolean,), arguments)
 
 
 def _operation(
-    function: Any, operands: int, emit: Callable[..., Any], among: Callable[..., Any] = _lanes_among, result: Any = None
+    function: Any, operands: int, emit: Callable[..., Any], among: Callable[..., Any] = lanes_among, result: Any = None
 ) -> None:
     """Let ``function`` take lanes; ``emit`` writes the instruction, of ``result`` or of what is taken."""
 
@@ -206,7 +197,7 @@ def _operation(
 
     # Not as a decorator: it asks for the function's module, and ufuncs of NumPy 1 have none.
     infer_global(function, types.Function(_Template))
-    kind = MaskType if among is _mask_among else LanesType
+    kind = MaskType if among is mask_among else LanesType
 
     @lower_builtin(function, *[kind] * operands)
     def _lowered(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
@@ -248,7 +239,7 @@ for _name, _instruction in (("and_", "and_"), ("or_", "or_"), ("iand", "and_"), 
         getattr(operator, _name),
         2,
         lambda builder, a, b, instruction=_instruction: getattr(builder, instruction)(a, b),
-        _mask_among,
+        mask_among,
     )
 _operation(operator.neg, 1, lambda builder, a: builder.fneg(a))
 _operation(abs, 1, _called("fabs"))
@@ -290,20 +281,21 @@ class _RecordAttributes(AttributeTemplate):
 @lower_getattr_generic(LaneRecordType)
 def _lower_field(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     data = _struct(context, builder, kind, value).data
-    place = builder.gep(data, [ir.Constant(_WORD, kind.fields.index(name) * kind.count)])
-    load = _loaded(builder, place, kind.count)
+    place = builder.gep(data, [ir.Constant(WORD, kind.fields.index(name) * kind.count)])
+    load = load_lanes(builder, place, kind.count)
     # Nothing writes to a record: it need not be read once more after each store.
     load.set_metadata("invariant.load", builder.module.add_metadata([]))
     return load
 
 
-def _loaded(builder: Any, place: Any, count: int) -> Any:
-    load = builder.load(builder.bitcast(place, _vector(_DOUBLE, count).as_pointer()))
+def load_lanes(builder: Any, place: Any, count: int) -> Any:
+    """Return the lanes at an address."""
+    load = builder.load(builder.bitcast(place, vector_of(DOUBLE, count).as_pointer()))
     load.align = 8
     return load
 
 
-def _place(context: Any, builder: Any, kind: Any, array: Any, indices: Sequence[Any]) -> tuple[Any, Any]:
+def place_of(context: Any, builder: Any, kind: Any, array: Any, indices: Sequence[Any]) -> tuple[Any, Any]:
     """Return the address of the first lane of an element, and the stride of the lanes."""
     made = _struct(context, builder, kind, array)
     flat = indices[0]
@@ -312,7 +304,7 @@ def _place(context: Any, builder: Any, kind: Any, array: Any, indices: Sequence[
         if axis < len(indices):
             flat = builder.add(flat, indices[axis])
     if not kind.split:
-        flat = builder.mul(flat, ir.Constant(_WORD, kind.count))
+        flat = builder.mul(flat, ir.Constant(WORD, kind.count))
     return builder.gep(made.data, [flat]), made.stride
 
 
@@ -337,7 +329,7 @@ class _GetItem(AbstractTemplate):
 class _SetItem(AbstractTemplate):
     def generic(self, arguments: Any, keywords: Any) -> Any:
         array, index, value = arguments
-        if not isinstance(array, LaneArrayType) or _lanes_among((LanesType(array.count), value)) is None:
+        if not isinstance(array, LaneArrayType) or lanes_among((LanesType(array.count), value)) is None:
             return None
         if isinstance(index, types.Integer) and array.ndim == 1:
             return signature(types.none, array, types.intp, LanesType(array.count))
@@ -355,17 +347,17 @@ def _indices(builder: Any, kind: Any, index: Any) -> list[Any]:
 def _get(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
     kind, index = called.args
     indices = _indices(builder, index, arguments[1])
-    place, stride = _place(context, builder, kind, arguments[0], indices)
+    place, stride = place_of(context, builder, kind, arguments[0], indices)
     if len(indices) < kind.ndim:
         whole, row = _struct(context, builder, kind, arguments[0]), _struct(context, builder, called.return_type)
         row.data, row.stride = place, whole.stride
-        row.shape = cgutils.pack_array(builder, cgutils.unpack_tuple(builder, whole.shape)[1:], _WORD)
+        row.shape = cgutils.pack_array(builder, cgutils.unpack_tuple(builder, whole.shape)[1:], WORD)
         return row._getvalue()
     if not kind.split:
-        return _loaded(builder, place, kind.count)
-    value = ir.Constant(_vector(_DOUBLE, kind.count), ir.Undefined)
+        return load_lanes(builder, place, kind.count)
+    value = ir.Constant(vector_of(DOUBLE, kind.count), ir.Undefined)
     for lane in range(kind.count):
-        number = builder.load(builder.gep(place, [builder.mul(stride, ir.Constant(_WORD, lane))]))
+        number = builder.load(builder.gep(place, [builder.mul(stride, ir.Constant(WORD, lane))]))
         value = builder.insert_element(value, number, ir.Constant(ir.IntType(32), lane))
     return value
 
@@ -374,11 +366,11 @@ def _get(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
 @lower_builtin(operator.setitem, LaneArrayType, types.BaseTuple, LanesType)
 def _set(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
     kind, index = called.args[:2]
-    place, stride = _place(context, builder, kind, arguments[0], _indices(builder, index, arguments[1]))
+    place, stride = place_of(context, builder, kind, arguments[0], _indices(builder, index, arguments[1]))
     if kind.split:
         for lane in range(kind.count):
             number = builder.extract_element(arguments[2], ir.Constant(ir.IntType(32), lane))
-            builder.store(number, builder.gep(place, [builder.mul(stride, ir.Constant(_WORD, lane))]))
+            builder.store(number, builder.gep(place, [builder.mul(stride, ir.Constant(WORD, lane))]))
     else:
         builder.store(arguments[2], builder.bitcast(place, arguments[2].type.as_pointer())).align = 8
     return context.get_dummy_value()
@@ -393,118 +385,3 @@ class _Len(AbstractTemplate):
 @lower_builtin(len, LaneArrayType)
 def _length(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
     return builder.extract_value(_struct(context, builder, called.args[0], arguments[0]).shape, 0)
-
-
-@_intrinsic
-def all_of(typing_context: Any, mask: Any) -> Any:
-    """Tell whether a mask holds in all lanes."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        bits = builder.bitcast(arguments[0], ir.IntType(mask.count))
-        return builder.icmp_unsigned("==", bits, ir.Constant(bits.type, (1 << mask.count) - 1))
-
-    return types.boolean(mask), generate
-
-
-@_intrinsic
-def select(typing_context: Any, mask: Any, a: Any, b: Any) -> Any:
-    """Return lanes, or a mask, of two by a mask."""
-    kind = _lanes_among((LanesType(mask.count), a, b)) or _mask_among((mask, a, b))
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        return builder.select(*arguments)
-
-    return kind(mask, kind, kind), generate
-
-
-@_intrinsic
-def one_lane(typing_context: Any, value: Any, index: Any) -> Any:
-    """Return a lane of lanes or of a mask."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        return builder.extract_element(*arguments)
-
-    return (types.boolean if isinstance(value, MaskType) else types.float64)(value, types.intp), generate
-
-
-@_intrinsic
-def with_lane(typing_context: Any, value: Any, index: Any, number: Any) -> Any:
-    """Return lanes with another number in one."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        lanes, place, new = arguments
-        return builder.insert_element(lanes, new, place)
-
-    return value(value, types.intp, types.float64), generate
-
-
-def _beginning(context: Any, builder: Any, kind: Any, array: Any, start: Any) -> Any:
-    """Return the address of :data:`REGISTER` numbers of a contiguous array, from the flat index ``start`` on."""
-    data = builder.gep(context.make_array(kind)(context, builder, array).data, [start])
-    return builder.bitcast(data, _vector(_DOUBLE, REGISTER).as_pointer())
-
-
-@_intrinsic
-def neighbours(typing_context: Any, array: Any, start: Any) -> Any:
-    """Return :data:`REGISTER` numbers of a contiguous array of float64 as lanes, from the flat index ``start`` on."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        load = builder.load(_beginning(context, builder, called.args[0], *arguments))
-        load.align = 8
-        return load
-
-    return LanesType(REGISTER)(array, types.intp), generate
-
-
-@_intrinsic
-def write_sums(typing_context: Any, weights: Any, rows: Any, total: Any, first: Any, part: Any) -> Any:
-    """Write :data:`SUMS` numbers of :func:`hsv.lanes.weighted_sum`, from ``first`` on, in lanes from ``part`` on."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        given, matrix, written, column, lane = arguments
-        numbers = context.make_array(called.args[1])(context, builder, matrix)
-        count, size = cgutils.unpack_tuple(builder, numbers.shape)
-        kind = _vector(_DOUBLE, PART)
-        sums = [cgutils.alloca_once_value(builder, ir.Constant(kind, [0.0] * PART)) for _ in range(SUMS)]
-        with cgutils.for_range(builder, count) as row:
-            place, _ = _place(context, builder, called.args[0], given, [row.index])
-            weight = _loaded(builder, builder.gep(place, [lane]), PART)
-            start = builder.gep(numbers.data, [builder.add(builder.mul(row.index, size), column)])
-            for i, total_so_far in enumerate(sums):
-                number = builder.load(builder.gep(start, [ir.Constant(_WORD, i)]))
-                product = builder.fmul(weight, _in_all_lanes(builder, number, PART))
-                builder.store(builder.fadd(builder.load(total_so_far), product), total_so_far)
-        for i, found in enumerate(sums):
-            index = builder.add(column, ir.Constant(_WORD, i))
-            place, _ = _place(context, builder, called.args[2], written, [index])
-            target = builder.bitcast(builder.gep(place, [lane]), kind.as_pointer())
-            builder.store(builder.load(found), target).align = 8
-        return context.get_dummy_value()
-
-    return types.none(weights, rows, total, types.intp, types.intp), generate
-
-
-@_intrinsic
-def write_neighbours(typing_context: Any, array: Any, start: Any, value: Any) -> Any:
-    """Write lanes to :data:`REGISTER` numbers of a contiguous array of float64, from the flat index ``start`` on."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        given, place, lanes = arguments
-        builder.store(lanes, _beginning(context, builder, called.args[0], given, place)).align = 8
-        return context.get_dummy_value()
-
-    return types.none(array, types.intp, LanesType(REGISTER)), generate
-
-
-@_intrinsic
-def powers_of_two(typing_context: Any, whole: Any) -> Any:
-    """Return 2 to the power of lanes, whole numbers from -1022 to 1023."""
-
-    def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
-        kind = _vector(_WORD, whole.count)
-        # Through 32 bits: AVX2 has no conversion to 64.
-        exponent = builder.sext(builder.fptosi(arguments[0], _vector(ir.IntType(32), whole.count)), kind)
-        biased = builder.add(exponent, ir.Constant(kind, [1023] * whole.count))
-        return builder.bitcast(builder.shl(biased, ir.Constant(kind, [52] * whole.count)), arguments[0].type)
-
-    return whole(whole), generate

@@ -26,7 +26,7 @@ def _has_instructions() -> bool:
 AVAILABLE = ENABLED and _has_instructions()
 """Whether the processor that numba compiles for has these instructions."""
 
-BLOCK = 8
+BLOCK_NUMBERS = 8
 """Numbers of a block of 64 bytes."""
 
 _INITIAL = (0x6A09E667, 0xBB67AE85, 0x3C6EF372, 0xA54FF53A, 0x510E527F, 0x9B05688C, 0x1F83D9AB, 0x5BE0CD19)
@@ -61,8 +61,10 @@ def digests(arrays: Sequence[np.ndarray]) -> list[bytes]:
     """
     state, sizes = initial(2), [array.size for array in arrays]
     first, second = (array.ctypes.data for array in arrays)
-    absorb(state, first, second, sizes[0] // BLOCK, sizes[1] // BLOCK)
-    return finished(state, sizes, [array.reshape(-1)[array.size // BLOCK * BLOCK :] for array in arrays])
+    absorb(state, first, second, sizes[0] // BLOCK_NUMBERS, sizes[1] // BLOCK_NUMBERS)
+    return finished(
+        state, sizes, [array.reshape(-1)[array.size // BLOCK_NUMBERS * BLOCK_NUMBERS :] for array in arrays]
+    )
 
 
 def initial(count: int) -> np.ndarray:
@@ -70,22 +72,22 @@ def initial(count: int) -> np.ndarray:
     return np.array([[_INITIAL[i] for i in _ORDER]] * count, np.uint32)
 
 
-def finished(state: np.ndarray, sizes: Sequence[int], rests: Sequence[np.ndarray]) -> list[bytes]:
+def finished(state: np.ndarray, sizes: Sequence[int], tails: Sequence[np.ndarray]) -> list[bytes]:
     """Return the digests of an even number of arrays, whose whole blocks the ``state`` has taken.
 
     Args:
         state: Of each (arrays, 8); it is changed.
         sizes: Of each, numbers.
-        rests: Of each, the numbers after its last whole block.
+        tails: Of each, the numbers after its last whole block.
     """
     # Padding: the remaining numbers, a 1 bit, zeros, and the length in bits, big-endian; one block or two.
-    ends = np.zeros((len(sizes), 2 * BLOCK), "<u8")
-    blocks = [1 if size % BLOCK < BLOCK - 1 else 2 for size in sizes]
-    for end, size, rest, last in zip(ends, sizes, rests, blocks, strict=True):
-        left = size % BLOCK
-        end[:left] = rest[:left].view(np.uint64)
+    ends = np.zeros((len(sizes), 2 * BLOCK_NUMBERS), "<u8")
+    blocks = [1 if size % BLOCK_NUMBERS < BLOCK_NUMBERS - 1 else 2 for size in sizes]
+    for end, size, tail, last in zip(ends, sizes, tails, blocks, strict=True):
+        left = size % BLOCK_NUMBERS
+        end[:left] = tail[:left].view(np.uint64)
         end[left] = 0x80
-        end[last * BLOCK - 1] = np.uint64(64 * size).byteswap()
+        end[last * BLOCK_NUMBERS - 1] = np.uint64(64 * size).byteswap()
     # The length is never taken for a NaN: it is a multiple of 64, so its exponent bits are not all ones.
     for i in range(0, len(sizes), 2):
         absorb(state[i : i + 2], ends[i].ctypes.data, ends[i + 1].ctypes.data, blocks[i], blocks[i + 1])
@@ -113,7 +115,7 @@ def _absorb_block(typing_context: Any, state: Any, first: Any, second: Any, bloc
 
     def generate(context: Any, builder: Any, called: Any, arguments: Any) -> Any:
         data = context.make_array(state)(context, builder, arguments[0]).data
-        offset = builder.mul(arguments[3], ir.Constant(_PLACE, BLOCK))
+        offset = builder.mul(arguments[3], ir.Constant(_PLACE, BLOCK_NUMBERS))
         slots, words = [], []
         for i, address in enumerate(arguments[1 : 1 + arrays]):
             place = builder.gep(builder.inttoptr(address, _DOUBLE.as_pointer()), [offset])

@@ -1,4 +1,4 @@
-"""Flights side by side that are read while they are flown: of their histories a piece at a time is in memory.
+"""Flights side by side that are read while they are flown: only a piece of their histories is in memory at a time.
 
 What a campaign keeps of a flight is read from its history four times: for the fingerprint, the level in the tube,
 metrics and envelope. The history of several flights is larger than the caches near a processor, a piece of it is not.
@@ -15,16 +15,17 @@ from hsv.campaign.tube_levels import TubeLevels, worst_level
 from hsv.compiled import bound, njit_in_flight
 from hsv.lane_types import WIDTH
 from hsv.lanes import LaneArray, with_lane
-from hsv.sha256_pairs import AVAILABLE, BLOCK, absorb, finished, initial
-from hsv.simulation.closed_loop import Components, fault_start, fly_loop, times
+from hsv.sha256_pairs import AVAILABLE, BLOCK_NUMBERS, absorb, finished, initial
+from hsv.simulation.closed_loop import Components, fly_loop
 from hsv.simulation.curves import read_flight
 from hsv.simulation.fingerprint import fingerprint, written
+from hsv.simulation.flight import fault_start, times
 from hsv.simulation.history import ACTUATOR, BESIDE, FLOWN, Q_F, U_N, U_UNSATURATED, X_N, U, X
 from hsv.simulation.metrics import CURVES, FlightCurves, FlightData
 from hsv.simulation.side_by_side import FlightGroup, LaneHistory, lane_loop
 from hsv.vehicle.dynamics import N_STATES
 
-PIECE = 17 * BLOCK
+PIECE = 17 * BLOCK_NUMBERS
 """Rows of a piece, which are whole blocks of a digest.
 
 The pieces of 8 lanes take half of a second-level cache of 512 KiB, those of 16 lanes half of one of 1 MiB. Were the
@@ -42,7 +43,7 @@ class FlightReading(NamedTuple):
 
     @classmethod
     def of(cls, data: FlightData, level: float | None, fingerprint: str | None) -> Self:
-        """Return it of a flight whose whole history there is."""
+        """Return the reading of a flight whose whole history is in memory."""
         return cls(data.flight_curves, data.state[-1], level, fingerprint)
 
 
@@ -76,7 +77,7 @@ class FlightReader:
             raise ValueError(f"{len(components)} flights of {first.plant.steps} steps: expected {rows - 1} steps")
         ended = np.full(WIDTH, rows)
         last = np.empty((WIDTH, N_STATES))
-        state, rests = initial(WIDTH), np.zeros((WIDTH, BLOCK))
+        state, tails = initial(WIDTH), np.zeros((WIDTH, BLOCK_NUMBERS))
         worst = LaneArray.zeros(1)
         self._fly_and_read(
             lane_loop(components, rows),
@@ -86,20 +87,21 @@ class FlightReader:
             first.nominal_trajectory.reference.along(rows).state,
             (self._levels.tube, self._levels.work(LaneArray.zeros), LaneArray.zeros(1), worst),
             (self._curves, self._saturated, last),
-            (state, rests) if AVAILABLE else None,
+            (state, tails) if AVAILABLE else None,
         )
-        lengths = [int(own) for own in ended[: len(components)]]
+        lengths = ended.tolist()
         if AVAILABLE:
-            digests = map(written, finished(state, [int(own) * FLOWN for own in ended], [*rests]))
+            digests = [written(digest) for digest in finished(state, [n * FLOWN for n in lengths], [*tails])]
         else:
-            digests = map(fingerprint, (own[:n] for own, n in zip(self._history.arrays[0], lengths, strict=False)))
+            digests = [fingerprint(flown[:n]) for flown, n in zip(self._history.arrays[0], lengths, strict=True)]
         found = []
-        for i, (own, n, digest) in enumerate(zip(components, lengths, digests, strict=False)):
+        for i, own in enumerate(components):
+            n = lengths[i]
             curves = FlightCurves(
                 times(n, own.plant.period), self._curves[i, :, :n], self._saturated[i, :n], fault_start(own, n)
             )
             level = float(worst.array[0, i]) if self._levels.defined else None
-            found.append(FlightReading(curves, last[i], level, digest))
+            found.append(FlightReading(curves, last[i], level, digests[i]))
         return found
 
 
@@ -172,14 +174,19 @@ def _read_piece(lane: int, start: int, stop: int, rows: int, history: Any, refer
 @njit_in_flight()
 def _digest_piece(lane: int, start: int, stop: int, ended: np.ndarray, flown: np.ndarray, digest: Any) -> None:
     """Take the steps ``start`` ... ``stop`` - 1 of the flights of two lanes into their digests, as far as they fly."""
-    state, rests = digest
+    state, tails = digest
     first, second = flown[lane], flown[lane + 1]
-    n, m = (max(min(stop, ended[lane]) - start, 0) * FLOWN, max(min(stop, ended[lane + 1]) - start, 0) * FLOWN)
-    absorb(state[lane : lane + 2], first.ctypes.data, second.ctypes.data, n // BLOCK, m // BLOCK)
-    # Only the last piece of a flight ends within a block.
-    for j in range(n % BLOCK):
-        number = n - n % BLOCK + j
-        rests[lane, j] = first[number // FLOWN, number % FLOWN]
-    for j in range(m % BLOCK):
-        number = m - m % BLOCK + j
-        rests[lane + 1, j] = second[number // FLOWN, number % FLOWN]
+    n = max(min(stop, ended[lane]) - start, 0) * FLOWN
+    m = max(min(stop, ended[lane + 1]) - start, 0) * FLOWN
+    absorb(state[lane : lane + 2], first.ctypes.data, second.ctypes.data, n // BLOCK_NUMBERS, m // BLOCK_NUMBERS)
+    _keep_tail(first, n, tails[lane])
+    _keep_tail(second, m, tails[lane + 1])
+
+
+@njit_in_flight()
+def _keep_tail(rows: np.ndarray, numbers: int, tail: np.ndarray) -> None:
+    """Copy what follows the last whole block of ``numbers`` numbers; only a flight's last piece has such a tail."""
+    left = numbers % BLOCK_NUMBERS
+    for j in range(left):
+        number = numbers - left + j
+        tail[j] = rows[number // FLOWN, number % FLOWN]

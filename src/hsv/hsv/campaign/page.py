@@ -32,7 +32,7 @@ from hsv.recording.report.payload import Numbers, compressed
 from hsv.recording.report.picture import Band, Line, Picture, picture, time_plot
 from hsv.recording.report.templates import environment_of
 from hsv.recording.report.text import capitalised, in_brackets, quantity, units_of
-from hsv.simulation.closed_loop import Flight
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import METRICS, Group, in_words, is_share
 from hsv.units import UnitSystem
 from hsv.vehicle.plant import Plant

@@ -18,8 +18,9 @@ from hsv.control.controller import Controller
 from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError, ScenarioError
 from hsv.lane_types import WIDTH
-from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.closed_loop import Components, fly
 from hsv.simulation.fingerprint import fingerprints
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.simulation.side_by_side import FlightGroup
 from hsv.vehicle.envelope import in_model_range

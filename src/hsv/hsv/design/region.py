@@ -19,7 +19,8 @@ from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
 from hsv.design.inputs import DesignInputs
 from hsv.errors import DesignError
 from hsv.simulation.assembly import assemble
-from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.flight import Flight
 from hsv.simulation.side_by_side import fly_perturbed
 from hsv.vehicle.actuators import ACTUATOR_SETS
 from hsv.vehicle.plant import FlightStatus

@@ -26,7 +26,7 @@ from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.progress import Progress
-from hsv.simulation.closed_loop import Flight
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import flight_metrics
 from hsv.vehicle.dynamics import PITCH_RATE
 

@@ -17,7 +17,8 @@ from hsv.control.library import library_digest
 from hsv.errors import CampaignError, ControllerError
 from hsv.resilience.campaign import Case, ResilienceCampaign, Subject
 from hsv.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
-from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import FlightData
 from hsv.simulation.scenario import parse_scenario
 from hsv.vehicle.plant import FlightStatus

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import Flight, fly
+from hsv.simulation.closed_loop import fly
+from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import SETTLING_BAND, FlightData, flight_metrics
 from hsv.simulation.scenario import load_scenario
 from hsv.units import to_paper

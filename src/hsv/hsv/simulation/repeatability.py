@@ -18,7 +18,8 @@ import numpy as np
 from hsv.control.controller import Controller, ControllerInput
 from hsv.errors import HsvError, ParameterError, RunError
 from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Components, Flight, fly
+from hsv.simulation.closed_loop import Components, fly
+from hsv.simulation.flight import Flight
 from hsv.simulation.history import SIGNALS, History
 from hsv.simulation.scenario import Scenario, load_scenario, scenario_names
 from hsv.threads import ctrl_c_held_back

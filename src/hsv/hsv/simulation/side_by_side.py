@@ -13,17 +13,8 @@ from hsv.control.tube_law import TubeData, memory_of, watch_of
 from hsv.lane_types import WIDTH
 from hsv.lanes import LaneArray, LaneRecord
 from hsv.signals import VARYING
-from hsv.simulation.closed_loop import (
-    CommandFaults,
-    Components,
-    Flight,
-    LoopArrays,
-    Workspace,
-    flight_of,
-    fly,
-    fly_loop,
-    is_ideal,
-)
+from hsv.simulation.closed_loop import CommandFaults, Components, LoopArrays, Workspace, fly, fly_loop, is_ideal
+from hsv.simulation.flight import Flight, flight_of
 from hsv.simulation.history import BESIDE, FLOWN, History
 from hsv.threads import over_threads
 from hsv.vehicle.dynamics import N_INPUTS

@@ -13,7 +13,7 @@ from hsv.campaign.tube_levels import TubeLevels
 from hsv.design.region import Corner
 from hsv.progress import Progress
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import Flight
+from hsv.simulation.flight import Flight
 from hsv.simulation.scenario import load_scenario
 from hsv.simulation.side_by_side import fly_perturbed
 from hsv.study.measures import flight_measures

@@ -13,7 +13,7 @@ from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Corner, record
 from hsv.design.tube_problem import channel_model
 from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import Flight
+from hsv.simulation.flight import Flight
 from hsv.simulation.scenario import load_scenario
 from hsv.simulation.side_by_side import fly_perturbed
 from hsv.vehicle.vehicle import Vehicle
