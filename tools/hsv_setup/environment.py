@@ -97,8 +97,9 @@ def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
 
 
 def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
-    # Copies: some installed files are changed later, and a link would change uv's cache as well.
-    uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--link-mode", "copy"]
+    # As pip, with the certificates of the system. Copies: some installed files are changed later, and a link would change
+    # uv's cache as well.
+    uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--system-certs", "--link-mode", "copy"]
     if route.wheels and _UV.exists():
         try:
             stage.run([*uv, "--constraint", route.constraints, "--no-build-isolation", *wanted], env)

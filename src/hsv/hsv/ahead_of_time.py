@@ -9,6 +9,7 @@ calls the function as compiled functions do, and returns an object. The entries 
 from __future__ import annotations
 
 import ctypes
+import gc
 import hashlib
 import json
 import os
@@ -35,6 +36,8 @@ from numba.np.arrayobj import populate_array
 
 from hsv import compiled
 from hsv.compiled import EXTENSIONS, CompiledFunction
+from hsv.lane_types import LaneArrayType, LaneRecordType
+from hsv.library_code import compile_without_machine_code, object_of
 from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest, processor, types_of
 
 _WORD = ir.IntType(64)
@@ -59,11 +62,12 @@ Calls = dict[tuple[str, tuple[str, ...]], Callable[[], Compiled]]
 
 
 @contextmanager
-def recording(processes: int = 1) -> Iterator[Calls]:
+def recording(processes: int = 0) -> Iterator[Calls]:
     """Yield the calls from Python within the block that can be compiled ahead of time.
 
-    These run as Python, and what they call in turn; other calls are compiled by numba. Where there are to be several
-    ``processes``, these compile the entries meanwhile, and the block ends when they have.
+    These run as Python, and what they call in turn; what Python lacks, lanes and instructions of the processor, is not
+    done, and ``None`` returned. Other calls are compiled by numba. Other ``processes``, if any, compile the
+    entries meanwhile, and the block ends when they have.
     """
     calls: Calls = {}
     noted = False
@@ -82,17 +86,21 @@ def recording(processes: int = 1) -> Iterator[Calls]:
         if key not in calls:
             compile_entry = partial(_entry_if_any, function, tuple(map(typeof, arguments)), _symbol(len(calls)))
             calls[key] = pool.submit(compile_entry).result if pool else compile_entry
+        if any("Lane" in kind for kind in key[1]):
+            return None
         noted = True
         try:
             with np.errstate(all="ignore"):  # as in compiled functions
                 return function.py_func(*arguments)
+        except NotImplementedError:  # an instruction of the processor
+            return None
         finally:
             noted = False
 
     with TemporaryDirectory() as folder:
         context = get_context("spawn")
         start = _compile_for_the_library, (context.Lock(), folder)
-        pool = ProcessPoolExecutor(processes, context, *start) if processes > 1 else None
+        pool = ProcessPoolExecutor(processes, context, *start) if processes else None
         compiled.instead = call
         try:
             yield calls
@@ -112,7 +120,11 @@ def _compile_for_the_library(lock: Any, folder: str) -> None:
     It saves only while it has the ``lock``: of two functions with different arguments that are saved at the same time,
     one could be taken for the other, as numba's index of a function has no lock.
     """
+    gc.freeze()
+    # To look for garbage as often as Python does takes a fifth of the time; the process ends soon.
+    gc.set_threshold(100_000, 50, 1000)
     compiled.for_a_library = True
+    compile_without_machine_code()
     settings: Any = config
     settings.CACHE_DIR = folder
     file: Any = IndexDataCacheFile
@@ -208,7 +220,7 @@ def _entry_if_any(function: CompiledFunction, arguments: tuple[Any, ...], symbol
         code, result = _entry(function, arguments)
     except NumbaError:
         return None
-    return _machine().emit_object(_with_one_symbol(code, symbol)), result
+    return object_of(code, symbol), result
 
 
 def _entry(function: CompiledFunction, arguments: tuple[Any, ...]) -> tuple[str, Result]:
@@ -320,6 +332,8 @@ def _from_object(context: Any, builder: Any, python: Any, kind: Any, given: Any)
         return context.make_tuple(builder, kind, values)
     if isinstance(kind, types.Array):
         return _array_of(context, builder, kind, given)
+    if isinstance(kind, LaneArrayType | LaneRecordType):
+        return _lanes_of(context, builder, python, kind, given)
     if isinstance(kind, types.NoneType):
         with builder.if_then(builder.icmp_unsigned("!=", given, python.borrow_none()), likely=False):
             _raise(builder, python, "TypeError", "expected None")
@@ -351,6 +365,31 @@ def _array_of(context: Any, builder: Any, kind: Any, given: Any) -> Any:
         itemsize=_WORD(context.get_abi_sizeof(element)),
         meminfo=None,
     )
+    return made._getvalue()
+
+
+def _lanes_of(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> Any:
+    def attribute(name: str, wanted: Any) -> Any:
+        found = python.object_getattr_string(given, name)
+        there = builder.select(cgutils.is_null(builder, found), python.borrow_none(), found)
+        value = _from_object(context, builder, python, wanted, there)
+        python.decref(found)
+        return value
+
+    named = python.object_getattr_string(given, "kind")
+    there = builder.select(cgutils.is_null(builder, named), python.borrow_none(), named)
+    expected = python.string_from_string(context.insert_const_string(builder.module, kind.name))
+    same = python.object_richcompare(there, expected, "==")
+    with builder.if_then(builder.icmp_signed("!=", python.object_istrue(same), ir.IntType(32)(1)), likely=False):
+        _raise(builder, python, "TypeError", f"expected a {kind.name}")
+    for each in (named, expected, same):
+        python.decref(each)
+
+    made = cgutils.create_struct_proxy(kind)(context, builder)
+    made.data = builder.inttoptr(attribute("address", types.int64), made.data.type)
+    if isinstance(kind, LaneArrayType):
+        made.shape = attribute("shape", types.UniTuple(types.int64, kind.ndim))
+        made.stride = attribute("stride", types.int64)
     return made._getvalue()
 
 
@@ -395,33 +434,6 @@ def _tuple(python: Any, elements: Any) -> Any:
     for index, element in enumerate(elements):
         python.tuple_setitem(made, index, element)
     return made
-
-
-def _with_one_symbol(code: str, symbol: str) -> Any:
-    """Return the module of an entry, in which nothing else has a name outside of it."""
-    module = binding.parse_assembly(code)
-    for function in module.functions:
-        if function.name.startswith("cfunc."):
-            function.name = symbol
-        elif not function.is_declaration:
-            function.linkage = "internal"
-    for variable in module.global_variables:
-        if not variable.is_declaration:
-            variable.linkage = "internal"
-    passes = binding.create_new_module_pass_manager()
-    passes.add_global_dead_code_eliminate_pass()
-    builder = binding.create_pass_builder(_machine(), binding.create_pipeline_tuning_options())
-    passes.run(module, builder)
-    return module
-
-
-def _machine() -> Any:
-    """Return what makes code for this processor, as numba does."""
-    target = binding.Target.from_default_triple()
-    features = binding.get_host_cpu_features().flatten()
-    return target.create_target_machine(
-        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small"
-    )
 
 
 def _linked(objects: Sequence[bytes]) -> bytes:

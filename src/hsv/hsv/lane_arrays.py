@@ -40,6 +40,11 @@ class LaneArray:
         self.address = array.ctypes.data
         self.stride = array.strides[0] // array.itemsize if split else 1
 
+    @property
+    def kind(self) -> str:
+        """What functions are compiled for."""
+        return f"LaneArray({len(self.shape)}, {self.lanes}, {self.split})"
+
     @classmethod
     def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
         """Return zeros, as many lanes as there are flights side by side."""
@@ -64,3 +69,8 @@ class LaneRecord:
         self.array = _empty((len(self.fields), len(tuples)))
         self.array[:] = np.array(tuples, float).T
         self.address = self.array.ctypes.data
+
+    @property
+    def kind(self) -> str:
+        """What functions are compiled for."""
+        return f"LaneRecord({self.fields}, {self.array.shape[-1]})"

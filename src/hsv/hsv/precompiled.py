@@ -20,6 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsv.lane_arrays import LaneArray, LaneRecord
+
 PACKAGE = Path(__file__).parent
 INDEX = Path(os.environ.get("NUMBA_CACHE_DIR") or PACKAGE / "__pycache__", "ahead_of_time.json")
 """What was compiled ahead of time, from which sources, for which processor; the library lies beside it."""
@@ -35,7 +37,7 @@ _NUMBERS: dict[type, str] = {
     bool: "bool",
     np.bool_: "bool",
 }
-_ELEMENTS = {np.dtype(name): name for name in ("float64", "int64", "uint64", "bool", "complex128")}
+_ELEMENTS = {np.dtype(name): name for name in ("float64", "int64", "uint32", "uint64", "bool", "complex128")}
 _LAYOUT = 16
 """Size of what every object of Python's begins with, as ``run_time.c`` has it: other Pythons have another."""
 
@@ -64,6 +66,8 @@ def _type_of(value: Any) -> str:
     if kind is np.ndarray and value.dtype in _ELEMENTS and value.flags.aligned:
         layout = "C" if value.flags.c_contiguous else "F" if value.flags.f_contiguous else "A"
         return f"{_ELEMENTS[value.dtype]}[{value.ndim}{layout}{'' if value.flags.writeable else ' read-only'}]"
+    if kind is LaneArray or kind is LaneRecord:
+        return str(value.kind)
     raise NotAheadOfTimeError(f"argument of type {kind.__name__}")
 
 

@@ -1,0 +1,84 @@
+"""Machine code of functions for the library of :mod:`hsv.ahead_of_time`.
+
+For each function that numba compiles it optimizes the code of all that is called there, and makes machine code of it.
+What is compiled for the library alone is called by entries only. There both are done once, for an entry with all that
+it calls (:func:`object_of`), which takes half of the time.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import binding
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.registry import cpu_target
+
+
+class _Code(JITCodeLibrary):
+    """The code of a function and of all that it calls, before it is optimized."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+    def _finalize_specific(self) -> None:
+        pass
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """Return 0, as for a function without machine code; the code of what is called is there afterwards."""
+        self._ensure_finalized()
+        return 0
+
+    def serialize_using_object_code(self) -> Any:
+        """Return what other processes need of a function."""
+        return self.serialize_using_bitcode()
+
+
+class _Codegen(JITCPUCodegen):
+    """Code for this processor, as by numba's own, which nothing calls."""
+
+    _library_class = _Code
+
+    def _add_module(self, module: Any) -> None:
+        pass
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Do nothing: the environment of a function is for what calls Python."""
+
+
+def compile_without_machine_code() -> None:
+    """Let numba in this process, which has compiled nothing so far, make no machine code of the functions it compiles.
+
+    They cannot be called afterwards.
+    """
+    cpu_target.target_context._internal_codegen = _Codegen("hsv")
+
+
+def object_of(code: str, symbol: str) -> bytes:
+    """Return the object file of the code of an entry, in which nothing but ``symbol``, the entry, has an outer name."""
+    module = binding.parse_assembly(code)
+    for function in module.functions:
+        if function.name.startswith("cfunc."):
+            function.name = symbol
+        elif not function.is_declaration:
+            function.linkage = "internal"
+    for variable in module.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = "internal"
+    machine = _machine()
+    passes = binding.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(module, binding.create_pass_builder(machine, binding.create_pipeline_tuning_options()))
+    library = cpu_target.target_context.codegen().create_library(symbol)
+    library._final_module = module
+    JITCodeLibrary._optimize_final_module(library)
+    compiled: bytes = machine.emit_object(library._final_module)
+    return compiled
+
+
+def _machine() -> Any:
+    """Return what makes code for this processor, as numba does."""
+    target = binding.Target.from_default_triple()
+    features = binding.get_host_cpu_features().flatten()
+    return target.create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=features, opt=3, reloc="pic", codemodel="small"
+    )
