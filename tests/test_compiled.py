@@ -14,13 +14,15 @@ import pytest
 from hsv import ahead_of_time, compiled, precompiled
 from hsv.compiled import CompiledFunction, bound, njit
 from hsv.elementary import arcsine, exponential, tangent
+from hsv.lane_types import WIDTH
+from hsv.lanes import LaneArray, LaneRecord
 from hsv.precompiled import NotAheadOfTimeError, types_of
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly, fly_loop
 from hsv.simulation.scenario import load_scenario
 from hsv.vehicle.envelope import in_model_range
 
-Pair = namedtuple("Pair", "first second")
+Pair, Plain = namedtuple("Pair", "first second"), namedtuple("Plain", "one other")
 SYSTEM = (
     "malloc",
     "free",
@@ -28,6 +30,7 @@ SYSTEM = (
     "memset",
     "memmove",
     "fmod",
+    "strcmp",
     "Py",
     "_Py",
     "__cxa_finalize",
@@ -45,6 +48,12 @@ def mixed(numbers, pair, flag, count, nothing):
         made[1, i] = pair.second[i] + count
         numbers[i] = -1.0
     return made, made[1], (count + 1, flag, nothing), 1j * pair.first
+
+
+@njit(_nrt=False)
+def weighted(rows, pair, total):
+    for i in range(len(rows)):
+        total[i] = rows[i] * pair.first + pair.second
 
 
 @njit(inline="always")
@@ -98,6 +107,31 @@ def test_arguments_and_results_of_all_kinds_are_those_of_numba(index):
         assert ours.dtype == theirs.dtype and np.array_equal(ours, theirs)
     assert found[2:] == expected[2:] and found[2][1] is True
     assert np.array_equal(given[0], changed[0])  # written in place
+
+
+def test_lanes_are_taken_and_nothing_is_done_with_them_while_recorded(index):
+    def given():
+        pairs = [Pair(i + 1.0, -0.5 * i) for i in range(WIDTH)]
+        rows = np.arange(3.0 * WIDTH).reshape(3, WIDTH)
+        return LaneArray(rows), LaneRecord(pairs), LaneArray.zeros(3)
+
+    arguments = given()
+    assert built((weighted, *arguments)) == 1
+    assert not arguments[2].array.any()
+    rows, pair, total = given()
+    call = bound(weighted)
+    call(rows, pair, total)
+    assert np.array_equal(total.array, rows.array * pair.array[0] + pair.array[1])
+    weighted(rows, pair, total)
+    assert weighted._dispatcher is None
+    history = LaneArray(np.zeros((WIDTH, 3)), split=True)
+    for other in (history, LaneArray.zeros((3, 2)), LaneArray(np.zeros((3, WIDTH + 1))), pair, rows.array, None):
+        with pytest.raises(TypeError, match=r"expected a LaneArray\(1, "):
+            call(rows, pair, other)
+    for other in (LaneRecord([Plain(1.0, 2.0)] * WIDTH), LaneRecord([Pair(1.0, 2.0)]), rows, None):
+        with pytest.raises(TypeError, match=r"expected a LaneRecord\(\('first', 'second'\), "):
+            call(rows, other, total)
+    call(rows, pair, total)
 
 
 def test_what_is_recorded_is_not_compiled_meanwhile(index):

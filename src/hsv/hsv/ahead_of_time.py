@@ -52,7 +52,8 @@ _ALIGNED = 0x100
 
 _nothing = ctypes.c_char()
 # To be linked here as well, where entries are not called.
-binding.add_symbol("hsv_array", ctypes.addressof(_nothing))
+for _name in ("hsv_array", "hsv_lanes"):
+    binding.add_symbol(_name, ctypes.addressof(_nothing))
 
 Compiled = tuple[bytes, Result] | None
 """Object file of an entry and what it returns, or nothing where that cannot be handed over."""
@@ -333,7 +334,7 @@ def _from_object(context: Any, builder: Any, python: Any, kind: Any, given: Any)
     if isinstance(kind, types.Array):
         return _array_of(context, builder, kind, given)
     if isinstance(kind, LaneArrayType | LaneRecordType):
-        return _lanes_of(context, builder, python, kind, given)
+        return _lanes_of(context, builder, kind, given)
     if isinstance(kind, types.NoneType):
         with builder.if_then(builder.icmp_unsigned("!=", given, python.borrow_none()), likely=False):
             _raise(builder, python, "TypeError", "expected None")
@@ -368,28 +369,17 @@ def _array_of(context: Any, builder: Any, kind: Any, given: Any) -> Any:
     return made._getvalue()
 
 
-def _lanes_of(context: Any, builder: Any, python: Any, kind: Any, given: Any) -> Any:
-    def attribute(name: str, wanted: Any) -> Any:
-        found = python.object_getattr_string(given, name)
-        there = builder.select(cgutils.is_null(builder, found), python.borrow_none(), found)
-        value = _from_object(context, builder, python, wanted, there)
-        python.decref(found)
-        return value
-
-    named = python.object_getattr_string(given, "kind")
-    there = builder.select(cgutils.is_null(builder, named), python.borrow_none(), named)
-    expected = python.string_from_string(context.insert_const_string(builder.module, kind.name))
-    same = python.object_richcompare(there, expected, "==")
-    with builder.if_then(builder.icmp_signed("!=", python.object_istrue(same), ir.IntType(32)(1)), likely=False):
-        _raise(builder, python, "TypeError", f"expected a {kind.name}")
-    for each in (named, expected, same):
-        python.decref(each)
-
+def _lanes_of(context: Any, builder: Any, kind: Any, given: Any) -> Any:
+    axes = kind.ndim if isinstance(kind, LaneArrayType) else 0
+    words = cgutils.alloca_once(builder, _WORD, axes + 2)
+    name = context.insert_const_string(builder.module, kind.name)
+    read = ir.FunctionType(ir.VoidType(), [given.type, name.type, _WORD, words.type])
+    builder.call(cgutils.get_or_insert_function(builder.module, read, "hsv_lanes"), [given, name, _WORD(axes), words])
+    address, stride, *lengths = (builder.load(builder.gep(words, [_WORD(i)])) for i in range(axes + 2))
     made = cgutils.create_struct_proxy(kind)(context, builder)
-    made.data = builder.inttoptr(attribute("address", types.int64), made.data.type)
-    if isinstance(kind, LaneArrayType):
-        made.shape = attribute("shape", types.UniTuple(types.int64, kind.ndim))
-        made.stride = attribute("stride", types.int64)
+    made.data = builder.inttoptr(address, made.data.type)
+    if axes:
+        made.shape, made.stride = cgutils.pack_array(builder, lengths, _WORD), stride
     return made._getvalue()
 
 

@@ -1,10 +1,11 @@
 /* What functions that are compiled ahead of time need when they are called without numba, see hsv/ahead_of_time.py:
- * memory for the arrays that they make, and the arrays that they are given.
+ * memory for the arrays that they make, and the arrays and lanes that they are given.
  *
  * Python's and numpy's headers need not be there: what is used of them has been the same in all their versions. */
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 
 /* Memory: names and fields are those of numba's run time (runtime/nrt.cpp). */
 
@@ -85,4 +86,47 @@ const struct Array *hsv_array(struct Object *object, int64_t axes, int64_t numbe
         return array;
     PyErr_SetString(PyExc_TypeError, "expected an array of the type and order that was compiled for");
     return &no_array;
+}
+
+/* Lanes that are given, see hsv/lane_arrays.py. */
+
+void *PyErr_Occurred(void);
+void *PyErr_Format(void *type, const char *format, ...);
+void *PyObject_GetAttrString(void *object, const char *name);
+const char *PyUnicode_AsUTF8(void *text);
+void *PyTuple_GetItem(void *tuple, intptr_t index);
+long long PyLong_AsLongLong(void *number);
+void Py_DecRef(void *object);
+
+static int64_t number_of(void *object, const char *name)
+{
+    void *value = PyObject_GetAttrString(object, name);
+    int64_t number = PyLong_AsLongLong(value);
+    Py_DecRef(value);
+    return number;
+}
+
+/* Writes address and, of an array, stride and lengths of lanes of a kind; else 0, and there is an error of Python's. */
+void hsv_lanes(void *object, const char *kind, int64_t axes, int64_t *found)
+{
+    for (int64_t i = 0; i < axes + 2; i++)
+        found[i] = 0;
+    if (PyErr_Occurred() != NULL) /* to look for an attribute would clear it */
+        return;
+    void *name = PyObject_GetAttrString(object, "kind");
+    const char *text = name == NULL ? NULL : PyUnicode_AsUTF8(name);
+    int fits = text != NULL && strcmp(text, kind) == 0;
+    Py_DecRef(name);
+    if (!fits) {
+        PyErr_Format(PyExc_TypeError, "expected a %s", kind);
+        return;
+    }
+    found[0] = number_of(object, "address");
+    if (axes == 0)
+        return;
+    found[1] = number_of(object, "stride");
+    void *shape = PyObject_GetAttrString(object, "shape");
+    for (int64_t i = 0; i < axes; i++)
+        found[i + 2] = PyLong_AsLongLong(PyTuple_GetItem(shape, i));
+    Py_DecRef(shape);
 }
