@@ -61,7 +61,7 @@ def install_for_build(route: Route, python: Interpreter, env: Mapping[str, str],
         _install_installer(route, env, stage)
         # First, because empy comes as source only and is built with this pinned setuptools, not with the newest.
         _install(route, ["setuptools"], env, stage)
-    _install(route, ["--requirement", route.requirements[0]], env, stage)
+    _install(route, ["--requirement", route.requirements[0]], env, stage, changed_later=route.wheels)
     if route.wheels:
         relocate(VENV, python.include, _numpy_include(env))
         _install_ros2_command()
@@ -96,10 +96,13 @@ def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
         stage.run([PYTHON, "-m", "pip", "--disable-pip-version-check", "uninstall", "--yes", "uv"], env)
 
 
-def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
-    # As pip, with the certificates of the system. Copies: some installed files are changed later, and a link would change
-    # uv's cache as well.
-    uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--system-certs", "--link-mode", "copy"]
+def _install(
+    route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage, changed_later: bool = False
+) -> None:
+    # As pip, with the certificates of the system.
+    uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--system-certs"]
+    if changed_later:
+        uv += ["--link-mode", "copy"]  # a link would change uv's cache as well
     if route.wheels and _UV.exists():
         try:
             stage.run([*uv, "--constraint", route.constraints, "--no-build-isolation", *wanted], env)
