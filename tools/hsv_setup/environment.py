@@ -61,7 +61,7 @@ def install_for_build(route: Route, python: Interpreter, env: Mapping[str, str],
         _install_installer(route, env, stage)
         # First, because empy comes as source only and is built with this pinned setuptools, not with the newest.
         _install(route, ["setuptools"], env, stage)
-    _install(route, ["--requirement", route.requirements[0]], env, stage, changed_later=route.wheels)
+    _install(route, ["--requirement", route.requirements[0]], env, stage)
     if route.wheels:
         relocate(VENV, python.include, _numpy_include(env))
         _install_ros2_command()
@@ -96,13 +96,9 @@ def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
         stage.run([PYTHON, "-m", "pip", "--disable-pip-version-check", "uninstall", "--yes", "uv"], env)
 
 
-def _install(
-    route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage, changed_later: bool = False
-) -> None:
+def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
     # As pip, with the certificates of the system.
     uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--system-certs"]
-    if changed_later:
-        uv += ["--link-mode", "copy"]  # a link would change uv's cache as well
     if route.wheels and _UV.exists():
         try:
             stage.run([*uv, "--constraint", route.constraints, "--no-build-isolation", *wanted], env)
@@ -145,6 +141,7 @@ def _install_ros2_command() -> None:
     because it needs none and starts twice as fast.
     """
     command = VENV / "bin" / "ros2"
+    command.unlink(missing_ok=True)
     program = ROOT / "tools" / "ros2.py"
     command.write_text(f'#!/bin/sh\nexec {shlex.quote(str(PYTHON))} -S {shlex.quote(str(program))} "$@"\n')
     command.chmod(0o755)

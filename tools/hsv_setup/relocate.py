@@ -36,6 +36,7 @@ def relocate(prefix: Path, python_include: str, numpy_include: str) -> int:
         for pattern, replacement in rules:
             after = pattern.sub(replacement, after)
         if after != before:
+            path.unlink()  # what uv installs may be a link to its cache
             path.write_text(after)
             changed += 1
     return changed
