@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 from collections import namedtuple
+from concurrent.futures import BrokenExecutor
 
 import numpy as np
 import pytest
@@ -132,6 +133,43 @@ def test_lanes_are_taken_and_nothing_is_done_with_them_while_recorded(index):
         with pytest.raises(TypeError, match=r"expected a LaneRecord\(\('first', 'second'\), "):
             call(rows, other, total)
     call(rows, pair, total)
+
+
+class Claimed:
+    """Says that it is an array of lanes, and lacks an attribute of one."""
+
+    def __init__(self, **attributes):
+        vars(self).update(attributes)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"address": None}, {"address": "1"}, {"stride": 0.5}, {"shape": None}, {"shape": [3]}, {"shape": ()}, {"kind": 1}],
+    ids=str,
+)
+@pytest.mark.parametrize("missing", [False, True])
+def test_what_only_claims_to_be_lanes_is_refused(index, change, missing):
+    given = LaneArray.zeros(3)
+    rest = LaneRecord([Pair(1.0, 2.0)] * WIDTH), LaneArray.zeros(3)
+    built((weighted, given, *rest))
+    call = bound(weighted)
+    call(given, *rest)
+    attributes = {name: getattr(given, name) for name in ("kind", "address", "stride", "shape")} | change
+    if missing:
+        attributes = {name: value for name, value in attributes.items() if name not in change}
+    with pytest.raises(TypeError, match="expected a LaneArray"):
+        call(Claimed(**attributes), *rest)
+
+
+def test_a_process_that_was_killed_is_told_after_the_block(index):
+    with ahead_of_time.recording(1) as calls:
+        assert exponential(0.0) == 1.0
+        [process] = multiprocessing.active_children()
+        process.kill()
+        process.join()
+        assert tangent(0.0) == 0.0
+    with pytest.raises(BrokenExecutor):
+        ahead_of_time.build(calls)
 
 
 def test_what_is_recorded_is_not_compiled_meanwhile(index):

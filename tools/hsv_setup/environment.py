@@ -97,7 +97,7 @@ def _remove_installer(env: Mapping[str, str], stage: Stage) -> None:
 
 
 def _install(route: Route, wanted: Sequence[str], env: Mapping[str, str], stage: Stage) -> None:
-    # As pip, with the certificates of the system.
+    # Like pip, trust the certificates of the system.
     uv: list[str | Path] = [_UV, "pip", "install", "--python", PYTHON, "--system-certs"]
     if route.wheels and _UV.exists():
         try:

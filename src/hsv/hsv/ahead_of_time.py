@@ -17,7 +17,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
 from multiprocessing import get_context
@@ -66,9 +66,9 @@ Calls = dict[tuple[str, tuple[str, ...]], Callable[[], Compiled]]
 def recording(processes: int = 0) -> Iterator[Calls]:
     """Yield the calls from Python within the block that can be compiled ahead of time.
 
-    These run as Python, and what they call in turn; what Python lacks, lanes and instructions of the processor, is not
-    done, and ``None`` returned. Other calls are compiled by numba. Other ``processes``, if any, compile the
-    entries meanwhile, and the block ends when they have.
+    These run as Python, and what they call in turn. Calls that need lanes or instructions of the processor, which
+    Python lacks, are skipped and return ``None``. Other calls are compiled by numba. Other ``processes``, if any,
+    compile the entries meanwhile, and the block ends when they have.
     """
     calls: Calls = {}
     noted = False
@@ -86,8 +86,8 @@ def recording(processes: int = 0) -> Iterator[Calls]:
             return function.dispatcher(*arguments, **named)
         if key not in calls:
             compile_entry = partial(_entry_if_any, function, tuple(map(typeof, arguments)), _symbol(len(calls)))
-            calls[key] = pool.submit(compile_entry).result if pool else compile_entry
-        if any("Lane" in kind for kind in key[1]):
+            calls[key] = _submitted(pool, compile_entry) if pool else compile_entry
+        if any("LaneArray(" in kind or "LaneRecord(" in kind for kind in key[1]):
             return None
         noted = True
         try:
@@ -113,6 +113,19 @@ def recording(processes: int = 0) -> Iterator[Calls]:
             compiled.instead = None
             if pool:
                 pool.shutdown()
+
+
+def _submitted(pool: ProcessPoolExecutor, compile_entry: Callable[[], Compiled]) -> Callable[[], Compiled]:
+    """Return what waits for the entry, and raises BrokenExecutor where the processes have ended.
+
+    Not before: within the block that is recorded it could be taken for an error of what is recorded.
+    """
+    try:
+        return pool.submit(compile_entry).result
+    except BrokenExecutor as error:
+        lost: Future[Compiled] = Future()
+        lost.set_exception(error)
+        return lost.result
 
 
 def _compile_for_the_library(lock: Any, folder: str) -> None:

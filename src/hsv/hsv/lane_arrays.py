@@ -42,7 +42,7 @@ class LaneArray:
 
     @property
     def kind(self) -> str:
-        """What functions are compiled for."""
+        """The name of the numba type, see :mod:`hsv.lane_types`."""
         return f"LaneArray({len(self.shape)}, {self.lanes}, {self.split})"
 
     @classmethod
@@ -72,5 +72,5 @@ class LaneRecord:
 
     @property
     def kind(self) -> str:
-        """What functions are compiled for."""
+        """The name of the numba type, see :mod:`hsv.lane_types`."""
         return f"LaneRecord({self.fields}, {self.array.shape[-1]})"

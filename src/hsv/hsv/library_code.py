@@ -1,8 +1,8 @@
 """Machine code of functions for the library of :mod:`hsv.ahead_of_time`.
 
-For each function that numba compiles it optimizes the code of all that is called there, and makes machine code of it.
-What is compiled for the library alone is called by entries only. There both are done once, for an entry with all that
-it calls (:func:`object_of`), which takes half of the time.
+For each function that numba compiles, numba optimizes the code with that of all functions called in it, and makes
+machine code. In the library only entries are called from outside. Here both steps are done once for each entry, with
+all that it calls (:func:`object_of`), and not for the functions inside it.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class _Code(JITCodeLibrary):
         pass
 
     def get_pointer_to_function(self, name: str) -> int:
-        """Return 0, as for a function without machine code; the code of what is called is there afterwards."""
+        """Finalize the code, so that it holds what is called, and return 0: there is no machine code."""
         self._ensure_finalized()
         return 0
 
@@ -54,7 +54,7 @@ def compile_without_machine_code() -> None:
 
 
 def object_of(code: str, symbol: str) -> bytes:
-    """Return the object file of the code of an entry, in which nothing but ``symbol``, the entry, has an outer name."""
+    """Return the object file of the code of an entry, in which only ``symbol``, the entry, is visible from outside."""
     module = binding.parse_assembly(code)
     for function in module.functions:
         if function.name.startswith("cfunc."):

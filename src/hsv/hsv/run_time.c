@@ -98,35 +98,50 @@ void *PyTuple_GetItem(void *tuple, intptr_t index);
 long long PyLong_AsLongLong(void *number);
 void Py_DecRef(void *object);
 
-static int64_t number_of(void *object, const char *name)
+/* Writes a whole number and gives back its object; returns whether it was one, else there is an exception. */
+static int read_number(void *object, int64_t *number)
 {
-    void *value = PyObject_GetAttrString(object, name);
-    int64_t number = PyLong_AsLongLong(value);
-    Py_DecRef(value);
-    return number;
+    if (object == NULL)
+        return 0;
+    *number = PyLong_AsLongLong(object);
+    Py_DecRef(object);
+    return PyErr_Occurred() == NULL;
 }
 
-/* Writes address and, of an array, stride and lengths of lanes of a kind; else 0, and there is an error of Python's. */
-void hsv_lanes(void *object, const char *kind, int64_t axes, int64_t *found)
+static int read_shape(void *shape, int64_t axes, int64_t *lengths)
 {
-    for (int64_t i = 0; i < axes + 2; i++)
-        found[i] = 0;
-    if (PyErr_Occurred() != NULL) /* to look for an attribute would clear it */
-        return;
+    int read = shape != NULL;
+    for (int64_t i = 0; read && i < axes; i++) {
+        void *length = PyTuple_GetItem(shape, i); /* which the tuple keeps */
+        if (length != NULL)
+            lengths[i] = PyLong_AsLongLong(length);
+        read = PyErr_Occurred() == NULL;
+    }
+    Py_DecRef(shape);
+    return read;
+}
+
+static int has_kind(void *object, const char *kind)
+{
     void *name = PyObject_GetAttrString(object, "kind");
     const char *text = name == NULL ? NULL : PyUnicode_AsUTF8(name);
-    int fits = text != NULL && strcmp(text, kind) == 0;
+    int same = text != NULL && strcmp(text, kind) == 0;
     Py_DecRef(name);
-    if (!fits) {
-        PyErr_Format(PyExc_TypeError, "expected a %s", kind);
-        return;
+    return same;
+}
+
+/* Writes address and, of an array, stride and lengths of lanes of a kind; otherwise writes zeros and sets an exception. */
+void hsv_lanes(void *object, const char *kind, int64_t axes, int64_t *found)
+{
+    int fits = 0;
+    if (PyErr_Occurred() == NULL) { /* an attribute lookup could clear it */
+        fits = has_kind(object, kind) && read_number(PyObject_GetAttrString(object, "address"), &found[0]);
+        if (fits && axes > 0)
+            fits = read_number(PyObject_GetAttrString(object, "stride"), &found[1]) &&
+                   read_shape(PyObject_GetAttrString(object, "shape"), axes, &found[2]);
+        if (!fits)
+            PyErr_Format(PyExc_TypeError, "expected a %s", kind);
     }
-    found[0] = number_of(object, "address");
-    if (axes == 0)
-        return;
-    found[1] = number_of(object, "stride");
-    void *shape = PyObject_GetAttrString(object, "shape");
-    for (int64_t i = 0; i < axes; i++)
-        found[i + 2] = PyLong_AsLongLong(PyTuple_GetItem(shape, i));
-    Py_DecRef(shape);
+    for (int64_t i = fits ? axes + 2 : 0; i < axes + 2; i++)
+        found[i] = 0;
 }

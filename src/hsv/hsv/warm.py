@@ -24,7 +24,7 @@ from hsv.simulation.metrics import flight_metrics
 from hsv.simulation.scenario import load_scenario
 
 _MOST_PROCESSES = 4
-"""At most: each takes half a gigabyte of memory, and the largest function a fifth of the time of all."""
+"""At most: one that compiles all takes 0.75 GB of memory, and the largest function a fifth of the time of all."""
 
 
 _SOON_DONE = {"duration": 0.1, **{parameter.name: 1.0 for parameter in PROCESS_PARAMETERS}}
@@ -32,8 +32,8 @@ _SOON_DONE = {"duration": 0.1, **{parameter.name: 1.0 for parameter in PROCESS_P
 
 
 def warm() -> None:
-    """Step every component and fly every compiled loop once."""
-    # First what takes longest to compile.
+    """Call once what commands and nodes call: step every component, fly every compiled loop."""
+    # First what takes longest to compile, so that the other processes compile the rest meanwhile.
     runner, envelope = SampleRunner(plan("case1")), Envelope.empty()
     for own in runner.fly_piece(5):
         envelope.add(own.curves, 5)
@@ -63,7 +63,7 @@ if __name__ == "__main__":
             try:
                 _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1))
             except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
-                _ahead_of_time(1)
+                _ahead_of_time(0)
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)
