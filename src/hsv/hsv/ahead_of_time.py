@@ -93,7 +93,7 @@ def recording(processes: int = 0) -> Iterator[Calls]:
         try:
             with np.errstate(all="ignore"):  # as in compiled functions
                 return function.py_func(*arguments)
-        except NotImplementedError:  # an instruction of the processor
+        except NotImplementedError:  # numba's answer where Python calls an instruction of the processor
             return None
         finally:
             noted = False
@@ -135,7 +135,7 @@ def _compile_for_the_library(lock: Any, folder: str) -> None:
     one could be taken for the other, as numba's index of a function has no lock.
     """
     gc.freeze()
-    # To look for garbage as often as Python does takes a fifth of the time; the process ends soon.
+    # To look for garbage as often as Python does takes a sixth of the time; the process ends soon.
     gc.set_threshold(100_000, 50, 1000)
     compiled.for_a_library = True
     compile_without_machine_code()

@@ -21,6 +21,16 @@ def _empty(shape: tuple[int, ...]) -> np.ndarray:
     return more.ravel()[start : start + more[_LINE:].size].reshape(shape)
 
 
+def kind_of_array(axes: int, lanes: int, split: bool) -> str:
+    """Return the name of the numba type of such a :class:`LaneArray`."""
+    return f"LaneArray({axes}, {lanes}, {split})"
+
+
+def kind_of_record(fields: tuple[str, ...], lanes: int) -> str:
+    """Return the name of the numba type of such a :class:`LaneRecord`."""
+    return f"LaneRecord({fields}, {lanes})"
+
+
 class LaneArray:
     """An array of lanes, for compiled functions: indexed like an array whose elements are numbers."""
 
@@ -42,8 +52,8 @@ class LaneArray:
 
     @property
     def kind(self) -> str:
-        """The name of the numba type, see :mod:`hsv.lane_types`."""
-        return f"LaneArray({len(self.shape)}, {self.lanes}, {self.split})"
+        """The name of the numba type, by which functions compiled ahead of time are found."""
+        return kind_of_array(len(self.shape), self.lanes, self.split)
 
     @classmethod
     def zeros(cls, shape: int | Sequence[int]) -> LaneArray:
@@ -72,5 +82,5 @@ class LaneRecord:
 
     @property
     def kind(self) -> str:
-        """The name of the numba type, see :mod:`hsv.lane_types`."""
-        return f"LaneRecord({self.fields}, {self.array.shape[-1]})"
+        """The name of the numba type, by which functions compiled ahead of time are found."""
+        return kind_of_record(self.fields, self.array.shape[-1])

@@ -19,7 +19,7 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_getattr, infer_global, signature
 from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
 
-from hsv.lane_arrays import LaneArray, LaneRecord
+from hsv.lane_arrays import LaneArray, LaneRecord, kind_of_array, kind_of_record
 
 REGISTER = 8 if binding.get_host_cpu_features().get("avx512f") else 4
 """Numbers that a vector register of this processor holds."""
@@ -65,7 +65,7 @@ class LaneArrayType(types.Type):
 
     def __init__(self, ndim: int, count: int, split: bool) -> None:
         self.ndim, self.count, self.split = ndim, count, split
-        super().__init__(f"LaneArray({ndim}, {count}, {split})")
+        super().__init__(kind_of_array(ndim, count, split))
 
 
 class LaneRecordType(types.Type):
@@ -73,7 +73,7 @@ class LaneRecordType(types.Type):
 
     def __init__(self, fields: tuple[str, ...], count: int) -> None:
         self.fields, self.count = fields, count
-        super().__init__(f"LaneRecord({fields}, {count})")
+        super().__init__(kind_of_record(fields, count))
 
 
 DOUBLE, WORD = ir.DoubleType(), ir.IntType(64)

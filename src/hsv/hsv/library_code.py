@@ -34,7 +34,7 @@ class _Code(JITCodeLibrary):
 
 
 class _Codegen(JITCPUCodegen):
-    """Code for this processor, as by numba's own, which nothing calls."""
+    """Generates code for this processor as numba does, and loads none into the process."""
 
     _library_class = _Code
 
