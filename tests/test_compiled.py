@@ -12,7 +12,7 @@ from concurrent.futures import BrokenExecutor
 import numpy as np
 import pytest
 
-from hsv import ahead_of_time, compiled, precompiled
+from hsv import ahead_of_time, compiled, kept_library, precompiled
 from hsv.compiled import CompiledFunction, bound, njit
 from hsv.elementary import arcsine, exponential, tangent
 from hsv.lane_types import WIDTH
@@ -77,6 +77,7 @@ def index(tmp_path, monkeypatch):
     path = tmp_path / "ahead_of_time.json"
     monkeypatch.setattr(precompiled, "INDEX", path)
     monkeypatch.setattr(ahead_of_time, "INDEX", path)
+    monkeypatch.setattr(kept_library, "INDEX", path)
     precompiled._entries.cache_clear()
     yield path
     precompiled._entries.cache_clear()

@@ -9,7 +9,7 @@ import pytest
 
 @pytest.mark.long
 def test_after_the_set_up_no_command_compiles(tmp_path):
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "caches")}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "caches"), "XDG_CACHE_HOME": str(tmp_path / "kept")}
 
     def kept():
         return {path.name for path in (tmp_path / "caches").rglob("*") if path.is_file()}
@@ -26,6 +26,11 @@ def test_after_the_set_up_no_command_compiles(tmp_path):
     ):
         subprocess.run(["hsv", *words], env=environment, cwd=tmp_path, check=True)
         assert kept() == before, words
+    # Another checkout takes the library, and compiles nothing: there is no compiler.
+    another = {**environment, "NUMBA_CACHE_DIR": str(tmp_path / "another"), "CC": "/nowhere"}
+    subprocess.run([sys.executable, "-m", "hsv.warm"], env=another, check=True)
+    for name in before:
+        assert (tmp_path / "another" / name).read_bytes() == (tmp_path / "caches" / name).read_bytes()
 
 
 @pytest.mark.parametrize("setting", ["no folder for caches", "NUMBA_DISABLE_JIT"])

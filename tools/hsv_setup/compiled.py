@@ -2,7 +2,8 @@
 
 Five nodes that start at once on two cores should not each compile it. numba notices a changed source file, but not
 that a function it calls from another file has changed: so all caches go when any of the compiled sources changes, and
-with them the library of what is called without numba (:mod:`hsv.ahead_of_time`).
+with them the library of what is called without numba (:mod:`hsv.ahead_of_time`). That for the sources as they are now
+may have been built before (:mod:`hsv.kept_library`).
 """
 
 from __future__ import annotations
@@ -63,6 +64,6 @@ def warm(env: Mapping[str, str], stage: Stage) -> None:
 
 
 def outcome() -> str:
-    """Return what was compiled, in words; without a library compiled ahead of time all works, but starts slowly."""
+    """Return what there is, in words; without a library compiled ahead of time all works, but starts slowly."""
     lacking = "" if _INDEX.exists() or not _PROGRAM.exists() else f", nothing ahead of time (see {LOG.name}/setup)"
-    return f"byte code and numerical code compiled{lacking}"
+    return f"byte code and numerical code are ready{lacking}"

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import gc
 import hashlib
-import json
 import os
 import shlex
 import subprocess
@@ -36,6 +35,7 @@ from numba.np.arrayobj import populate_array
 
 from hsv import compiled
 from hsv.compiled import EXTENSIONS, CompiledFunction
+from hsv.kept_library import install
 from hsv.lane_types import LaneArrayType, LaneRecordType
 from hsv.library_code import compile_without_machine_code, object_of
 from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest, processor, types_of
@@ -170,31 +170,17 @@ def build(calls: Calls) -> int:
         functions.setdefault(name, []).append((key, _symbol(number), result))
     linked = _linked(objects)
     contents = hashlib.sha256(linked).hexdigest()
-    target = INDEX.with_name(f"ahead_of_time.{contents[:16]}.so")
-    INDEX.parent.mkdir(parents=True, exist_ok=True)
     sources = _sources()
     index = {
         "processor": processor(),
         "sources": sources,
         "digest": digest(sources),
-        "library": target.name,
+        "library": f"{INDEX.stem}.{contents[:16]}.so",
         "contents": contents,
         "functions": functions,
     }
-    before = _library_before()
-    _replace(target, linked)
-    ctypes.PyDLL(str(target))  # whatever is missing in it is an OSError here
-    _replace(INDEX, json.dumps(index).encode())
-    if before not in ("", target.name):
-        INDEX.with_name(before).unlink(missing_ok=True)
+    install(index, linked)
     return sum(map(len, functions.values()))
-
-
-def _library_before() -> str:
-    try:
-        return str(json.loads(INDEX.read_text())["library"])
-    except (OSError, ValueError, LookupError, TypeError):
-        return ""
 
 
 def _sources() -> list[str]:
@@ -212,16 +198,6 @@ def _sources() -> list[str]:
         if name in holding or name in (*EXTENSIONS, *_OWN) or not constants.isdisjoint(values)
     ]
     return sorted({str(path.relative_to(PACKAGE)) for path in (*files, _RUN_TIME)})
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Write a file that others may be reading: they keep the old one."""
-    temporary = path.with_name(f"{path.name}.{os.getpid()}")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
 
 
 def _symbol(number: int) -> str:

@@ -16,6 +16,7 @@ from hsv.campaign.campaign import plan
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
+from hsv.kept_library import keep, restored
 from hsv.precompiled import why_none
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
@@ -59,11 +60,12 @@ def _ahead_of_time(processes: int) -> None:
 if __name__ == "__main__":
     reason = why_none()
     try:
-        if not reason:
+        if not reason and not restored():
             try:
                 _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1))
             except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
                 _ahead_of_time(0)
+            keep()
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)
