@@ -86,16 +86,19 @@ class BatchExecutor(FlowExecutor):
     """Takes what has come in a while at once, for a node that nobody waits for.
 
     To be woken for every message takes longer than to take it, and the processor from those in the loop. Where nothing
-    comes, the wait set of the base class wakes on the next message.
+    has come for ``LOOKS`` batches, the wait set of the base class wakes on the next message.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._batches = 0
+        self._empty = LOOKS
+        """Batches since the last message."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Take all that has come, and then let more come; now and then, and where nothing has come, all the rest."""
-        if not self.drain():
+        """Take all that has come, and then let more come; now and then, and where nothing comes, all the rest."""
+        self._empty = 0 if self.drain() else self._empty + 1
+        if self._empty > LOOKS:
             SingleThreadedExecutor.spin_once(self, timeout_sec)
             return
         self._batches += 1
