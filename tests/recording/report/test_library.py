@@ -5,7 +5,7 @@ import json
 import pytest
 from bag_readers import NPM
 
-from hsv.recording.report.page import LIBRARY
+from hsv.recording.report.templates import LIBRARY
 
 PACKAGE = "plotly.js-basic-dist-min"
 

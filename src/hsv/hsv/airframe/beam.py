@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 
-
-@cache
-def eigenvalue() -> float:
-    """Return the least positive root of 1 + cos(b) cosh(b), 1.8751."""
-    return float(brentq(lambda b: 1.0 + np.cos(b) * np.cosh(b), 1.0, 3.0, xtol=1e-15))
+EIGENVALUE = 1.8751040687119611
+"""The least positive root of 1 + cos(b) cosh(b)."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +24,7 @@ class Cantilever:
 
     def shape(self, distance: np.ndarray | float, derivative: int = 0) -> np.ndarray:
         """Return the mode (kg^-0.5) at a distance (m, any shape) from the clamp, or its derivative (kg^-0.5/m^n)."""
-        b = eigenvalue()
+        b = EIGENVALUE
         x = b * np.asarray(distance, float) / self.length
         ratio = (np.cosh(b) + np.cos(b)) / (np.sinh(b) + np.sin(b))
         # Derivatives of cosh - cos and of sinh - sin; the fourth is the function itself.
@@ -43,4 +38,4 @@ class Cantilever:
 
     def bending_stiffness(self, natural_frequency: float) -> float:
         """Return EI (N m^2) of a beam whose first mode has this frequency (rad/s)."""
-        return self.mass_per_length * (natural_frequency * (self.length / eigenvalue()) ** 2) ** 2
+        return self.mass_per_length * (natural_frequency * (self.length / EIGENVALUE) ** 2) ** 2

@@ -27,10 +27,9 @@ from hsv.campaign.summary import (
 )
 from hsv.campaign.table import OUTCOMES
 from hsv.errors import CampaignError, ControllerError, reason
-from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.payload import Numbers, compressed
 from hsv.recording.report.picture import Band, Line, Picture, picture, time_plot
-from hsv.recording.report.templates import environment_of
+from hsv.recording.report.templates import LIBRARY, environment_of
 from hsv.recording.report.text import capitalised, in_brackets, quantity, units_of
 from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import METRICS, Group, in_words, is_share

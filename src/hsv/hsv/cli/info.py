@@ -120,7 +120,7 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
     """Return lines on what is not ideal, none where all is."""
-    from hsv.recording.equipment import AIR
+    from hsv.recording.report.panels import AIR_PANELS
     from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
     if equipment is None:
@@ -137,7 +137,7 @@ def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str,
         "air": (
             "",
             ", ".join(
-                f"{name} {' to '.join(in_words(value, AIR[name][0], units) for value in ends)}"
+                f"{name} {' to '.join(in_words(value, AIR_PANELS[name].unit, units) for value in ends)}"
                 for name, ends in equipment["air_range"].items()
             ),
         ),

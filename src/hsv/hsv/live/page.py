@@ -12,9 +12,8 @@ from hsv.faults.table import CHANNELS, FAULT_KINDS
 from hsv.live.addresses import origins
 from hsv.live.hub import Hub
 from hsv.parameters import Parameter
-from hsv.recording.report.page import LIBRARY
 from hsv.recording.report.panels import GROUPS
-from hsv.recording.report.templates import asset, environment_of
+from hsv.recording.report.templates import LIBRARY, asset, environment_of
 from hsv.recording.report.text import units_of
 from hsv.units import UnitSystem
 

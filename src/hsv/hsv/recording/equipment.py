@@ -12,8 +12,8 @@ from hsv.recording.flight import input_columns, state_columns
 from hsv.recording.reader import Bag
 from hsv.vehicle.dynamics import INPUT_NAMES, STATE_NAMES
 
-AIR = {"wind_forward": ("m/s", 0.0), "wind_up": ("m/s", 0.0), "density_factor": ("1", 1.0)}
-"""Fields of the air, with SI units and their values in calm air."""
+CALM_AIR = {"wind_forward": 0.0, "wind_up": 0.0, "density_factor": 1.0}
+"""Fields of the air, with their values in calm air."""
 
 _EFFECTOR = "effector."
 
@@ -67,9 +67,9 @@ def effectors(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
 
 
 def moving_air(topics: Mapping[str, Columns]) -> dict[str, np.ndarray]:
-    """Return the fields of :data:`AIR` (n) that differ from calm air, over the period of a step, as above."""
-    air = {name: _over_the_period(topics, name) for name in AIR}
-    return {name: y for name, y in air.items() if (np.isfinite(y) & (y != AIR[name][1])).any()}
+    """Return the fields of :data:`CALM_AIR` (n) that differ from calm air, over the period of a step, as above."""
+    air = {name: _over_the_period(topics, name) for name in CALM_AIR}
+    return {name: y for name, y in air.items() if (np.isfinite(y) & (y != CALM_AIR[name])).any()}
 
 
 def _over_the_period(topics: Mapping[str, Columns], field: str) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 
 from markupsafe import Markup
@@ -16,14 +15,11 @@ from hsv.recording.report.opening import flight_picture, happened, sentence, ver
 from hsv.recording.report.panels import GROUPS, OF_EQUIPMENT, Kind
 from hsv.recording.report.payload import all_panels, compressed, payload
 from hsv.recording.report.run import ReportedRun, reported_runs
-from hsv.recording.report.templates import environment_of
+from hsv.recording.report.templates import LIBRARY, environment_of
 from hsv.recording.report.values import Quantity, Section, Table
 from hsv.simulation.metrics import CRITERIA, METRICS, Group, Metric
 from hsv.simulation.scenario import scenario_names
 from hsv.units import UnitSystem
-
-LIBRARY = files("hsv.recording.report").joinpath("plotly", "plotly-basic.min.js")
-"""The plotting library; see the README beside it."""
 
 EVENTS_SHOWN = 200
 """Events of a run that are listed; of a run with more, the page says how many there are."""

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from hsv.graph.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
-from hsv.recording.equipment import AIR
 from hsv.vehicle.dynamics import STATE_NAMES, STATE_UNITS
 
 
@@ -130,11 +129,11 @@ MEASUREMENT_ERRORS = {
 """Panels by state; the curve is the difference of two topics."""
 
 AIR_PANELS = {
-    name: Panel(name, title, AIR[name][0], "air", ())
-    for name, title in (
-        ("wind_forward", "Wind from behind"),
-        ("wind_up", "Wind from below"),
-        ("density_factor", "Density for that of the model"),
+    name: Panel(name, title, unit, "air", ())
+    for name, title, unit in (
+        ("wind_forward", "Wind from behind", "m/s"),
+        ("wind_up", "Wind from below", "m/s"),
+        ("density_factor", "Density for that of the model", "1"),
     )
 }
 """Panels by field of the air."""

@@ -13,6 +13,9 @@ from hsv.simulation.metrics import in_words
 SHARED = "hsv.recording.report"
 """The package whose templates, style and scripts all pages share."""
 
+LIBRARY = files(SHARED).joinpath("plotly", "plotly-basic.min.js")
+"""The plotting library of all pages; see the README beside it."""
+
 
 def environment_of(package: str, *, escaped: bool = True) -> Environment:
     """Return the environment of the templates in the folder ``template`` of a package, and of the shared ones.
