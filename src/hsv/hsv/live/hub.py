@@ -201,5 +201,8 @@ class Hub:
         time = min(messages[-1][0] for messages in kept.values())
         if time <= self._sampled:
             return None
-        step = {topic: dict(messages).get(time, b"") for topic, messages in kept.items()}
+        step = {
+            topic: next((data for stamp, data in reversed(messages) if stamp == time), b"")
+            for topic, messages in kept.items()
+        }
         return (time, step) if all(step.values()) else None
