@@ -429,3 +429,23 @@ def imported(words):
     ran = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, env=environment)
     assert ran.returncode == 0, ran.stderr
     return {*ran.stderr.split()}
+
+
+@pytest.mark.parametrize("change", ["content", "another module", "name", "a table"])
+def test_the_state_of_the_sources_tells_all_their_changes(change, tmp_path, monkeypatch):
+    monkeypatch.setattr(precompiled, "PACKAGE", tmp_path)
+    source = tmp_path / "source.py"
+    source.write_text("a = 1\n")
+    before = precompiled.state_of_sources()
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__" / "source.pyc").touch()
+    (tmp_path / ".source.py.swp").touch()
+    assert precompiled.state_of_sources() == before
+    if change == "content":
+        source.write_text("a = 2\n")
+    elif change == "name":
+        source.rename(source.with_name("other.py"))
+    else:
+        (tmp_path / "more").mkdir()
+        (tmp_path / "more" / ("more.toml" if change == "a table" else "more.py")).touch()
+    assert precompiled.state_of_sources() != before

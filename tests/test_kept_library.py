@@ -4,19 +4,17 @@ import hashlib
 import json
 import os
 import subprocess
+import time
 
 import pytest
+from full_disk import files_no_larger_than
 
 from hsv import kept_library
 
 
 @pytest.fixture
 def place(tmp_path, monkeypatch):
-    """Return where the index of the library is to be, of a package with one source."""
-    (tmp_path / "package").mkdir()
-    (tmp_path / "package" / "source.py").write_text("a = 1\n")
-    monkeypatch.setattr(kept_library, "PACKAGE", tmp_path / "package")
-    monkeypatch.setattr("hsv.precompiled.PACKAGE", tmp_path / "package")
+    """Return where the index of the library is to be."""
     monkeypatch.setattr(kept_library, "INDEX", tmp_path / "installed" / "ahead_of_time.json")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return kept_library.INDEX
@@ -43,55 +41,38 @@ def remove():
 
 
 def test_a_library_that_was_kept_is_installed_again(place, tmp_path):
-    assert not kept_library.restored()
+    assert not kept_library.restored("state")
     before = install(tmp_path)
-    kept_library.keep()
+    kept_library.keep("state")
     remove()
-    assert kept_library.restored()
+    assert kept_library.restored("state")
     assert installed() == before and len(before) == 2
 
 
 def test_the_library_that_is_there_gives_way(place, tmp_path):
     before = install(tmp_path)
-    kept_library.keep()
+    kept_library.keep("state")
     assert install(tmp_path, 2) != before
-    assert kept_library.restored()
+    assert kept_library.restored("state")
     assert installed() == before
 
 
-@pytest.mark.parametrize("change", ["content", "another module", "name", "processor", "numba"])
-def test_a_library_of_other_sources_or_for_another_machine_is_not_installed(place, tmp_path, monkeypatch, change):
+@pytest.mark.parametrize("change", ["sources", "processor", "numba"])
+def test_a_library_of_other_sources_or_for_another_machine_is_not_installed(change, place, tmp_path, monkeypatch):
     install(tmp_path)
-    kept_library.keep()
+    kept_library.keep("state")
     remove()
-    source = tmp_path / "package" / "source.py"
-    if change == "content":
-        source.write_text("a = 2\n")
-    elif change == "another module":
-        (tmp_path / "package" / "more").mkdir()
-        (tmp_path / "package" / "more" / "other.py").touch()
-    elif change == "name":
-        source.rename(source.with_name("other.py"))
-    elif change == "processor":
+    if change == "processor":
         monkeypatch.setattr(kept_library, "processor", lambda: "another")
-    else:
+    elif change == "numba":
         monkeypatch.setattr(kept_library, "version", lambda name: "0.1")
-    assert not kept_library.restored() and not installed()
+    assert not kept_library.restored("another" if change == "sources" else "state") and not installed()
 
 
-def test_byte_code_is_no_source(place, tmp_path):
-    install(tmp_path)
-    kept_library.keep()
-    cache = tmp_path / "package" / "__pycache__"
-    cache.mkdir()
-    (cache / "source.pyc").touch()
-    assert kept_library.restored()
-
-
-@pytest.mark.parametrize("damage", ["library cut", "library gone", "index cut", "no index", "other contents"])
+@pytest.mark.parametrize("damage", ["library cut", "library gone", "index cut", "index changed", "other contents"])
 def test_a_damaged_one_is_not_installed(place, tmp_path, damage):
     install(tmp_path)
-    kept_library.keep()
+    kept_library.keep("state")
     remove()
     [library], [index] = (list((tmp_path / "cache").rglob(f"*.{kind}")) for kind in ("so", "json"))
     if damage == "library cut":
@@ -99,37 +80,48 @@ def test_a_damaged_one_is_not_installed(place, tmp_path, damage):
     elif damage == "library gone":
         library.unlink()
     elif damage == "index cut":
-        os.truncate(index, 10)
-    elif damage == "no index":
-        index.write_text("[]")
+        os.truncate(index, 80)
+    elif damage == "index changed":
+        index.write_text(index.read_text().replace('"contents"', '"Contents"'))
     else:
         # All as it should be, except that the file is no library.
         other, contents = b"no library", hashlib.sha256(b"no library").hexdigest()
         library.with_name("other.so").write_bytes(other)
-        index.write_text(json.dumps({"library": "other.so", "contents": contents}))
-    assert not kept_library.restored() and not installed()
+        content = json.dumps({"library": "other.so", "contents": contents})
+        index.write_text(f"{hashlib.sha256(content.encode()).hexdigest()}\n{content}")
+    assert not kept_library.restored("state") and not installed()
 
 
 def test_where_there_is_no_place_nothing_is_kept(place, tmp_path, monkeypatch):
     install(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc")
-    kept_library.keep()
-    assert not kept_library.restored()
+    kept_library.keep("state")
+    assert not kept_library.restored("state")
+
+
+def test_where_the_disk_is_full_nothing_is_left(place, tmp_path):
+    install(tmp_path)
+    with files_no_larger_than(100):
+        kept_library.keep("state")
+    assert not [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+
+
+def test_a_relative_folder_for_caches_is_ignored(place, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", "cache")
+    install(tmp_path)
+    kept_library.keep("state")
+    assert not (tmp_path / "cache").exists() and (tmp_path / "home" / ".cache" / "hsv").is_dir()
 
 
 def test_the_last_libraries_are_kept(place, tmp_path):
-    source = tmp_path / "package" / "source.py"
     for number in range(kept_library._MOST_KEPT):
-        source.write_text(f"a = {number}\n")
         install(tmp_path, number)
-        kept_library.keep()
-    source.write_text("a = 0\n")
-    assert kept_library.restored()  # which makes it the one that was used last
-    source.write_text("a = -1\n")
-    kept_library.keep()
-    kept = []
-    for number in range(-1, kept_library._MOST_KEPT):
-        source.write_text(f"a = {number}\n")
-        if kept_library.restored():
-            kept.append(number)
-    assert kept == [-1, 0, *range(2, kept_library._MOST_KEPT)]
+        kept_library.keep(str(number))
+        time.sleep(0.01)  # folders are told apart by their times
+    assert kept_library.restored("0")  # which makes it the one that was used last
+    time.sleep(0.01)
+    kept_library.keep("another")
+    kept = [number for number in range(kept_library._MOST_KEPT) if kept_library.restored(str(number))]
+    assert kept == [0, *range(2, kept_library._MOST_KEPT)] and kept_library.restored("another")

@@ -1,10 +1,14 @@
 """What the set-up compiles is all that commands need."""
 
+import importlib.resources
 import os
+import shutil
 import subprocess
 import sys
 
 import pytest
+
+from hsv import warm as program
 
 
 @pytest.mark.long
@@ -43,3 +47,29 @@ def test_commands_run_where_nothing_is_kept_or_compiled(setting, tmp_path):
     assert ran.returncode == 0, ran.stderr
     ours, other = map(float, ran.stdout.split())
     assert ours == pytest.approx(other, rel=1e-15)
+
+
+def test_sources_that_change_while_they_are_compiled_give_no_library(monkeypatch):
+    monkeypatch.setattr(program, "warm", lambda: None)
+    monkeypatch.setattr(program, "build", lambda calls: pytest.fail("it was built"))
+    with pytest.raises(SystemExit, match="sources were changed meanwhile; run it again"):
+        program._ahead_of_time(0, "what they were before")
+
+
+def test_numba_compiles_again_when_a_function_of_another_file_has_changed(tmp_path):
+    package = shutil.copytree(
+        importlib.resources.files("hsv"), tmp_path / "hsv", ignore=shutil.ignore_patterns("__pycache__", "*.js")
+    )
+    decorated = "from hsv.compiled import njit_in_flight\n{}\n\n@njit_in_flight()\ndef {}(x):\n    return {}\n"
+    (package / "caller.py").write_text(decorated.format("from hsv.called import called", "caller", "called(x)"))
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": str(tmp_path)}
+    for factor in (2.0, 3.0, 2.0):
+        (package / "called.py").write_text(decorated.format("", "called", f"{factor} * x"))
+        ran = subprocess.run(
+            [sys.executable, "-c", "from hsv.caller import caller; print(caller(1.0))"],
+            env=environment,
+            capture_output=True,
+            text=True,
+        )
+        assert ran.stdout == f"{factor}\n", ran.stderr

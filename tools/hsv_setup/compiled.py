@@ -1,15 +1,15 @@
 """The stage that compiles the numerical code ahead of its first use.
 
-Five nodes that start at once on two cores should not each compile it. numba notices a changed source file, but not
-that a function it calls from another file has changed: so all caches go when any of the compiled sources changes, and
-with them the library of what is called without numba (:mod:`hsv.ahead_of_time`). That for the sources as they are now
-may have been built before (:mod:`hsv.kept_library`).
+Five nodes that start at once on two cores should not each compile it. When any of the compiled sources changes, all
+that was compiled goes, numba's caches and the library of what is called without numba (:mod:`hsv.ahead_of_time`). The
+library for the present sources may have been built before (:mod:`hsv.kept_library`).
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -25,7 +25,10 @@ _STAMP = STAMPS / "compiled"
 
 def _sources() -> list[Path]:
     """Return what defines compiled functions, and what the library was made of: modules with their constants, too."""
-    made_of = json.loads(_INDEX.read_text())["sources"] if _INDEX.exists() else []
+    try:
+        made_of = [str(name) for name in json.loads(_INDEX.read_text())["sources"]]
+    except (OSError, ValueError, LookupError, TypeError):  # there is none, or it is damaged
+        made_of = []
     defining = {path for path in _LIBRARY.rglob("*.py") if any(word in path.read_text() for word in ("numba", "njit"))}
     return sorted(defining | {path for name in made_of if (path := _LIBRARY / name).exists()})
 
@@ -33,7 +36,7 @@ def _sources() -> list[Path]:
 def _caches() -> list[Path]:
     """Return what was compiled, with what was left half written where that was cut off."""
     library = [path for pattern in ("*.so*", "json*") for path in _INDEX.parent.glob(f"{_INDEX.stem}.{pattern}")]
-    return [*_LIBRARY.rglob("__pycache__/*.nb[ic]*"), *library]
+    return [*_LIBRARY.rglob("*.nb[ic]*"), *library]
 
 
 def _key() -> str:
@@ -58,6 +61,8 @@ def warm(env: Mapping[str, str], stage: Stage) -> None:
         return
     for path in _caches():
         path.unlink()
+    for folder in _INDEX.parent.glob("numba-*"):
+        shutil.rmtree(folder)
     paths = [str(_LIBRARY.parent), *filter(None, [env.get("PYTHONPATH")])]
     stage.run([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)})
     write_stamp(_STAMP, _key())

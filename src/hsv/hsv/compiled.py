@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import update_wrapper
+from functools import cache, update_wrapper
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-from hsv.precompiled import entry_for
+from hsv.precompiled import INDEX, entry_for, state_of_sources
 
 EXTENSIONS = ("hsv.lane_overloads", "hsv.simulation.foreign_call")
 """Modules that tell numba of our types and functions; to import them is to import numba."""
@@ -53,9 +53,9 @@ class CompiledFunction:
     def dispatcher(self) -> Any:
         """What numba makes of the function; numba is imported."""
         if self._dispatcher is None:
+            compile_with = _numba().njit
             for name in EXTENSIONS:
                 import_module(name)
-            compile_with = import_module("numba").njit
             # The wrapper by which C would call it takes a tenth of the time to compile, and nobody does.
             options = self.targetoptions | {"no_cfunc_wrapper": True}
             if for_a_library:
@@ -97,6 +97,18 @@ class CompiledFunction:
             for i, given in enumerate(arguments)
         ]
         return cast(Callable[..., Any], self.dispatcher.compile(tuple(kinds)))
+
+
+@cache
+def _numba() -> Any:
+    """Return numba, which from now on keeps what it compiles in a folder for the present state of the sources.
+
+    It notices a change of the file that a function is in, and none of a file that it calls functions of.
+    """
+    numba = import_module("numba")
+    if not for_a_library:
+        numba.config.CACHE_DIR = str(INDEX.with_name(f"numba-{state_of_sources()[:16]}"))
+    return numba
 
 
 def njit(**options: Any) -> Callable[[Function], Function]:

@@ -1,8 +1,9 @@
 """Libraries of :mod:`hsv.ahead_of_time`, in their place and in the user's cache.
 
 To compile one takes two cores half a minute. So the last ones are kept in ``$XDG_CACHE_HOME/hsv``, which is
-``~/.cache/hsv`` where that is not set: another checkout of the same commit, or an earlier commit that is checked out
-again, takes what was built before.
+``~/.cache/hsv`` where that is not set: another checkout of the same sources, or earlier ones that are checked out
+again, take what was built before. Each is in a folder of its own, as the library and its index, which begins with a
+line of its digest.
 """
 
 from __future__ import annotations
@@ -20,10 +21,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hsv.precompiled import INDEX, PACKAGE, digest, processor
+from hsv.precompiled import INDEX, processor
 
 _MOST_KEPT = 8
-"""Each takes some 1.5 MB."""
+"""Each takes about a megabyte."""
 
 
 def install(index: Mapping[str, Any], library: bytes) -> None:
@@ -49,50 +50,60 @@ def install(index: Mapping[str, Any], library: bytes) -> None:
         INDEX.with_name(before).unlink(missing_ok=True)
 
 
-def keep() -> None:
-    """Keep the installed library in the cache, unless that has no place for it; all but the last ones leave it."""
+def keep(state: str) -> None:
+    """Keep the installed library in the cache, unless that has no place for it; all but the last ones leave it.
+
+    Args:
+        state: Of the sources that it was compiled from, see :func:`hsv.precompiled.state_of_sources`.
+    """
     with suppress(OSError, RuntimeError):  # a RuntimeError where the user has no home
-        index = json.loads(INDEX.read_text())
-        kept = _kept()
+        index = INDEX.read_bytes()
+        name = json.loads(index)["library"]
+        kept = _kept(state)
         kept.mkdir(parents=True, exist_ok=True)
-        _replace(kept / index["library"], INDEX.with_name(index["library"]).read_bytes())
-        _replace(kept / INDEX.name, json.dumps(index).encode())
-        by_age = sorted(kept.parent.glob(f"*/{INDEX.name}"), key=lambda path: path.stat().st_mtime_ns)
-        for oldest in by_age[:-_MOST_KEPT]:
-            shutil.rmtree(oldest.parent)
+        _replace(kept / name, INDEX.with_name(name).read_bytes())
+        _replace(kept / INDEX.name, hashlib.sha256(index).hexdigest().encode() + b"\n" + index)
+        folders = [path for path in kept.parent.iterdir() if path.is_dir()]
+        for oldest in sorted(folders, key=lambda path: path.stat().st_mtime_ns)[:-_MOST_KEPT]:
+            shutil.rmtree(oldest)
 
 
-def restored() -> bool:
-    """Install the library that was built of these sources on such a machine, if the cache has it; return whether."""
+def restored(state: str) -> bool:
+    """Install the library that was built of sources in this state on such a machine; return whether there is one."""
     try:
-        path = _kept() / INDEX.name
-        index = json.loads(path.read_text())
-        library = path.with_name(index["library"]).read_bytes()
+        kept = _kept(state)
+        written, _, content = (kept / INDEX.name).read_bytes().partition(b"\n")
+        if hashlib.sha256(content).hexdigest().encode() != written:
+            return False
+        index = json.loads(content)
+        library = (kept / index["library"]).read_bytes()
         if hashlib.sha256(library).hexdigest() != index["contents"]:
             return False
         install(index, library)
     except (OSError, RuntimeError, ValueError, LookupError, TypeError):
         return False
     with suppress(OSError):
-        os.utime(path)
+        os.utime(kept)
     return True
 
 
-def _kept() -> Path:
-    """Return the folder in the cache for a library of these sources, made and used on such a machine."""
-    files = (path.relative_to(PACKAGE) for path in PACKAGE.rglob("*") if path.is_file())
-    sources = sorted(str(path) for path in files if "__pycache__" not in path.parts)  # scenarios say what is called
-    compilers = [version("numba"), version("llvmlite"), sys.version, *platform.libc_ver()]
-    words = [processor(), *compilers, digest(sources), *sources]
-    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+def _kept(state: str) -> Path:
+    """Return the folder in the cache for a library of such sources, made and used on such a machine."""
+    words = [processor(), version("numba"), version("llvmlite"), sys.version, *platform.libc_ver(), state]
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    cache = given if given.is_absolute() else Path.home() / ".cache"  # as the XDG specification has it
     return Path(cache, "hsv", hashlib.sha256("\n".join(words).encode()).hexdigest()[:32])
 
 
 def _replace(path: Path, content: bytes) -> None:
     """Write a file that others may be reading: they keep the old one."""
     temporary = path.with_name(f"{path.name}.{os.getpid()}")
-    with temporary.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    temporary.replace(path)
+    try:
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError:
+        temporary.unlink(missing_ok=True)
+        raise

@@ -171,6 +171,20 @@ def digest(sources: Sequence[str]) -> str:
     return contents.hexdigest()
 
 
+def state_of_sources() -> str:
+    """Return a digest of all sources of this package and of its tables, with their names.
+
+    Raises:
+        OSError: One is gone meanwhile.
+    """
+    contents = hashlib.sha256()
+    paths = (path for kind in ("py", "c", "h", "toml") for path in PACKAGE.rglob(f"*.{kind}"))
+    for path in sorted(paths):
+        contents.update(os.fsencode(path.relative_to(PACKAGE)) + b"\0")
+        contents.update(hashlib.sha256(path.read_bytes()).digest())
+    return contents.hexdigest()
+
+
 def why_none() -> str:
     """Return why no function is compiled ahead of time here, empty where they are."""
     for name in os.environ:

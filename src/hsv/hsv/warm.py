@@ -17,7 +17,7 @@ from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
 from hsv.kept_library import keep, restored
-from hsv.precompiled import why_none
+from hsv.precompiled import state_of_sources, why_none
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.blocks import steps
 from hsv.simulation.closed_loop import fly
@@ -51,21 +51,23 @@ def warm() -> None:
             pass
 
 
-def _ahead_of_time(processes: int) -> None:
+def _ahead_of_time(processes: int, state: str) -> None:
     with recording(processes) as calls:
         warm()
+    if state_of_sources() != state:  # the library would be of the old ones, and taken for one of the new ones
+        sys.exit("python -m hsv.warm: sources were changed meanwhile; run it again")
     build(calls)
 
 
 if __name__ == "__main__":
-    reason = why_none()
+    state, reason = state_of_sources(), why_none()
     try:
-        if not reason and not restored():
+        if not reason and not restored(state):
             try:
-                _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1))
+                _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1), state)
             except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
-                _ahead_of_time(0)
-            keep()
+                _ahead_of_time(0, state)
+            keep(state)
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)

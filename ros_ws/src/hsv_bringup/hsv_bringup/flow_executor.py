@@ -17,7 +17,7 @@ BATCH = 0.005
 """Seconds in which the messages of a batch come: some steps at full speed, a quarter of one in real time."""
 
 LOOKS = 8
-"""Batches between two looks at everything else."""
+"""Batches between two looks at everything else, and without a message after which the next one is waited for."""
 
 _Subscription = tuple[Callable[..., Any], Any, bool, Callable[[Any], Any]]
 """What takes a message, with which arguments, and what is called with it."""
@@ -93,7 +93,7 @@ class BatchExecutor(FlowExecutor):
         super().__init__()
         self._batches = 0
         self._empty = LOOKS
-        """Batches since the last message."""
+        """Batches without a message; before the first message, all that there can be."""
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Take all that has come, and then let more come; now and then, and where nothing comes, all the rest."""
