@@ -40,6 +40,21 @@ def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
     assert ran.stderr.splitlines()[-1] == "KeyboardInterrupt" and "ignored" not in ran.stderr
 
 
+@pytest.mark.parametrize("code", [0, 2])
+def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code) -> None:
+    program = f"""
+import os, signal, sys
+from hsv.interruption import take_interrupts
+take_interrupts()
+class Last:
+    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.SIGINT): kill(process, number)
+last = Last()
+sys.exit({code})
+"""
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (code, "")
+
+
 @pytest.fixture
 def interrupted_as_a_command() -> Iterator[None]:
     """Take Ctrl-C as the commands do."""

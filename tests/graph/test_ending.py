@@ -44,6 +44,19 @@ def test_without_a_timer_a_process_leaves_all_the_same():
     assert (done.returncode, done.stderr) == (3, "")
 
 
+def test_the_exit_code_of_a_node_stands_when_ctrl_c_comes_at_the_very_end():
+    done = run("""
+import os, signal
+from hsv_node.main import take_signals
+take_signals(lambda number, frame: None)
+class Last:
+    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.SIGINT): kill(process, number)
+last = Last()
+sys.exit(2)
+""")
+    assert (done.returncode, done.stderr) == (2, "")
+
+
 def test_a_node_that_cannot_leave_is_ended_before_it_is_said_to_hang():
     assert LEAVE_WITHIN < HUNG_AFTER
 

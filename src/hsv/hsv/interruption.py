@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
 import os
 import signal
@@ -57,6 +58,16 @@ def take_interrupts() -> None:
         signal.signal(number, interrupt)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT,))
     sys.unraisablehook = _interrupt_again
+    ignore_ctrl_c_at_end()
+
+
+def ignore_ctrl_c_at_end() -> None:
+    """Keep the exit code of a process that is interrupted when everything but the end of Python is done.
+
+    Python gives signals their own effect back first, and then still takes some tens of milliseconds to let go of
+    compiled libraries.
+    """
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
 
 
 def end_with_parent(parent: int) -> None:

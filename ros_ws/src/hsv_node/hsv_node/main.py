@@ -17,6 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import remove_ros_args
 
 from hsv.errors import HsvError, ParameterError
+from hsv.interruption import ignore_ctrl_c_at_end
 from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.ending import ends_with
 from hsv_node.middleware import prefer_profiles
@@ -122,6 +123,7 @@ def take_signals(handler: Callable[[int, FrameType | None], object]) -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGTERM))
+    ignore_ctrl_c_at_end()
 
 
 def _refuse(name: str, error: BaseException) -> int:
