@@ -6,6 +6,7 @@ import os
 import pickle
 import subprocess
 import sys
+import time
 from collections import namedtuple
 from concurrent.futures import BrokenExecutor
 
@@ -434,13 +435,15 @@ def imported(words):
 @pytest.mark.parametrize("change", ["content", "another module", "name", "a table"])
 def test_the_state_of_the_sources_tells_all_their_changes(change, tmp_path, monkeypatch):
     monkeypatch.setattr(precompiled, "PACKAGE", tmp_path)
+    monkeypatch.setattr(precompiled, "IMPORTED_AT", time.time_ns() + 10**12)
     source = tmp_path / "source.py"
     source.write_text("a = 1\n")
     before = precompiled.state_of_sources()
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "__pycache__" / "source.pyc").touch()
     (tmp_path / ".source.py.swp").touch()
-    assert precompiled.state_of_sources() == before
+    (tmp_path / ".#source.py").symlink_to("somebody@here:1")  # Emacs
+    assert before and precompiled.state_of_sources() == before
     if change == "content":
         source.write_text("a = 2\n")
     elif change == "name":
@@ -449,3 +452,15 @@ def test_the_state_of_the_sources_tells_all_their_changes(change, tmp_path, monk
         (tmp_path / "more").mkdir()
         (tmp_path / "more" / ("more.toml" if change == "a table" else "more.py")).touch()
     assert precompiled.state_of_sources() != before
+
+
+def test_sources_that_were_changed_after_the_import_have_no_state(tmp_path, monkeypatch):
+    monkeypatch.setattr(precompiled, "PACKAGE", tmp_path)
+    source = tmp_path / "source.py"
+    source.write_text("a = 1\n")
+    changed = source.stat().st_ctime_ns
+    os.utime(source, (0, 0))  # as what is unpacked
+    monkeypatch.setattr(precompiled, "IMPORTED_AT", changed + 10**12)
+    assert precompiled.state_of_sources()
+    monkeypatch.setattr(precompiled, "IMPORTED_AT", changed - 10**9)
+    assert precompiled.state_of_sources() is None

@@ -41,13 +41,15 @@ def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
 
 
 @pytest.mark.parametrize("code", [0, 2])
-def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code) -> None:
+@pytest.mark.parametrize("number", ["SIGINT", "SIGALRM"])
+def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code, number) -> None:
+    # SIGALRM: an interruption that was to come later.
     program = f"""
 import os, signal, sys
 from hsv.interruption import take_interrupts
 take_interrupts()
 class Last:
-    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.SIGINT): kill(process, number)
+    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.{number}): kill(process, number)
 last = Last()
 sys.exit({code})
 """

@@ -5,11 +5,15 @@ import json
 import os
 import subprocess
 import time
+from pathlib import Path
 
 import pytest
 from full_disk import files_no_larger_than
 
 from hsv import kept_library
+
+SOURCE = "elementary.py"
+"""A source that the library may have been compiled from."""
 
 
 @pytest.fixture
@@ -27,7 +31,9 @@ def install(folder, number=1):
     subprocess.run(["cc", "-shared", "-fPIC", "-o", built, source], check=True)
     library = built.read_bytes()
     contents = hashlib.sha256(library).hexdigest()
-    kept_library.install({"library": f"ahead_of_time.{contents[:16]}.so", "contents": contents}, library)
+    index = {"library": f"ahead_of_time.{contents[:16]}.so", "contents": contents}
+    index |= {"sources": [SOURCE], "digest": kept_library.digest([SOURCE])}
+    kept_library.install(index, library)
     return installed()
 
 
@@ -125,3 +131,26 @@ def test_the_last_libraries_are_kept(place, tmp_path):
     kept_library.keep("another")
     kept = [number for number in range(kept_library._MOST_KEPT) if kept_library.restored(str(number))]
     assert kept == [0, *range(2, kept_library._MOST_KEPT)] and kept_library.restored("another")
+
+
+@pytest.mark.parametrize("changed", ["before it is kept", "before it is installed"])
+def test_what_was_compiled_of_other_sources_is_not_used(changed, place, tmp_path, monkeypatch):
+    install(tmp_path)
+    if changed == "before it is kept":
+        with monkeypatch.context() as patch:
+            patch.setattr(kept_library, "digest", lambda sources: "another")
+            kept_library.keep("state")
+        assert not (tmp_path / "cache").exists()
+    else:
+        kept_library.keep("state")
+        monkeypatch.setattr(kept_library, "digest", lambda sources: "another")
+    remove()
+    assert not kept_library.restored("state") and not installed()
+
+
+def test_what_numba_compiles_is_kept_beside_the_library_or_in_the_cache_of_the_user(place, tmp_path, monkeypatch):
+    assert kept_library.numba_folder("state") == place.parent / "numba-state"
+    monkeypatch.setattr(kept_library, "INDEX", Path("/proc/ahead_of_time.json"))
+    assert kept_library.numba_folder("state") == tmp_path / "cache" / "hsv" / "numba-state"
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc")
+    assert kept_library.numba_folder("state") is None

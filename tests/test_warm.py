@@ -5,10 +5,11 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 
 import pytest
 
-from hsv import warm as program
+from hsv import ahead_of_time
 
 
 @pytest.mark.long
@@ -50,16 +51,35 @@ def test_commands_run_where_nothing_is_kept_or_compiled(setting, tmp_path):
 
 
 def test_sources_that_change_while_they_are_compiled_give_no_library(monkeypatch):
-    monkeypatch.setattr(program, "warm", lambda: None)
-    monkeypatch.setattr(program, "build", lambda calls: pytest.fail("it was built"))
-    with pytest.raises(SystemExit, match="sources were changed meanwhile; run it again"):
-        program._ahead_of_time(0, "what they were before")
+    monkeypatch.setattr(ahead_of_time, "install", lambda index, library: pytest.fail("it was installed"))
+    monkeypatch.setattr(ahead_of_time, "state_of_sources", lambda: None)
+    with pytest.raises(ahead_of_time.SourcesChangedError):
+        ahead_of_time.build({})
+
+
+def test_sources_that_have_changed_since_they_were_imported_are_not_compiled(tmp_path):
+    package = copied(tmp_path)
+    program = (
+        "import runpy, hsv, hsv.elementary; from pathlib import Path\n"
+        "path = Path(hsv.elementary.__file__); path.write_text(path.read_text() + '\\n')\n"
+        "runpy.run_module('hsv.warm', run_name='__main__')"
+    )
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "kept")}
+    ran = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (1, "python -m hsv.warm: sources were changed meanwhile; run it again\n")
+    assert not list(package.rglob("ahead_of_time.*.so")) and not (tmp_path / "kept").exists()
+
+
+def copied(folder):
+    """Return a copy of the package, of its sources only."""
+    return shutil.copytree(
+        importlib.resources.files("hsv"), folder / "hsv", ignore=shutil.ignore_patterns("__pycache__", "*.js")
+    )
 
 
 def test_numba_compiles_again_when_a_function_of_another_file_has_changed(tmp_path):
-    package = shutil.copytree(
-        importlib.resources.files("hsv"), tmp_path / "hsv", ignore=shutil.ignore_patterns("__pycache__", "*.js")
-    )
+    package = copied(tmp_path)
     decorated = "from hsv.compiled import njit_in_flight\n{}\n\n@njit_in_flight()\ndef {}(x):\n    return {}\n"
     (package / "caller.py").write_text(decorated.format("from hsv.called import called", "caller", "called(x)"))
     environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
@@ -67,6 +87,7 @@ def test_numba_compiles_again_when_a_function_of_another_file_has_changed(tmp_pa
     environment |= {"PYTHONPATH": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}
     for factor in (2.0, 3.0, 2.0):
         (package / "called.py").write_text(decorated.format("", "called", f"{factor} * x"))
+        time.sleep(0.1)  # what was changed while the process began would not be kept
         ran = subprocess.run(
             [sys.executable, "-c", "from hsv.caller import caller; print(caller(1.0))"],
             env=environment,
@@ -74,3 +95,5 @@ def test_numba_compiles_again_when_a_function_of_another_file_has_changed(tmp_pa
             text=True,
         )
         assert ran.stdout == f"{factor}\n", ran.stderr
+    kept = [path for path in (package / "__pycache__").glob("numba-*") if list(path.rglob("*.nbc"))]
+    assert len(kept) == 2

@@ -25,10 +25,17 @@ for path in sys.argv[2:]:
     compileall.compile_dir(path, quiet=2, workers=0, rx=re.compile(sys.argv[1]))
 """
 
+# Byte code that is good for a content. What Python writes by itself is good for a size and a whole second: after a
+# change within the same second it would be that of the source before, and what is compiled of it is kept.
+_COMPILE_SOURCES = """
+import compileall, py_compile, sys
+mode = py_compile.PycInvalidationMode.CHECKED_HASH
+for path in sys.argv[1:]:
+    compileall.compile_dir(path, quiet=2, workers=0, force=True, invalidation_mode=mode)
+"""
+
 _OWN_TESTS = "site-packages/.*/tests?/"
 """Directories of installed packages that no process of the bench imports: a quarter of all that is installed."""
-
-_NOTHING = "(?!)"
 
 
 def compile_packages(python: Path, env: Mapping[str, str], stage: Stage) -> None:
@@ -46,7 +53,7 @@ def compile_sources(python: Path, env: Mapping[str, str], stage: Stage) -> None:
     Raises:
         SetupError: the interpreter does not run.
     """
-    stage.run([python, "-c", _COMPILE, _NOTHING, *SOURCES], env)
+    stage.run([python, "-c", _COMPILE_SOURCES, *SOURCES], env)
     write_stamp(_STAMP, _key())
 
 
@@ -56,8 +63,7 @@ def sources_are_current() -> bool:
 
 
 def _key() -> str:
-    # Byte code is good for a time of change, not for a content.
-    modules = sorted(path for folder in SOURCES for path in folder.rglob("*.py"))
-    return fingerprint(
-        read_stamp(STAMPS / "identity"), *(f"{path.relative_to(ROOT)} {path.stat().st_mtime_ns}" for path in modules)
-    )
+    parts: list[str | bytes] = [read_stamp(STAMPS / "identity")]
+    for path in sorted(path for folder in SOURCES for path in folder.rglob("*.py") if not path.name.startswith(".")):
+        parts += [str(path.relative_to(ROOT)), path.read_bytes()]
+    return fingerprint(*parts)

@@ -29,7 +29,8 @@ def _sources() -> list[Path]:
         made_of = [str(name) for name in json.loads(_INDEX.read_text())["sources"]]
     except (OSError, ValueError, LookupError, TypeError):  # there is none, or it is damaged
         made_of = []
-    defining = {path for path in _LIBRARY.rglob("*.py") if any(word in path.read_text() for word in ("numba", "njit"))}
+    modules = (path for path in _LIBRARY.rglob("*.py") if not path.name.startswith("."))  # no locks of editors
+    defining = {path for path in modules if any(word in path.read_text() for word in ("numba", "njit"))}
     return sorted(defining | {path for name in made_of if (path := _LIBRARY / name).exists()})
 
 
@@ -62,7 +63,7 @@ def warm(env: Mapping[str, str], stage: Stage) -> None:
     for path in _caches():
         path.unlink()
     for folder in _INDEX.parent.glob("numba-*"):
-        shutil.rmtree(folder)
+        shutil.rmtree(folder, ignore_errors=True)  # a process may be compiling into it
     paths = [str(_LIBRARY.parent), *filter(None, [env.get("PYTHONPATH")])]
     stage.run([PYTHON, "-m", "hsv.warm"], {**env, "PYTHONPATH": os.pathsep.join(paths)})
     write_stamp(_STAMP, _key())

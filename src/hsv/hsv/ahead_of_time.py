@@ -38,7 +38,16 @@ from hsv.compiled import EXTENSIONS, CompiledFunction
 from hsv.kept_library import install
 from hsv.lane_types import LaneArrayType, LaneRecordType
 from hsv.library_code import compile_without_machine_code, object_of
-from hsv.precompiled import INDEX, PACKAGE, NotAheadOfTimeError, Result, digest, processor, types_of
+from hsv.precompiled import (
+    INDEX,
+    PACKAGE,
+    NotAheadOfTimeError,
+    Result,
+    digest,
+    processor,
+    state_of_sources,
+    types_of,
+)
 
 _WORD = ir.IntType(64)
 _TUPLE: Any = types.BaseTuple
@@ -60,6 +69,10 @@ Compiled = tuple[bytes, Result] | None
 
 Calls = dict[tuple[str, tuple[str, ...]], Callable[[], Compiled]]
 """What returns an entry, by the function's name and the types of arguments as the index names them."""
+
+
+class SourcesChangedError(RuntimeError):
+    """Sources are not those of which functions were compiled."""
 
 
 @contextmanager
@@ -157,6 +170,7 @@ def build(calls: Calls) -> int:
     Left out is what returns something else than numbers, arrays and tuples of them. An older library is replaced.
 
     Raises:
+        SourcesChangedError: One was changed meanwhile; the library would be of the old one.
         OSError, subprocess.CalledProcessError: There is no C compiler to link with, or no place for the library.
     """
     functions: dict[str, list[tuple[tuple[str, ...], str, Result]]] = {}
@@ -179,6 +193,8 @@ def build(calls: Calls) -> int:
         "contents": contents,
         "functions": functions,
     }
+    if state_of_sources() is None:
+        raise SourcesChangedError("sources were changed meanwhile; run it again")
     install(index, linked)
     return sum(map(len, functions.values()))
 

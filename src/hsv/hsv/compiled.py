@@ -6,7 +6,7 @@ call from Python, for the types of arguments with which they call them (:mod:`hs
 :func:`njit` that is called with such arguments is taken from there, and numba is not imported
 (:mod:`hsv.precompiled`). With any other arguments, without that library, after a change of a source or on another kind
 of processor it is numba's, as with its own ``njit``. Both are compiled from the same source with the same options, and
-a test compares the bits of flights.
+a test compares the bits of flights. What numba compiles it keeps, for each state of the sources apart.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from functools import cache, update_wrapper
 from importlib import import_module
 from typing import Any, TypeVar, cast
 
-from hsv.precompiled import INDEX, entry_for, state_of_sources
+from hsv.precompiled import entry_for, state_of_sources
 
 EXTENSIONS = ("hsv.lane_overloads", "hsv.simulation.foreign_call")
 """Modules that tell numba of our types and functions; to import them is to import numba."""
@@ -53,13 +53,15 @@ class CompiledFunction:
     def dispatcher(self) -> Any:
         """What numba makes of the function; numba is imported."""
         if self._dispatcher is None:
-            compile_with = _numba().njit
+            compile_with = import_module("numba").njit
             for name in EXTENSIONS:
                 import_module(name)
             # The wrapper by which C would call it takes a tenth of the time to compile, and nobody does.
             options = self.targetoptions | {"no_cfunc_wrapper": True}
             if for_a_library:
                 options["no_cpython_wrapper"] = True
+            elif not _keeps_code():
+                options["cache"] = False
             try:
                 self._dispatcher = compile_with(**options)(self.py_func)
             except RuntimeError:  # there is no folder to keep what is compiled in
@@ -100,15 +102,19 @@ class CompiledFunction:
 
 
 @cache
-def _numba() -> Any:
-    """Return numba, which from now on keeps what it compiles in a folder for the present state of the sources.
+def _keeps_code() -> bool:
+    """Have numba keep what it compiles in a folder for this state of the sources, and return whether it does.
 
-    It notices a change of the file that a function is in, and none of a file that it calls functions of.
+    It notices a change of the file that a function is in, and none of a file that it calls functions of. Where a source
+    was changed since this process began, what it compiles may be of the one before, and is not kept.
     """
-    numba = import_module("numba")
-    if not for_a_library:
-        numba.config.CACHE_DIR = str(INDEX.with_name(f"numba-{state_of_sources()[:16]}"))
-    return numba
+    from hsv.kept_library import numba_folder  # not for what is taken from the library
+
+    state = state_of_sources()
+    folder = numba_folder(state) if state else None
+    if folder:
+        import_module("numba").config.CACHE_DIR = str(folder)
+    return folder is not None
 
 
 def njit(**options: Any) -> Callable[[Function], Function]:

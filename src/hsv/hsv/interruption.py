@@ -65,9 +65,10 @@ def ignore_ctrl_c_at_end() -> None:
     """Keep the exit code of a process that is interrupted when everything but the end of Python is done.
 
     Python gives signals their own effect back first, and then still takes some tens of milliseconds to let go of
-    compiled libraries.
+    compiled libraries. The timer of an interruption that was to come later may run down in that time as well.
     """
-    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGALRM):
+        atexit.register(signal.signal, number, signal.SIG_IGN)
 
 
 def end_with_parent(parent: int) -> None:

@@ -21,10 +21,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from hsv.precompiled import INDEX, processor
+from hsv.precompiled import INDEX, digest, processor
 
 _MOST_KEPT = 8
-"""Each takes about a megabyte."""
+"""A library takes about a megabyte; what numba has compiled of a state of the sources, seven."""
 
 
 def install(index: Mapping[str, Any], library: bytes) -> None:
@@ -56,9 +56,13 @@ def keep(state: str) -> None:
     Args:
         state: Of the sources that it was compiled from, see :func:`hsv.precompiled.state_of_sources`.
     """
-    with suppress(OSError, RuntimeError):  # a RuntimeError where the user has no home
+    with suppress(
+        OSError, RuntimeError, ValueError, LookupError, TypeError
+    ):  # a RuntimeError where the user has no home
         index = INDEX.read_bytes()
         name = json.loads(index)["library"]
+        if not _is_of_these_sources(json.loads(index)):
+            return
         kept = _kept(state)
         kept.mkdir(parents=True, exist_ok=True)
         _replace(kept / name, INDEX.with_name(name).read_bytes())
@@ -79,6 +83,8 @@ def restored(state: str) -> bool:
         library = (kept / index["library"]).read_bytes()
         if hashlib.sha256(library).hexdigest() != index["contents"]:
             return False
+        if not _is_of_these_sources(index):
+            return False
         install(index, library)
     except (OSError, RuntimeError, ValueError, LookupError, TypeError):
         return False
@@ -87,12 +93,41 @@ def restored(state: str) -> bool:
     return True
 
 
+def numba_folder(state: str) -> Path | None:
+    """Return where numba keeps what it compiles of sources in this state: beside them, else in the user's cache.
+
+    Returns:
+        ``None`` where neither can be written to.
+    """
+    name = f"numba-{state[:16]}"
+    with suppress(OSError, RuntimeError):
+        for folder in (INDEX.with_name(name), _cache() / name):
+            with suppress(OSError):
+                folder.mkdir(parents=True, exist_ok=True)
+                if os.access(folder, os.W_OK | os.X_OK):
+                    return folder
+    return None
+
+
+def _is_of_these_sources(index: Mapping[str, Any]) -> bool:
+    return bool(index["digest"] == digest(index["sources"]))
+
+
+def _cache() -> Path:
+    """Return the project's folder in the user's cache.
+
+    Raises:
+        RuntimeError: The user has no home.
+    """
+    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    cache = given if given.is_absolute() else Path.home() / ".cache"  # as the XDG specification has it
+    return cache / "hsv"
+
+
 def _kept(state: str) -> Path:
     """Return the folder in the cache for a library of such sources, made and used on such a machine."""
     words = [processor(), version("numba"), version("llvmlite"), sys.version, *platform.libc_ver(), state]
-    given = Path(os.environ.get("XDG_CACHE_HOME", ""))
-    cache = given if given.is_absolute() else Path.home() / ".cache"  # as the XDG specification has it
-    return Path(cache, "hsv", hashlib.sha256("\n".join(words).encode()).hexdigest()[:32])
+    return _cache() / hashlib.sha256("\n".join(words).encode()).hexdigest()[:32]
 
 
 def _replace(path: Path, content: bytes) -> None:

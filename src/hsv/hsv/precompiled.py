@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsv import IMPORTED_AT
 from hsv.lane_arrays import LaneArray, LaneRecord
 
 PACKAGE = Path(__file__).parent
@@ -28,6 +29,9 @@ INDEX = Path(os.environ.get("NUMBA_CACHE_DIR") or PACKAGE / "__pycache__", "ahea
 
 _NUMBA_SETTINGS = ("NUMBA_CACHE_DIR", "NUMBA_NUM_THREADS")
 """Environment variables of numba's that leave the code as it is."""
+
+_CLOCK_STEP = 20_000_000
+"""Nanoseconds by which the system's time of a change of a file may be behind its clock: twice its longest tick."""
 
 _NUMBERS: dict[type, str] = {
     float: "float64",
@@ -171,17 +175,26 @@ def digest(sources: Sequence[str]) -> str:
     return contents.hexdigest()
 
 
-def state_of_sources() -> str:
-    """Return a digest of all sources of this package and of its tables, with their names.
+def state_of_sources() -> str | None:
+    """Return a digest of the sources of this package in Python and C and of its tables, with their names.
 
-    Raises:
-        OSError: One is gone meanwhile.
+    Returns:
+        ``None`` where they are not known to be those that this process has imported: one was changed since then, or is
+        gone.
     """
     contents = hashlib.sha256()
-    paths = (path for kind in ("py", "c", "h", "toml") for path in PACKAGE.rglob(f"*.{kind}"))
-    for path in sorted(paths):
-        contents.update(os.fsencode(path.relative_to(PACKAGE)) + b"\0")
-        contents.update(hashlib.sha256(path.read_bytes()).digest())
+    found = (path for kind in ("py", "c", "h", "toml") for path in PACKAGE.rglob(f"*.{kind}"))
+    # Editors keep locks and copies of unsaved files under names that begin with a dot.
+    paths = sorted(path for path in found if not path.name.startswith("."))
+    try:
+        for path in paths:
+            contents.update(os.fsencode(path.relative_to(PACKAGE)) + b"\0")
+            contents.update(hashlib.sha256(path.read_bytes()).digest())
+            # The time of the content would be that of where it was copied from.
+            if path.stat().st_ctime_ns > IMPORTED_AT - _CLOCK_STEP:
+                return None
+    except OSError:
+        return None
     return contents.hexdigest()
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.ahead_of_time import build, recording
+from hsv.ahead_of_time import SourcesChangedError, build, recording
 from hsv.campaign.campaign import plan
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
@@ -51,23 +51,25 @@ def warm() -> None:
             pass
 
 
-def _ahead_of_time(processes: int, state: str) -> None:
+def _ahead_of_time(processes: int) -> None:
     with recording(processes) as calls:
         warm()
-    if state_of_sources() != state:  # the library would be of the old ones, and taken for one of the new ones
-        sys.exit("python -m hsv.warm: sources were changed meanwhile; run it again")
     build(calls)
 
 
 if __name__ == "__main__":
     state, reason = state_of_sources(), why_none()
     try:
+        if state is None:
+            raise SourcesChangedError("sources were changed meanwhile; run it again")
         if not reason and not restored(state):
             try:
-                _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1), state)
+                _ahead_of_time(min(_MOST_PROCESSES, os.cpu_count() or 1))
             except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
-                _ahead_of_time(0, state)
+                _ahead_of_time(0)
             keep(state)
+    except SourcesChangedError as error:
+        sys.exit(f"python -m hsv.warm: {error}")
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
         # No compiler to link with, or a llvmlite before 0.44: only to start a command or node takes longer.
         reason = str(getattr(error, "stderr", None) or error)
