@@ -149,7 +149,9 @@ def test_what_was_compiled_of_other_sources_is_not_used(changed, place, tmp_path
 
 
 def test_what_numba_compiles_is_kept_beside_the_library_or_in_the_cache_of_the_user(place, tmp_path, monkeypatch):
-    assert kept_library.numba_folder("state") == place.parent / "numba-state"
+    with monkeypatch.context() as homeless:
+        homeless.setattr(kept_library, "_cache", lambda: Path("~nobody-of-this-name").expanduser())
+        assert kept_library.numba_folder("state") == place.parent / "numba-state"
     monkeypatch.setattr(kept_library, "INDEX", Path("/proc/ahead_of_time.json"))
     assert kept_library.numba_folder("state") == tmp_path / "cache" / "hsv" / "numba-state"
     monkeypatch.setenv("XDG_CACHE_HOME", "/proc")

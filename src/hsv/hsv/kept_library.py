@@ -56,9 +56,8 @@ def keep(state: str) -> None:
     Args:
         state: Of the sources that it was compiled from, see :func:`hsv.precompiled.state_of_sources`.
     """
-    with suppress(
-        OSError, RuntimeError, ValueError, LookupError, TypeError
-    ):  # a RuntimeError where the user has no home
+    # A RuntimeError where the user has no home; the others where what is installed is damaged.
+    with suppress(OSError, RuntimeError, ValueError, LookupError, TypeError):
         index = INDEX.read_bytes()
         name = json.loads(index)["library"]
         if not _is_of_these_sources(json.loads(index)):
@@ -99,13 +98,12 @@ def numba_folder(state: str) -> Path | None:
     Returns:
         ``None`` where neither can be written to.
     """
-    name = f"numba-{state[:16]}"
-    with suppress(OSError, RuntimeError):
-        for folder in (INDEX.with_name(name), _cache() / name):
-            with suppress(OSError):
-                folder.mkdir(parents=True, exist_ok=True)
-                if os.access(folder, os.W_OK | os.X_OK):
-                    return folder
+    for place in (lambda: INDEX.parent, _cache):
+        with suppress(OSError, RuntimeError):  # a RuntimeError where the user has no home
+            folder = place() / f"numba-{state[:16]}"
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK | os.X_OK):
+                return folder
     return None
 
 
