@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -31,7 +32,19 @@ def test_sources_are_compiled_again_only_when_one_has_changed(module):
     compiled = Path(importlib.util.cache_from_source(str(module)))
     assert compiled.is_file() and bytecode.sources_are_current()
     os.utime(module, (0, 0))
+    assert bytecode.sources_are_current()
+    module.write_text("ALTITUDE = 27000.0\n")
     assert not bytecode.sources_are_current()
+
+
+def test_byte_code_is_not_taken_for_that_of_a_change_within_the_same_second(module):
+    os.utime(module, (1e9, 1e9))
+    bytecode.compile_sources(Path(sys.executable), os.environ, Stage("Trial", "trial"))
+    module.write_text("ALTITUDE = 27000.0\n")
+    os.utime(module, (1e9, 1e9))
+    program = "import flyer; print(flyer.ALTITUDE)"
+    ran = subprocess.run([sys.executable, "-c", program], cwd=module.parent, capture_output=True, text=True)
+    assert ran.stdout == "27000.0\n", ran.stderr
 
 
 def test_what_is_for_another_python_is_left_out(module):
