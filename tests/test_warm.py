@@ -3,11 +3,14 @@
 import importlib.resources
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
 import pytest
+from marking import long
 
 from hsv import ahead_of_time
 
@@ -36,6 +39,53 @@ def test_after_the_set_up_no_command_compiles(tmp_path):
     subprocess.run([sys.executable, "-m", "hsv.warm"], env=another, check=True)
     for name in before:
         assert (tmp_path / "another" / name).read_bytes() == (tmp_path / "caches" / name).read_bytes()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["processes begin", "they are waited for", *(long(t) for t in (1, 2, 4))])
+def test_interrupted_it_ends_with_its_processes(moment, number, tmp_path):
+    places = {name: tmp_path / name.lower() for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "TMPDIR")}
+    places["TMPDIR"].mkdir()
+    environment = os.environ | {name: str(path) for name, path in places.items()}
+    program = """
+import os, runpy, sys
+from hsv import ahead_of_time
+def tell(event, function):
+    def told(*arguments, **named):
+        if named.get("wait", True):
+            print(event, flush=True)
+        return function(*arguments, **named)
+    return told
+if __name__ == "__main__":
+    pool = ahead_of_time.ProcessPoolExecutor
+    pool.submit = tell("processes begin", pool.submit)
+    pool.shutdown = tell("they are waited for", pool.shutdown)
+    print("imported", flush=True)
+    runpy.run_module("hsv.warm", run_name="__main__")
+"""
+    path = tmp_path / "program.py"
+    path.write_text(program)
+    with subprocess.Popen(
+        [sys.executable, path],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as running:
+        awaited = moment if isinstance(moment, str) else "processes begin"
+        assert any(line.strip() == awaited for line in running.stdout)
+        if not isinstance(moment, str):
+            time.sleep(moment)
+        os.killpg(running.pid, signal.SIGINT) if number == signal.SIGINT else running.terminate()
+        try:
+            said = running.communicate(timeout=120)[1]  # until the last of its processes has ended
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(running.pid, signal.SIGKILL)
+    assert (running.returncode, said) == (130, "python -m hsv.warm: interrupted\n")
+    assert not [path for name in places for path in places[name].rglob("*") if path.is_file()]
+    assert not list(places["TMPDIR"].iterdir())
 
 
 @pytest.mark.parametrize("setting", ["no folder for caches", "NUMBA_DISABLE_JIT"])

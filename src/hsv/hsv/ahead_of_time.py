@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -35,6 +35,7 @@ from numba.np.arrayobj import populate_array
 
 from hsv import compiled
 from hsv.compiled import EXTENSIONS, CompiledFunction
+from hsv.interruption import end_with_parent, uninterrupted
 from hsv.kept_library import install
 from hsv.lane_types import LaneArrayType, LaneRecordType
 from hsv.library_code import compile_without_machine_code, object_of
@@ -48,6 +49,7 @@ from hsv.precompiled import (
     state_of_sources,
     types_of,
 )
+from hsv.threads import ctrl_c_held_back
 
 _WORD = ir.IntType(64)
 _TUPLE: Any = types.BaseTuple
@@ -111,42 +113,60 @@ def recording(processes: int = 0) -> Iterator[Calls]:
         finally:
             noted = False
 
-    with TemporaryDirectory() as folder:
-        context = get_context("spawn")
-        start = _compile_for_the_library, (context.Lock(), folder)
-        pool = ProcessPoolExecutor(processes, context, *start) if processes else None
+    with _compiling(processes) as pool:
         compiled.instead = call
         try:
             yield calls
-        except BaseException:
-            if pool:
-                pool.shutdown(cancel_futures=True)
-            raise
         finally:
             compiled.instead = None
-            if pool:
-                pool.shutdown()
 
 
+@contextmanager
+def _compiling(processes: int) -> Iterator[ProcessPoolExecutor | None]:
+    """Yield a pool of so many processes, ``None`` for none; at the end wait for what they compile, not after Ctrl-C."""
+    if not processes:
+        yield None
+        return
+    with TemporaryDirectory() as folder:
+        context = get_context("spawn")
+        start = _compile_for_the_library, (context.Lock(), folder, os.getpid())
+        pool = ProcessPoolExecutor(processes, context, *start)
+        try:
+            yield pool
+            pool.shutdown()
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in active_children():
+                process.terminate()
+                process.join()  # what it writes is in the folder, which is removed now
+            raise
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+@uninterrupted
 def _submitted(pool: ProcessPoolExecutor, compile_entry: Callable[[], Compiled]) -> Callable[[], Compiled]:
     """Return what waits for the entry, and raises BrokenExecutor where the processes have ended.
 
     Not before: within the block that is recorded it could be taken for an error of what is recorded.
     """
     try:
-        return pool.submit(compile_entry).result
+        with ctrl_c_held_back():  # a process begins here, and is ended by this one
+            return pool.submit(compile_entry).result
     except BrokenExecutor as error:
         lost: Future[Compiled] = Future()
         lost.set_exception(error)
         return lost.result
 
 
-def _compile_for_the_library(lock: Any, folder: str) -> None:
+def _compile_for_the_library(lock: Any, folder: str, parent: int) -> None:
     """Let this process compile for the library alone, and keep in ``folder`` what the others need as well.
 
     It saves only while it has the ``lock``: of two functions with different arguments that are saved at the same time,
     one could be taken for the other, as numba's index of a function has no lock.
     """
+    end_with_parent(parent)
     gc.freeze()
     # To look for garbage as often as Python does takes a sixth of the time; the process ends soon.
     gc.set_threshold(100_000, 50, 1000)

@@ -59,9 +59,10 @@ def keep(state: str) -> None:
     # A RuntimeError where the user has no home; the others where what is installed is damaged.
     with suppress(OSError, RuntimeError, ValueError, LookupError, TypeError):
         index = INDEX.read_bytes()
-        name = json.loads(index)["library"]
-        if not _is_of_these_sources(json.loads(index)):
+        described = json.loads(index)
+        if not _is_of_these_sources(described):
             return
+        name = described["library"]
         kept = _kept(state)
         kept.mkdir(parents=True, exist_ok=True)
         _replace(kept / name, INDEX.with_name(name).read_bytes())

@@ -16,6 +16,7 @@ from hsv.campaign.campaign import plan
 from hsv.campaign.envelope import Envelope
 from hsv.campaign.sample_runner import SampleRunner
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
+from hsv.interruption import take_interrupts
 from hsv.kept_library import keep, restored
 from hsv.precompiled import state_of_sources, why_none
 from hsv.simulation.assembly import assemble, flight_parameters
@@ -58,6 +59,7 @@ def _ahead_of_time(processes: int) -> None:
 
 
 if __name__ == "__main__":
+    take_interrupts()
     state, reason = state_of_sources(), why_none()
     try:
         if state is None:
@@ -68,6 +70,9 @@ if __name__ == "__main__":
             except BrokenExecutor:  # one was killed, as where the memory does not suffice for several
                 _ahead_of_time(0)
             keep(state)
+    except KeyboardInterrupt:
+        print("python -m hsv.warm: interrupted", file=sys.stderr)
+        sys.exit(130)
     except SourcesChangedError as error:
         sys.exit(f"python -m hsv.warm: {error}")
     except (OSError, subprocess.CalledProcessError, AttributeError) as error:
