@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-long fuzz mutation test-ros test-viewers test-portability coverage ci-local lint references bench docs clean
+.PHONY: help setup run test test-long fuzz test-ros test-viewers test-portability coverage ci-local lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -33,12 +33,6 @@ test-long: setup ## set up, then run the tests that take minutes (ARGS="-k damag
 
 fuzz: setup ## set up, then give 10 000 mutated files to every reader (ARGS="--fuzz-inputs 1000" for fewer)
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto -m fuzz $(ARGS)
-
-# Works on a copy of the checkout, in .mutation.
-mutation: setup ## set up, then try the unit tests on 300 changed copies of the code (ARGS="--keep-killed" goes on)
-	@pins=constraints$$([ "$$ROS_DISTRO" = jazzy ] && echo -jazzy).txt; \
-	$(IN_ENVIRONMENT) python3 -m pip install --quiet --requirement requirements-mutation.txt --constraint "$$pins"
-	@export NUMBA_DISABLE_JIT=1; $(IN_ENVIRONMENT) python3 tools/mutation.py $(ARGS)
 
 # In a shell with the wheels' ROS too, if the tools of an installation built for it are on PATH.
 test-ros: setup ## set up, then run the tests that need a full ROS 2 installation, sourced before (ARGS="-k launch" chooses)
@@ -95,5 +89,5 @@ docs: setup ## set up, then build the documentation into docs/_build (open docs/
 	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv .portability .mutation .ci-local .coverage ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
+	rm -rf .venv .portability .ci-local .coverage ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

@@ -35,7 +35,6 @@ def test_transition_is_the_matrix_exponential():
     assert_allclose(transition(A, B, T), expm(whole * T), rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.compiled
 def test_gain_solves_the_riccati_equation(estimator):
     whole = np.zeros((11, 11))
     whole[:9, :9], whole[:9, 9:] = A, B
@@ -105,27 +104,23 @@ def flown(estimator, measured, seconds=20.0, offset=0.0):
     return np.array(truth), np.array(found), state
 
 
-@pytest.mark.compiled
 def test_of_a_perfect_measurement_the_estimate_is_the_truth(estimator):
     truth, found, _ = flown(estimator, sensor_data({}, T))
     assert_allclose(found, truth, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.compiled
 def test_noise_falls_to_a_fraction_of_the_sensors(estimator):
     truth, found, _ = flown(estimator, SENSORS, 60.0)
     error = (found - truth)[500:, :5].std(axis=0) / SENSORS.noise[:5]
     assert error.max() < 0.5 and error[2:4].max() < 0.3
 
 
-@pytest.mark.compiled
 def test_an_offset_of_the_elevator_is_found(estimator):
     truth, _, state = flown(estimator, sensor_data({}, T), 4.0, offset=0.01)
     assert np.abs(truth[-1, 2:4]).max() < 0.5
     assert state[10] == pytest.approx(0.01, rel=0.05)
 
 
-@pytest.mark.compiled
 def test_it_is_a_function_of_what_it_is_given(estimator):
     for one, other in zip(flown(estimator, SENSORS, 2.0), flown(estimator, SENSORS, 2.0), strict=True):
         assert_array_equal(one, other)

@@ -92,7 +92,6 @@ def test_what_is_wrong_with_a_plan_is_told():
     assert "climb rate = " in problem(1, target=(START[0] + 200.0, START[1]))
 
 
-@pytest.mark.compiled
 def test_a_step_becomes_the_shortest_ramp_whose_plan_is_inside_the_tightened_inputs(step):
     assert column(step, "time")[0] == step.blend == BLEND
     assert (column(step, "altitude"), column(step, "velocity")) == tuple(zip(START, TARGET, strict=True))
@@ -101,7 +100,6 @@ def test_a_step_becomes_the_shortest_ramp_whose_plan_is_inside_the_tightened_inp
     assert KEPT_FREE <= room.min() < KEPT_FREE + 5e-4
 
 
-@pytest.mark.compiled
 def test_less_room_makes_it_slower_and_more_faster(step):
     lower, higher = (govern(Leg(0.0, 0.0, *TARGET), maximum=HIGH + np.array([0.0, by])) for by in (-0.005, 0.005))
     assert lower.end > step.end > higher.end
@@ -139,7 +137,6 @@ def test_a_short_plan_too_is_that_of_its_reference(short_step):
     assert len(short_step.plan) == round((short_step.end + 10.0) / PERIOD)
 
 
-@pytest.mark.compiled
 def test_the_plan_is_that_of_the_reference_it_returns(step):
     check_plan(step)
     assert np.abs(step.deviation[-1, :2]).max() < 0.1  # it has come to rest
@@ -157,7 +154,6 @@ def check_plan(step):
         assert_allclose(step.deviation[k + 1], A @ x + B @ u + reference.defect[row], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.compiled
 def test_a_ramp_is_never_faster_than_it_was_asked_for(step):
     slow = govern(Leg(20.0, 60.0, *TARGET))
     assert column(slow, "time") == (BLEND, 20.0 + BLEND, 80.0 + BLEND)
@@ -166,7 +162,6 @@ def test_a_ramp_is_never_faster_than_it_was_asked_for(step):
     assert end - begin == pytest.approx(np.ptp(column(step, "time")), abs=2 * PERIOD)
 
 
-@pytest.mark.compiled
 def test_a_leg_begins_when_it_is_asked_for_or_when_the_one_before_is_done(step):
     soon = govern(Leg(0.0, 0.0, *TARGET), Leg(10.0, 0.0, *START))
     late = govern(Leg(0.0, 0.0, *TARGET), Leg(100.0, 0.0, *START))
@@ -176,7 +171,6 @@ def test_a_leg_begins_when_it_is_asked_for_or_when_the_one_before_is_done(step):
     assert column(late, "altitude") == (START[0], TARGET[0], TARGET[0], START[0])
 
 
-@pytest.mark.compiled
 def test_the_rates_of_the_actuators_are_kept(step):
     fastest = np.abs(np.diff(step.plan, axis=0)).max(axis=0) / PERIOD
     limited = govern(Leg(0.0, 0.0, *TARGET), rate=0.5 * fastest)
@@ -184,7 +178,6 @@ def test_the_rates_of_the_actuators_are_kept(step):
     assert np.all(np.abs(np.diff(limited.plan, axis=0)).max(axis=0) <= 0.5 * fastest * PERIOD)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("changes", "why"),
     [

@@ -36,7 +36,6 @@ def flight():
     return fly(2 * SOLVE_STEPS + 1)
 
 
-@pytest.mark.compiled
 def test_gain_takes_effect_exactly_when_it_should(flight):
     assert [r.gain_index == NOT_IN_FAMILY for r in flight] == [k >= SOLVE_STEPS for k in range(len(flight))]
     assert np.array_equal(flight[SOLVE_STEPS].gain, flight[2 * SOLVE_STEPS - 1].gain)
@@ -52,7 +51,6 @@ def test_gain_is_that_of_the_state_at_the_start_of_the_solve(flight):
     assert np.array_equal(found.K, flight[2 * SOLVE_STEPS].gain[:, :5])
 
 
-@pytest.mark.compiled
 def test_two_flights_are_bit_identical_whatever_the_pace(flight):
     slow = fly(len(flight), pause=0.01)
     for one, other in zip(flight, slow, strict=True):
@@ -68,7 +66,6 @@ def test_a_failed_solve_leaves_the_family():
     assert np.array_equal(results[-1].input, FamilyLaw(DATA).step(far).input)
 
 
-@pytest.mark.compiled
 def test_a_gain_that_no_longer_fits_is_not_taken():
     law, far = KothareLaw(DESIGN, DATA), 30.0 * STEP
     for _ in range(SOLVE_STEPS):

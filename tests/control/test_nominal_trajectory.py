@@ -63,7 +63,6 @@ def test_obeys_the_nominal_system_scheduled_by_the_measured_state():
         assert_array_equal(result.reference, law.reference.final_state)
 
 
-@pytest.mark.compiled
 def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
     law = nominal()
     used = set()
@@ -76,7 +75,6 @@ def test_plays_the_gain_of_the_smallest_ellipsoid_that_holds_the_deviation():
     assert np.abs(result.deviation[:2]).max() < 1.0
 
 
-@pytest.mark.compiled
 def test_never_leaves_an_ellipsoid_outwards():
     law = nominal()
     indices = [smallest(law.step(START.state).deviation) for _ in range(4000)]

@@ -96,7 +96,6 @@ NOT_RUN = {
     ("CONTRIBUTING.md", "python3 -m pytest tests/test_noise.py -q"): "make test runs that file",
     ("README.md", "flowchart LR"): "a diagram",
     ("docs/benchmarks.md", "python3 tools/step_times.py"): "takes minutes; see tests/graph/test_active_law.py",
-    ("docs/mutation.md", "make mutation"): "takes an hour; tests/tools/test_mutation.py runs a part",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
     ("src/hsv/hsv/recording/report/plotly/README.md", NPM): "how a file of the repository was fetched",
     (

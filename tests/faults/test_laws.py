@@ -119,7 +119,6 @@ def test_periodic_fault_acts_for_its_share_of_each_period():
     assert_array_equal(result, expected.astype(float))
 
 
-@pytest.mark.compiled
 def test_random_fault_comes_and_goes_as_a_markov_chain():
     fault = elevator("loss_of_effectiveness", effectiveness=0.0, random_on=0.4, random_off=1.2)
     result = flown([(fault, 5)], np.ones(40000))

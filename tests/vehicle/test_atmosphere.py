@@ -65,7 +65,6 @@ def test_cross_filter_has_drydens_autocorrelation_exactly(r):
         assert C @ np.linalg.matrix_power(F, lag) @ C == pytest.approx(math.exp(-x) * (1.0 - 0.5 * x), abs=1e-12)
 
 
-@pytest.mark.compiled
 def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     r = SPEED * T / LENGTH
     for axis, law in enumerate((lambda x: math.exp(-x), lambda x: math.exp(-x) * (1.0 - 0.5 * x))):
@@ -76,7 +75,6 @@ def test_turbulence_has_its_variance_and_autocorrelation(turbulence):
     assert abs(np.mean(turbulence[0] * turbulence[1])) < 0.025
 
 
-@pytest.mark.compiled
 def test_turbulence_has_drydens_spectrum(turbulence):
     tau = LENGTH / SPEED
     laws = (
@@ -92,7 +90,6 @@ def test_turbulence_has_drydens_spectrum(turbulence):
         assert np.mean(density[inside] / expected) == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.compiled
 def test_turbulence_is_stationary_from_the_first_step():
     values = {"turbulence.sigma_forward": 1.0, "turbulence.sigma_up": 1.0}
     first = np.array([flown(values, 2, seed) for seed in range(1500)])[:, :, :2]
@@ -177,7 +174,6 @@ def test_wind_is_steady_and_shears_with_altitude():
     assert_allclose(flown(values, 1), [[25.0, -1.0, 1.0]])
 
 
-@pytest.mark.compiled
 def test_density_is_off_by_a_constant_and_a_gauss_markov_process():
     assert_allclose(flown({"density.offset": -0.05}, 1)[0, 2], 0.95)
     values = {"density.offset": 0.02, "density.sigma": 0.03, "density.length": 2000.0}
