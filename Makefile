@@ -60,7 +60,7 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 	python3 -m pytest -n 2 -m portability $(ARGS) && exit "$$missing"
 
 # Of the packages that a flight is made of and of those that record it, by the tests that mirror them, in one process each:
-# some minutes. Compiled functions are not traced, and pyproject.toml leaves them out.
+# some minutes.
 coverage: setup ## set up, then measure how much of the flight's packages their own tests run; fails below the floor
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto --cov --cov-report=term:skip-covered \
 		-m "not (graph or long or fuzz or full_ros or portability or viewer or reference)" \
@@ -89,5 +89,5 @@ docs: setup ## set up, then build the documentation into docs/_build (open docs/
 	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv .portability .ci-local .coverage ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
+	rm -rf .venv .portability .ci-local .coverage src/hsv/build src/hsv/hsv/core/*.so ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

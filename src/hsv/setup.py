@@ -11,10 +11,9 @@ manifest = ElementTree.parse(Path(__file__).resolve().with_name("package.xml"))
 # Lower bounds are the oldest versions that tests/packaging/test_wheel.py flies; upper ones, the next release that may
 # break what is used. Both hold the pins of constraints*.txt.
 REQUIRED = [
-    "llvmlite>=0.43,<0.52",
+    "cffi>=1.16,<3",
     "lz4>=4.3.3,<5",
     "mcap>=1.3,<2",
-    "numba>=0.60,<0.70",
     "numpy>=1.26,<3",
     "pint>=0.24.4,<0.27",
     "piqp>=0.6,<0.8",
@@ -43,10 +42,10 @@ setup(
             "py.typed",
             "**/*.toml",
             "known_units.json",
-            "run_time.c",
             "bench/*.c",
             "campaign/template/*",
             "control/include/*.h",
+            "core/*.[ch]",
             "designs/*",
             "export/*.j2",
             "live/template/*",
@@ -60,6 +59,9 @@ setup(
         ("share/ament_index/resource_index/packages", ["resource/hsv"]),
         ("share/hsv", ["package.xml"]),
     ],
+    cffi_modules=["hsv/core/build.py:ffibuilder"],
+    # The extension uses Python's stable interface, so one wheel serves all versions from this one on.
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
     python_requires=">=3.11,<3.13",
     install_requires=REQUIRED,
     extras_require={**EXTRAS, "all": sorted(chain.from_iterable(EXTRAS.values()))},

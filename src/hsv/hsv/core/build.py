@@ -1,0 +1,36 @@
+"""The build of the core: setup.py passes `ffibuilder` to setuptools.
+
+The compiler is that of CC, or else the one that Python was built with; HSV_CFLAGS adds options for it.
+"""
+
+import os
+import shlex
+import shutil
+import sys
+import sysconfig
+from pathlib import Path
+
+from cffi import FFI
+
+FOLDER = Path(__file__).parent
+# Contraction of a * b + c would change the bits of a flight. gcc's own vectorisation only makes a flight slower.
+FLAGS = ["-std=gnu99", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize"]
+
+compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC"))[0]
+if not shutil.which(compiler) or not Path(sysconfig.get_path("include"), "Python.h").is_file():
+    sys.exit("hsv needs a C compiler and Python's header files: sudo apt-get install g++ python3-dev")
+
+own = shlex.split(os.environ.get("HSV_CFLAGS", ""))
+header = (FOLDER / "core.h").read_text(encoding="utf-8")
+
+ffibuilder = FFI()
+ffibuilder.cdef(header.split("/* begin */")[1].split("/* end */")[0])
+ffibuilder.set_source(
+    "hsv.core._core",
+    '#include "core.h"',
+    sources=sorted(map(str, FOLDER.glob("*.c"))),
+    depends=sorted(map(str, FOLDER.glob("*.h"))),
+    include_dirs=[str(FOLDER)],
+    extra_compile_args=[*FLAGS, *own],
+    extra_link_args=own,
+)
