@@ -1,1 +1,1 @@
-"""Sets the bench up: virtual environment, ROS 2 packages, workspace, compiled caches."""
+"""Sets the bench up: virtual environment, ROS 2 packages, workspace, byte code."""

@@ -103,8 +103,9 @@ def tool_problems(env: Mapping[str, str]) -> list[Problem]:
     """Return which build tools are missing or too old."""
     path = env.get("PATH")
     problems = []
-    if shutil.which(env.get("CXX") or "g++", path=path) is None:
-        problems.append(Problem("a C++ compiler (g++)", ("g++",)))
+    for language, variable, usual in (("C", "CC", "gcc"), ("C++", "CXX", "g++")):
+        if shutil.which(env.get(variable) or usual, path=path) is None:
+            problems.append(Problem(f"a {language} compiler ({env.get(variable) or usual})", ("g++",)))
     if shutil.which("make", path=path) is None:
         problems.append(Problem("make", ("make",)))
     needed = ".".join(map(str, CMAKE_AT_LEAST))

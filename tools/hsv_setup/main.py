@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from types import FrameType
 
-from hsv_setup import bytecode, checks, compiled, completion, environment, interpreter, routes, workspace
+from hsv_setup import bytecode, checks, completion, environment, interpreter, routes, workspace
 from hsv_setup.console import SetupError, Stage
 from hsv_setup.paths import ROOT
 
@@ -60,17 +60,16 @@ def _set_up(environ: Mapping[str, str], only_check: bool) -> None:
             if rebuilding:
                 checks.require(route, python, env)
                 built = Stage("[2/3] Workspace", "build")
-                # Neither other packages nor the numerical code need the workspace, and one core each is enough.
+                # Neither the other packages nor byte code need the workspace, and one core each is enough.
                 beside.enter_context(workspace.building(route, wanted, env, built))
             if incomplete:
                 environment.install_rest(route, env, packages)
                 packages.done("installed in .venv")
-            if not (bytecode.sources_are_current() and compiled.is_current()):
-                caches = Stage("[3/3] Compiled caches", "compile")
-                compiled.warm(env, caches)
-                completion.write(environment.PYTHON, env, caches)
-                bytecode.compile_sources(environment.PYTHON, env, caches)
-                caches.done(compiled.outcome())
+            if not bytecode.sources_are_current():
+                written = Stage("[3/3] Byte code", "bytecode")
+                completion.write(environment.PYTHON, env, written)
+                bytecode.compile_sources(environment.PYTHON, env, written)
+                written.done("is up to date")
         if rebuilding:
             built.done(f"built {', '.join(package.name for package in wanted) or 'nothing, removed old packages'}")
     print(f"Set up ({time.monotonic() - start:.1f} s). To use it in this shell: source env.sh", flush=True)

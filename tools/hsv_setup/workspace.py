@@ -1,8 +1,8 @@
 """The stage that builds the packages of src/ and ros_ws/src with colcon, those that need it only.
 
 Packages are built with --symlink-install: a changed Python module is live at once. What needs a build is a changed
-interface, CMakeLists.txt, package.xml, setup.py or setup.cfg, or a file that was added or removed outside the Python
-modules (launch files and other data are linked one by one).
+interface, CMakeLists.txt, package.xml, setup.py or setup.cfg, a source or header in C, or a file that was added or removed
+outside the Python modules (launch files and other data are linked one by one).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hsv_setup.routes import Route
 
 BASE_PATHS = ("src", "ros_ws/src")
 # Read from the sources at build time; everything else of a Python package is a link to the source.
-_COPIED = ("package.xml", "setup.py", "setup.cfg")
+_READ = ("package.xml", "setup.py", "setup.cfg", "core/build.py", "*.c", "*.h")
 # Generated code is compiled against these.
 _BINARY_INTERFACE = ("ros-", "numpy=")
 _JOBS_AT_MOST = 8
@@ -54,10 +54,10 @@ class Package:
         parts: list[str | bytes] = [route.name]
         for path in self._files():
             name = path.relative_to(self.path)
-            module = self.is_python and name.parts[0] == self.name
-            if not module:
+            read = not self.is_python or any(map(name.match, _READ))
+            if read or name.parts[0] != self.name:
                 parts.append(str(name))
-            if not self.is_python or str(name) in _COPIED:
+            if read:
                 parts.append(path.read_bytes())
         if self.is_python:
             parts.append(Path(__file__).read_bytes())  # writes the scripts
