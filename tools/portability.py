@@ -1,8 +1,9 @@
 """Prepare other processors, Pythons and packages to fly on: what "make test-portability" runs before its tests.
 
-Below ``.portability`` each environment has a folder of its own with wheels at their pinned versions and, for another
-machine, Debian's Python and the libraries under it, unpacked and not installed: nothing outside the checkout changes,
-and no rights are needed. What cannot be had is named, a line each; the tests fly on the rest.
+Below ``.portability`` each environment has a folder of its own with wheels at their pinned versions. For another
+machine there are also Debian's Python, the libraries under it, and a cross compiler for the core, unpacked and not
+installed: nothing outside the checkout changes, and no rights are needed. What cannot be had is named, a line each; the
+tests fly on the rest.
 """
 
 from __future__ import annotations
@@ -17,13 +18,17 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from hsv_setup.interpreter import Interpreter, probe
 from hsv_setup.paths import ROOT, fingerprint, read_stamp, write_stamp
 
 CACHE = ROOT / ".portability"
-PACKAGES = ("numba", "numpy", "pint", "pydantic", "pyyaml", "scipy")
+PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy")
 """Packages that a flight in one process imports."""
+LIBRARY = ROOT / "src" / "hsv"
+"""The sources of the library, and beside them its core, compiled for this machine by the set-up."""
+
 _DEBIAN_MACHINES = {"x86_64": "amd64", "aarch64": "arm64"}
 
 
@@ -37,6 +42,8 @@ class Environment:
 
     command: list[str]
     packages: str
+    library: str = str(LIBRARY)
+    """Folder of the library, with a core that the processor can run."""
 
     @classmethod
     def read(cls, name: str) -> Environment | None:
@@ -54,12 +61,12 @@ def nehalem(folder: Path) -> Environment:
 
 
 def aarch64(folder: Path) -> Environment:
-    """Return Debian's Python for aarch64, of the project's version, under the project's pins."""
+    """Return Debian's Python for aarch64, of the project's version, under the project's pins, with a core for it."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    root = folder / "root"
+    root = CACHE / "aarch64-root"
     unpack_packages("aarch64", root, f"python{version}", "libstdc++6")
     command = [emulator("aarch64"), "-L", str(root), str(root / "usr/bin" / f"python{version}")]
-    return Environment(command, install(folder, version, "aarch64", "constraints.txt"))
+    return Environment(command, install(folder, version, "aarch64", "constraints.txt"), cross_compile(folder))
 
 
 def python_3_12(folder: Path) -> Environment:
@@ -184,8 +191,28 @@ def install(folder: Path, version: str, machine: str, constraints: str) -> str:
     return str(packages)
 
 
+def cross_compile(folder: Path) -> str:
+    """Build the library with a core for aarch64, by Debian's cross compiler; return its folder.
+
+    Raises:
+        MissingError: There is no such compiler, or it does not compile the core.
+    """
+    compiler = CACHE / "aarch64-compiler"
+    unpack_packages(platform.machine(), compiler, "gcc-aarch64-linux-gnu", "libc6-dev-arm64-cross")
+    variables = {
+        "CC": f"{compiler}/usr/bin/aarch64-linux-gnu-gcc --sysroot={compiler}",
+        "LD_LIBRARY_PATH": str(compiler / "usr/lib" / f"{platform.machine()}-linux-gnu"),
+    }
+    base, library = folder / "build", folder / "library"
+    command = [sys.executable, "setup.py", "--quiet", "build", "--build-base", str(base), "--build-lib", str(library)]
+    done = _run(command, cwd=LIBRARY, env=os.environ | variables)
+    if done.returncode:
+        raise MissingError(f"the core does not compile for aarch64: {(done.stdout + done.stderr).splitlines()[-1]}")
+    return str(library)
+
+
 def prepare(name: str) -> Environment:
-    """Return environment ``name``, prepared again if the pins or this program have changed.
+    """Return environment ``name``, prepared again if the pins, the library or this program have changed.
 
     Raises:
         MissingError: Says what is missing for it.
@@ -193,7 +220,9 @@ def prepare(name: str) -> Environment:
     folder = CACHE / name
     stamp, described = folder / "made-for", folder / "environment.json"
     pins = [(ROOT / lock).read_bytes() for lock in ("constraints.txt", "constraints-jazzy.txt")]
-    key = fingerprint(str(ROOT), sys.version, Path(__file__).read_bytes(), *pins)
+    files = [LIBRARY / "setup.py", *sorted(LIBRARY.glob("hsv/**/*.py")), *sorted(LIBRARY.glob("hsv/**/*.[ch]"))]
+    sources = [path.read_bytes() for path in files if path.is_file()]  # not the locks of editors
+    key = fingerprint(str(ROOT), sys.version, Path(__file__).read_bytes(), *pins, *sources)
     found = Environment.read(name)
     if found and read_stamp(stamp) == key and shutil.which(found.command[0]):
         return found
@@ -205,8 +234,8 @@ def prepare(name: str) -> Environment:
     return environment
 
 
-def _run(command: list[str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+def _run(command: list[str], **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, **options)
 
 
 def _last_line(done: subprocess.CompletedProcess[str]) -> str:

@@ -7,6 +7,7 @@ import runpy
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -21,13 +22,18 @@ def test_without_a_compiler_one_line_names_the_packages_to_install() -> None:
     assert (ran.returncode, ran.stdout, ran.stderr) == (1, "", needed)
 
 
-def test_options_of_the_environment_come_last(monkeypatch: pytest.MonkeyPatch) -> None:
+def extension(folder: Path) -> Any:
+    """Return the extension as setuptools gets it; the generated source goes to ``folder``."""
+    return runpy.run_path(str(BUILD))["ffibuilder"].distutils_extension(str(folder), verbose=False)
+
+
+def test_options_of_the_environment_come_last(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("HSV_CFLAGS", "-O0 -fsanitize=address")
-    extension = runpy.run_path(str(BUILD))["ffibuilder"].distutils_extension(verbose=False)
-    assert extension.extra_compile_args[-2:] == extension.extra_link_args == ["-O0", "-fsanitize=address"]
+    built = extension(tmp_path)
+    assert built.extra_compile_args[-2:] == built.extra_link_args == ["-O0", "-fsanitize=address"]
 
 
-def test_an_edited_header_makes_the_extension_outdated() -> None:
-    extension = runpy.run_path(str(BUILD))["ffibuilder"].distutils_extension(verbose=False)
-    assert {Path(name) for name in extension.depends} == set(BUILD.parent.glob("*.h"))
-    assert {*map(Path, extension.sources)} >= set(BUILD.parent.glob("*.c"))
+def test_every_source_is_compiled_and_every_header_can_make_the_extension_outdated(tmp_path: Path) -> None:
+    built = extension(tmp_path)
+    assert {*map(Path, built.sources)} == {*BUILD.parent.glob("*.c"), tmp_path / "hsv/core/_core.c"}
+    assert {*map(Path, built.depends)} == set(BUILD.parent.glob("*.h"))

@@ -14,10 +14,9 @@ import sys
 import time
 from typing import Any
 
-import numba
 import numpy as np
-from numba.core.registry import cpu_target
 
+from hsv.core import instruction_set
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
@@ -31,7 +30,6 @@ except ModuleNotFoundError:  # numpy 1.26
 
 def flown_on() -> dict[str, Any]:
     """Return what the flights must not depend on: versions, processor, and the bits of libm and of BLAS."""
-    _, processor, features = cpu_target.target_context.codegen().magic_tuple()
     points = np.linspace(0.1, 3.0, 2000)
     libm = [function(x) for function in (math.sin, math.cos, math.tan, math.exp, math.log) for x in points]
     matrix = np.sin(np.arange(64.0 * 64.0)).reshape(64, 64)
@@ -39,9 +37,7 @@ def flown_on() -> dict[str, Any]:
         "machine": platform.machine(),
         "python": platform.python_version(),
         "numpy": np.__version__,
-        "numba": numba.__version__,
-        "compiled for": processor,
-        "compiled with": sorted(name[1:] for name in features.split(",") if name.startswith("+")),
+        "instruction set": instruction_set(),
         "numpy dispatches to": [name for name in __cpu_dispatch__ if __cpu_features__[name]],
         "libm": hashlib.sha256(np.array(libm).tobytes()).hexdigest(),
         "blas": hashlib.sha256((matrix @ matrix).tobytes()).hexdigest(),

@@ -27,13 +27,11 @@ SCENARIOS = (
 """Both vehicle models and couplings, every law that solves no problem in flight, commands and faults of both cases."""
 
 
-def fly(environment: Environment | None = None, compiled: Path | None = None, **variables: str) -> dict[str, Any]:
+def fly(environment: Environment | None = None, **variables: str) -> dict[str, Any]:
     """Fly all of :data:`SCENARIOS`; return what :mod:`flight_fingerprints` prints.
 
     Args:
         environment: The Python to fly on; the project's own where none is given.
-        compiled: Folder for compiled code: with an empty one everything is compiled afresh. Without one, the
-            project's own Python takes what set-up has compiled for this processor.
         variables: Environment variables over the plain ones: nothing of this process' environment is handed on.
 
     Raises:
@@ -46,10 +44,8 @@ def fly(environment: Environment | None = None, compiled: Path | None = None, **
         "HSV_DESIGN_PATH": str(ROOT / "offline_design"),
         "OPENBLAS_NUM_THREADS": "1",
         "PYTHONDONTWRITEBYTECODE": "1",
-        "PYTHONPATH": os.pathsep.join([str(ROOT / "src" / "hsv"), chosen.packages]),
+        "PYTHONPATH": os.pathsep.join([chosen.library, chosen.packages]),
     }
-    if compiled:
-        plain["NUMBA_CACHE_DIR"] = str(compiled)
     done = subprocess.run(
         [*chosen.command, "-S", str(PROGRAM), *SCENARIOS], env=plain | variables, capture_output=True, text=True
     )

@@ -1,8 +1,8 @@
 """The stage that builds the packages of src/ and ros_ws/src with colcon, those that need it only.
 
 Packages are built with --symlink-install: a changed Python module is live at once. What needs a build is a changed
-interface, CMakeLists.txt, package.xml, setup.py or setup.cfg, a source or header in C, or a file that was added or removed
-outside the Python modules (launch files and other data are linked one by one).
+interface, CMakeLists.txt, package.xml, setup.py or setup.cfg, a changed source or header in C, or a file that was added
+or removed outside the Python modules (launch files and other data are linked one by one).
 """
 
 from __future__ import annotations
