@@ -2,7 +2,7 @@
 
     python3 tools/lock.py constraints.txt python3.11 python3.12
     python3 tools/lock.py constraints-jazzy.txt python3.12
-    python3 tools/lock.py constraints.txt python3.11 python3.12 --upgrade numba llvmlite
+    python3 tools/lock.py constraints.txt python3.11 python3.12 --upgrade cffi scipy
     python3 tools/lock.py constraints.txt python3.11 python3.12 --upgrade all
 
 Each interpreter resolves with its own pip (a dry run: nothing is installed). Pins of the existing file are kept

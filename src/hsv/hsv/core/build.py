@@ -15,6 +15,8 @@ from cffi import FFI
 FOLDER = Path(__file__).parent
 # Contraction of a * b + c would change the bits of a flight. gcc's own vectorisation only makes a flight slower.
 FLAGS = ["-std=gnu99", "-O3", "-g0", "-ffp-contract=off", "-fno-math-errno", "-fno-tree-vectorize"]
+# Vector types do not leave the core, so that their calling convention does not matter.
+FLAGS += ["-Wno-psabi"]
 
 compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC"))[0]
 if not shutil.which(compiler) or not Path(sysconfig.get_path("include"), "Python.h").is_file():
