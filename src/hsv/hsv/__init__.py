@@ -4,7 +4,6 @@ The names for notebooks and scripts are those of :mod:`hsv.api`: ``hsv.load``, `
 """
 
 import os
-import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -17,9 +16,6 @@ if TYPE_CHECKING:
     from hsv.api import sweep as sweep
 
     __version__: str
-
-IMPORTED_AT = time.time_ns()
-"""When the first module of this package was imported, in nanoseconds of the system's time."""
 
 # All matrices are small: threads in the linear algebra only wait for each other, and their number changes last bits.
 # Read once, when numpy is imported.

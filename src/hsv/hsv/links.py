@@ -1,4 +1,4 @@
-"""Links of the loop that are not ideal: payloads that come late, get lost or are corrupted, compiled.
+"""Links of the loop that are not ideal: payloads that come late, are lost or corrupted; see ``core/links.h``.
 
 There is a link from the sensors to the filter, the trajectory and the controller, and one from the controller to the
 fault injector. In every step something is sent and something is taken: the payload alone is withheld, never the message
@@ -16,13 +16,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.compiled import njit_in_flight
+from hsv.core import Data, doubles, lib, vector
 from hsv.errors import ParameterError
-from hsv.noise import STREAMS, uniforms
 from hsv.parameters import Parameter, check_all
 
 LONGEST_DELAY = 50
@@ -57,19 +56,18 @@ COMPUTATION_PARAMETER = Parameter(
 MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
 COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
 
-NEWEST, LOSING, BEGUN, GIVEN = range(4)
-"""Columns of the state: the step of the payload that was taken last; whether the one before was lost; whether there
-was a payload yet; from the last one on, the payload that was taken last, and then those that may still come."""
-
-_LOSS, _DELAY, _CORRUPTION = STREAMS["link_loss"], STREAMS["link_delay"], STREAMS["link_corruption"]
+_ACCEPTED = 3
+"""Numbers in the memory of a link before its payloads."""
 
 
-class LinkData(NamedTuple):
-    """A link for compiled functions: delays in steps, and probabilities.
+@dataclass(frozen=True, eq=False)
+class LinkData(Data):
+    """A link as the core takes it: delays in steps, and probabilities.
 
     Of a loss: ``loss`` in step 0, then ``loss_after_arrival`` and ``loss_after_loss``.
     """
 
+    KIND = "hsv_link"
     channel: int
     delay: int
     jitter: int
@@ -114,7 +112,7 @@ def command_link(values: Mapping[str, object], period: float) -> LinkData:
 def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
     v = check_all(_parameters(name), values)
     delay, jitter, loss, burst, corruption, checksum = v.values()
-    # Of a chain that is lossy for so long on average, and as often as is said (Gilbert 1960).
+    # A two-state Gilbert channel with the given mean burst length and loss rate (Gilbert 1960).
     least = max(1.0, loss / (1.0 - loss)) if loss < 1.0 else 1.0
     if burst and burst < least:
         raise ParameterError(f"parameter link.{name}.burst = {burst}: expected 0, or at least {least:.6g}")
@@ -133,80 +131,11 @@ def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
 
 
 def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> np.ndarray:
-    """Return the state of a ``link`` of payloads of so many numbers.
+    """Return the memory of a ``link`` of payloads of so many numbers.
 
-    ``before``: what was sent until the flight begins; the first payload of it where none is given.
+    ``before``: what was sent until the flight begins; None: the first payload of the flight.
     """
-    state = np.zeros(GIVEN + size * (link.delay + link.jitter + 2))
+    memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
     if before is not None:
-        _begin(state, before)
-    return state
-
-
-@njit_in_flight(error_model="numpy")
-def _begin(state: np.ndarray, payload: np.ndarray) -> None:
-    """Fill a link with one ``payload``."""
-    n = len(payload)
-    for i in range(len(state) - GIVEN):
-        state[GIVEN + i] = payload[i % n]
-    state[NEWEST] = -len(state)
-    state[BEGUN] = 1.0
-
-
-@njit_in_flight(error_model="numpy")
-def receive(link: Any, state: np.ndarray, step: int, seed: int, payload: np.ndarray) -> None:
-    """Replace the ``payload`` (n) that is sent in ``step`` by the one that the receiver then has.
-
-    Args:
-        link: :class:`LinkData`.
-        state: See :func:`link_state`, replaced.
-        step: k; steps follow one another from 0 on.
-        seed: Seed of the flight.
-        payload: Replaced.
-    """
-    if link.ideal:
-        return
-    n = len(payload)
-    if state[BEGUN] == 0.0:
-        _begin(state, payload)
-    slots = link.delay + link.jitter + 1
-    sent = GIVEN + n * (1 + step % slots)
-    for i in range(n):
-        state[sent + i] = payload[i]
-    newest = step - link.delay
-    if link.jitter > 0:
-        drawn, _ = uniforms(seed, step, _DELAY + link.channel)
-        newest -= int(drawn * (link.jitter + 1))
-    arrives = newest > state[NEWEST]
-    if link.loss > 0.0:
-        drawn, _ = uniforms(seed, step, _LOSS + link.channel)
-        due = link.loss_after_loss if state[LOSING] == 1.0 else link.loss_after_arrival
-        lost = drawn < (link.loss if step == 0 else due)
-        state[LOSING] = 1.0 if lost else 0.0
-        arrives = arrives and not lost
-    if arrives:
-        come = GIVEN + n * (1 + newest % slots)
-        if not link.corruption > 0.0 or _passes(link, state, come, n, step, seed):
-            for i in range(n):
-                state[GIVEN + i] = state[come + i]
-            state[NEWEST] = newest
-    for i in range(n):
-        payload[i] = state[GIVEN + i]
-
-
-@njit_in_flight(error_model="numpy")
-def _passes(link: Any, state: np.ndarray, come: int, n: int, step: int, seed: int) -> bool:
-    """Corrupt the payload at ``come``, if that is drawn; tell whether the receiver takes it."""
-    drawn, place = uniforms(seed, step, _CORRUPTION + link.channel)
-    if not drawn < link.corruption:
-        return True
-    if link.checksum:
-        return False
-    bit = int(place * (64 * n))
-    number = come + bit // 64
-    words, turned = state.view(np.uint64), np.uint64(1) << np.uint64(bit % 64)
-    words[number] ^= turned
-    if abs(state[number]) <= LARGEST:
-        return True
-    words[number] ^= turned  # it may come again, late
-    return False
+        lib.hsv_fill_link(doubles(memory), len(memory), doubles(vector(before)), size)
+    return memory

@@ -1,4 +1,4 @@
-"""Sensors: from the state to what is measured of it, channel by channel, compiled.
+"""Sensors: from the state to its measurement, channel by channel; see ``core/sensors.h``.
 
 A measurement is y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n))))): scale factor and lag of the sensor,
 bias and noise, latency of whole samples, samples that are lost and held, quantisation, range, and at last what fails. A
@@ -10,23 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit_in_flight
+from hsv.core import dtype
 from hsv.elementary import exponential
 from hsv.errors import ParameterError
-from hsv.faults.laws import ACTING, CHANNEL, CODE, KEPT, ONSET, PARAMETER, START, begin_faults
-from hsv.faults.table import (
-    SENSOR_BIAS,
-    SENSOR_DROP_OUT,
-    SENSOR_FREEZE,
-    SENSOR_NOISE,
-    SENSOR_RUNAWAY,
-    SENSOR_SCALE,
-)
-from hsv.noise import STREAMS, normals, uniforms
 from hsv.parameters import Parameter, check_all
 from hsv.units import readable
 from hsv.vehicle.dynamics import N_STATES, STATE_NAMES, STATE_UNITS
@@ -133,19 +123,8 @@ SENSOR_PARAMETERS = (
 )
 """Empty: as the set has it."""
 
-LAGGED, DRIFT, WALK, BIAS, SCALE, HELD, GIVEN, QUEUE = range(8)
-"""Columns of the state: the lagged signal; the Gauss-Markov bias and the random walk; bias and scale that were drawn;
-the last sample that was not lost; the last measurement; from the last one on, samples on their way."""
-
-SENSOR_STATE = QUEUE + LONGEST_LATENCY + 1
-"""Numbers in the state of a channel."""
-
-_NOISE, _CONSTANTS, _DROP_OUT = STREAMS["sensor_noise"], STREAMS["sensor_constants"], STREAMS["sensor_drop_out"]
-_FAULT_NOISE, _FAULT_DROP_OUT = STREAMS["sensor_fault_noise"], STREAMS["sensor_fault_drop_out"]
-
-
 class SensorData(NamedTuple):
-    """Sensors for compiled functions, an entry a state (9); ``on`` where a sensor is not ideal.
+    """Sensors as the core takes them, an entry a state (9); ``on`` where a sensor is not ideal.
 
     Lag and drift as shares that remain over a period, the random walk per root of a period.
     """
@@ -228,128 +207,5 @@ def _one(name: str, given: list[float], standard: float) -> float:
 
 
 def sensor_state() -> np.ndarray:
-    """Return room for the state (9, :data:`SENSOR_STATE`) of the sensors, which step 0 fills."""
-    return np.zeros((N_STATES, SENSOR_STATE))
-
-
-@njit_in_flight(error_model="numpy")
-def measure(
-    data: Any,
-    state: np.ndarray,
-    rows: Any,
-    memory: np.ndarray,
-    step: int,
-    seed: int,
-    x: np.ndarray,
-    measurement: np.ndarray,
-) -> None:
-    """Write into ``measurement`` (9) the output of the sensors for the state ``x`` (9) in ``step``.
-
-    Args:
-        data: :class:`SensorData`.
-        state: See :func:`sensor_state`, replaced.
-        rows: Faults of sensors, see :mod:`hsv.faults.laws`.
-        memory: Theirs, replaced.
-        step: k; steps follow one another from 0 on.
-        seed: Seed of the flight.
-        x: The truth.
-        measurement: Written.
-    """
-    failing = begin_faults(rows, memory, step, seed)
-    pitch_error = 0.0
-    for back in range(N_STATES):
-        i = N_STATES - 1 - back  # the error of the pitch angle is known before the angle of attack's
-        if data.on[i]:
-            error = _error(data, state, i, step, seed)
-            if i == PITCH:
-                pitch_error = error
-            elif i == ALPHA and data.inertial_angle_of_attack:
-                error += pitch_error
-            measurement[i] = _sampled(data, state, i, step, seed, x[i], error)
-        else:
-            measurement[i] = x[i]
-    if failing > 0:
-        for j in range(len(rows.table)):
-            if memory[j, ACTING] == 1.0:
-                i = int(rows.table[j, CHANNEL])
-                measurement[i] = _failed(rows, memory, j, step, seed, measurement[i], state[i, GIVEN])
-    for i in range(N_STATES):
-        state[i, GIVEN] = measurement[i]
-
-
-@njit_in_flight(error_model="numpy", inline="always")
-def _error(data: Any, state: np.ndarray, i: int, step: int, seed: int) -> float:
-    """Return bias and noise of a step; draw what is drawn once in step 0."""
-    if step == 0:
-        first, second = normals(seed, 0, _CONSTANTS + i)
-        state[i, BIAS] = data.bias[i] + data.bias_sigma[i] * first
-        state[i, SCALE] = data.scale[i] + data.scale_sigma[i] * second
-        state[i, WALK] = 0.0
-    error = state[i, BIAS]
-    if data.noise[i] > 0.0 or data.drift_sigma[i] > 0.0:
-        white, driving = normals(seed, step, _NOISE + i)
-        error += data.noise[i] * white
-        if data.drift_sigma[i] > 0.0:
-            decay = data.drift_decay[i]
-            if step == 0:
-                state[i, DRIFT] = data.drift_sigma[i] * driving
-            else:
-                share = np.sqrt(max(1.0 - decay * decay, 0.0))
-                state[i, DRIFT] = decay * state[i, DRIFT] + data.drift_sigma[i] * share * driving
-            error += state[i, DRIFT]
-    if data.walk[i] > 0.0 and step > 0:
-        driving, _ = normals(seed, step, _NOISE + i, 1)
-        state[i, WALK] += data.walk[i] * driving
-    return error + state[i, WALK]
-
-
-@njit_in_flight(error_model="numpy", inline="always")
-def _sampled(data: Any, state: np.ndarray, i: int, step: int, seed: int, x: float, error: float) -> float:
-    """Return the measurement of a sensor that works."""
-    true = (1.0 + state[i, SCALE]) * x
-    state[i, LAGGED] = true if step == 0 else true + data.lag_decay[i] * (state[i, LAGGED] - true)
-    value = state[i, LAGGED] + error
-    if data.latency[i] > 0:
-        size = data.latency[i] + 1
-        if step == 0:
-            for j in range(size):
-                state[i, QUEUE + j] = value
-        state[i, QUEUE + step % size] = value
-        value = state[i, QUEUE + (step + 1) % size]
-    if data.drop_out[i] > 0.0 and step > 0:
-        drawn, _ = uniforms(seed, step, _DROP_OUT + i)
-        if drawn < data.drop_out[i]:
-            return state[i, HELD]
-    if data.quantum[i] > 0.0:
-        value = data.quantum[i] * float(math.floor(value / data.quantum[i] + 0.5))
-    state[i, HELD] = min(max(value, data.minimum[i]), data.maximum[i])
-    return state[i, HELD]
-
-
-@njit_in_flight(error_model="numpy", inline="always")
-def _failed(rows: Any, memory: np.ndarray, j: int, step: int, seed: int, value: float, given: float) -> float:
-    """Return what becomes of a measurement; ``given`` is the one of the step before."""
-    code, first = int(rows.table[j, CODE]), rows.table[j, PARAMETER]
-    fresh = memory[j, ONSET] == step
-    if code == SENSOR_SCALE:
-        return first * value
-    if code == SENSOR_NOISE:
-        drawn, _ = normals(seed, step, _FAULT_NOISE + int(rows.table[j, CHANNEL]), rows.table[j, START])
-        return value + first * drawn
-    if code == SENSOR_BIAS:
-        return value + first
-    if code == SENSOR_RUNAWAY:
-        limit = rows.table[j, PARAMETER + 1]
-        return value + min(max(first * ((step - rows.table[j, START]) * rows.period), -limit), limit)
-    if code == SENSOR_DROP_OUT:
-        if fresh:
-            memory[j, KEPT] = given if step > 0 else value
-        drawn, _ = uniforms(seed, step, _FAULT_DROP_OUT + int(rows.table[j, CHANNEL]), rows.table[j, START])
-        if drawn >= first:
-            memory[j, KEPT] = value
-        return memory[j, KEPT]
-    if code == SENSOR_FREEZE:
-        if fresh:
-            memory[j, KEPT] = value
-        return memory[j, KEPT]
-    return value
+    """Return room (9) for what the sensors remember, which step 0 fills."""
+    return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import base64
-import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import njit
-from hsv.lanes import LaneArray, choose, every
+from hsv.core import doubles, ffi, lib
 from hsv.simulation.metrics import FlightCurves
 
 WINDOWS = 400
@@ -42,33 +40,6 @@ def signals(flight: FlightCurves) -> np.ndarray:
     return flight.curves[: len(SIGNALS)]
 
 
-@njit(cache=True)
-def _add(curves: Any, starts: np.ndarray, low: Any, high: Any, total: Any, count: np.ndarray) -> None:
-    """Take ``curves`` (steps) into least and largest value, and, of whole windows, into sum and number (windows).
-
-    Each signal has a lane.
-    """
-    steps = len(curves)
-    for window in range(len(starts)):
-        start, stop = starts[window], steps
-        if window + 1 < len(starts):
-            stop = min(starts[window + 1], steps)
-        if start >= stop:
-            return
-        least, largest = low[window], high[window]
-        sums = 0.0
-        for k in range(start, stop):
-            value = curves[k]
-            sums += value
-            finite = math.isfinite(value)
-            least = choose(finite, min(least, value), least)
-            largest = choose(finite, max(largest, value), largest)
-        low[window], high[window] = least, largest
-        if every(math.isfinite(sums)):
-            total[window] += sums / (stop - start)
-            count[window] += 1.0
-
-
 @dataclass
 class Envelope:
     """Least and largest value, sum of the windows' mean values (windows, signals), and number of flights (windows)."""
@@ -86,9 +57,16 @@ class Envelope:
 
     def add(self, flight: FlightCurves, steps: int) -> None:
         """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
-        starts = window_starts(steps, len(self.count))
-        lanes = LaneArray(self.low), LaneArray(self.high), LaneArray(self.total)
-        _add(LaneArray(signals(flight), split=True), starts, *lanes, self.count)
+        starts, curves = window_starts(steps, len(self.count)), signals(flight)
+        stride = curves.strides[0] // curves.itemsize
+        lib.hsv_envelope(
+            *curves.shape,
+            stride,
+            ffi.cast("double *", curves.ctypes.data),
+            len(starts),
+            ffi.from_buffer("int64_t[]", starts),
+            *map(doubles, (self.low, self.high, self.total, self.count)),
+        )
 
     def merge(self, other: Envelope) -> None:
         """Take in all flights of ``other``."""

@@ -10,8 +10,6 @@ from hsv.campaign.envelope import Envelope
 from hsv.campaign.executors import Executor
 from hsv.campaign.store import ResultStore
 from hsv.campaign.table import fly_batch, schema, seconds_of, time_flight
-from hsv.compiled import ENABLED
-from hsv.errors import RunError
 
 _LATE = 30.0
 """Seconds: where a batch takes longer, the announcement does not wait for the first batches."""
@@ -39,11 +37,8 @@ def run_campaign(
             have built what their flights share.
 
     Raises:
-        RunError: Functions are not compiled.
         CampaignError, RunError: See :class:`hsv.campaign.store.ResultStore` and :mod:`hsv.campaign.executors`.
     """
-    if not ENABLED:
-        raise RunError("NUMBA_DISABLE_JIT: expected 0, or not set; the flights of a campaign are read by compiled code")
     flown = 0
     with store.opened(restart) as finished:
         if store.out.exists():

@@ -16,10 +16,9 @@ from hsv.campaign.tube_levels import TubeLevels
 from hsv.campaign.variants import FlightVariants
 from hsv.control.controller import Controller
 from hsv.control.library import library_digest
+from hsv.core import lanes
 from hsv.errors import CampaignError, ControllerError, ScenarioError
-from hsv.lane_types import WIDTH
 from hsv.simulation.closed_loop import Components, fly
-from hsv.simulation.fingerprint import fingerprints
 from hsv.simulation.flight import Flight
 from hsv.simulation.metrics import FlightData, flight_metrics
 from hsv.simulation.side_by_side import FlightGroup
@@ -70,15 +69,12 @@ class SampleRunner:
         Raises:
             ScenarioError: As above.
         """
-        for start in range(0, len(flights), WIDTH):
-            drawn = zip(flights[start : start + WIDTH], samples[start : start + WIDTH], strict=True)
+        width = lanes()
+        for start in range(0, len(flights), width):
+            drawn = zip(flights[start : start + width], samples[start : start + width], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
-            if FlightReader.takes(components):
+            if FlightGroup.takes(components):
                 yield from self._reader.read(components)
-            elif FlightGroup.takes(components):
-                flown = self._group.fly(components)
-                digests = fingerprints([flight.history.flown for flight in flown])
-                yield from map(self._reading, flown, digests)
             else:
                 yield from map(self._flown_or_error, components)
 
@@ -86,17 +82,10 @@ class SampleRunner:
     def _reader(self) -> FlightReader:
         return FlightReader(self.steps, self._levels)  # whose memory is kept
 
-    @cached_property
-    def _group(self) -> FlightGroup:
-        return FlightGroup(self.steps)  # whose memory is kept
-
-    def _reading(self, flight: Flight, digest: str) -> FlightReading:
-        data = flight.data()
-        return FlightReading.of(data, self.level(data), digest)
-
     def _flown_alone(self, components: Components) -> FlightReading:
         flight = fly(components)
-        return self._reading(flight, flight.fingerprint)
+        data = flight.data()
+        return FlightReading.of(data, self.level(data), flight.fingerprint)
 
     def _flown_or_error(self, components: Components) -> FlightReading | ControllerError:
         try:
@@ -128,8 +117,8 @@ class SampleRunner:
         parts = self._variants.unchanged
         plant = copy(parts.plant)
         plant.steps = steps
-        pieces = [replace(parts, plant=plant)] * WIDTH
-        if not FlightReader.takes(pieces):
+        pieces = [replace(parts, plant=plant)] * lanes()
+        if not FlightGroup.takes(pieces):
             return [self._flown_alone(pieces[0])]
         return FlightReader(steps, self._levels).read(pieces)
 

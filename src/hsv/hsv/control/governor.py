@@ -12,16 +12,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import njit
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_law import NominalData, nominal_input
-from hsv.control.nominal_trajectory import LAWS, NominalTrajectory, nominal_advance
+from hsv.control.nominal_law import NominalData
+from hsv.control.nominal_trajectory import LAWS, NominalTrajectory
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.reference_trajectory import TRIMS, Corner, ReferenceTrajectory
+from hsv.core import doubles, lib, vector
 from hsv.errors import GovernorError, TrimError
 from hsv.vehicle.actuators import ActuatorData, actuator_data
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
@@ -244,7 +244,13 @@ class Governor:
         rows = self._steps(corners[-1].time + corners[-1].blend + AFTERWARDS) - beginning.step
         plan, deviation = np.empty((rows, N_INPUTS)), np.empty((rows, N_STATES))
         reference = self.trajectory(corners).data
-        held = _plan(self._nominal, reference, beginning.step, beginning.deviation, plan, deviation)
+        held = lib.hsv_plan(
+            self._nominal.pointer,
+            reference.pointer,
+            beginning.step,
+            rows,
+            *map(doubles, (vector(beginning.deviation), plan, deviation)),
+        )
         return plan, deviation, bool(held)
 
     def _steps(self, time: float) -> int:
@@ -326,28 +332,3 @@ class CommandGovernor:
         )
         trajectory.change_reference(self._governor.trajectory(found.corners))
         return first, found.end
-
-
-@njit(cache=True)
-def _plan(nominal: Any, reference: Any, first: int, start: np.ndarray, plan: np.ndarray, deviation: np.ndarray) -> bool:
-    """Write u_r + u_n (k, 2) and x_n (k, 9) from step ``first`` on, where x_n is ``start`` (9), scheduled by x_r + x_n.
-
-    Returns whether x_n stayed in the family.
-    """
-    n, m = deviation.shape[1], plan.shape[1]
-    x_n, u_n, defect = start.copy(), np.empty(m), np.empty(n)
-    weights, S, new = np.empty(len(nominal.polytope.S)), np.empty(nominal.polytope.S.shape[1]), np.empty(n)
-    last = len(reference.state) - 1
-    held = True
-    for k in range(len(plan)):
-        row = min(max(first + k - reference.first, 0), last)
-        for i in range(n):
-            deviation[k, i] = x_n[i]
-            defect[i] = reference.defect[row, i]
-        _, inside = nominal_input(nominal, x_n, u_n)
-        held = held and inside
-        for i in range(m):
-            plan[k, i] = reference.input[row, i] + u_n[i]
-        altitude, velocity = reference.state[row, 0] + x_n[0], reference.state[row, 1] + x_n[1]
-        nominal_advance(nominal.polytope, altitude, velocity, x_n, u_n, defect, weights, S, new)
-    return held

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntFlag
-from typing import Any, NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from hsv.compiled import bound, njit_in_flight
-from hsv.lanes import choose, every, lanes_in, least, most
+from hsv.core import Data, doubles, ffi, lib, vector
 from hsv.lpv.polytope import PolytopeData
 
 MEMBERSHIP_TOLERANCE = 1e-6
-"""Relative slack of x' P x <= 1: the first deviation lies on the boundary of the outermost ellipsoid by design."""
+"""Relative slack of x' P x <= 1, as in ``core/nominal.h``: the first deviation lies on the outermost boundary."""
 
 NOT_IN_FAMILY = 255
 """Index of a gain that was found in flight."""
@@ -29,12 +28,14 @@ class NominalStatus(IntFlag):
     FAMILY_FALLBACK = 8
 
 
-class NominalData(NamedTuple):
-    """Polytope, gains K (g, 2, n) and ellipsoids P (g, s, s) for compiled functions, outermost first.
+@dataclass(frozen=True, eq=False)
+class NominalData(Data):
+    """Polytope, gains K (g, 2, 9) and ellipsoids P (g, 5, 5) as the core takes them, outermost first.
 
     ``interpolated``: whether the gain between two ellipsoids is one between theirs, or that of the outer one.
     """
 
+    KIND = "hsv_nominal"
     polytope: PolytopeData
     gains: np.ndarray
     ellipsoids: np.ndarray
@@ -58,7 +59,7 @@ class NominalLaw(Protocol):
     """A nominal law: deterministic, stepped once a control period."""
 
     compiled_with_loop: bool
-    """Whether it is the nested family, whose step the compiled loop has in itself."""
+    """Whether it is the nested family, which the core has in its loop."""
 
     def reset(self) -> None:
         """Forget the past."""
@@ -67,55 +68,9 @@ class NominalLaw(Protocol):
         """Return the nominal input for x_n (9), ``deviation``."""
 
 
-@njit_in_flight(inline="always")
-def level(ellipsoid: np.ndarray, x: Any) -> Any:
+def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     """Return x' P x over the first states, as many as P (s, s) has rows."""
-    total = 0.0
-    for i in range(ellipsoid.shape[0]):
-        row = 0.0
-        for j in range(ellipsoid.shape[0]):
-            row += ellipsoid[i, j] * x[j]
-        total += x[i] * row
-    return total
-
-
-@njit_in_flight(error_model="numpy")
-def nominal_input(data: Any, deviation: Any, u_n: Any) -> Any:
-    """Write u_n = K x_n of the smallest ellipsoid around ``deviation``; return its index and whether there is one.
-
-    Interpolated, K = a K_i + (1 - a) K_j, of that ellipsoid i and the next one inside, j, which does not hold x_n: with
-    x' (a P_i + (1 - a) P_j) x = 1, a is 1 on the boundary of i and 0 on that of j, so that u_n is continuous (Wan and
-    Kothare, Automatica 39, 2003). Without gains u_n is zero.
-    """
-    boundary = 1.0 + MEMBERSHIP_TOLERANCE
-    index, held, beyond = 0.0, 0.0, 0.0
-    inside = len(data.gains) == 0
-    for g in range(len(data.ellipsoids) - 1, -1, -1):
-        value = level(data.ellipsoids[g], deviation)
-        now = choose(inside, False, value <= boundary)
-        index = choose(now, g, index)
-        held = choose(now, value, held)
-        inside = inside | now
-        if every(inside):
-            break
-        beyond = choose(inside, beyond, value)
-    for i in range(len(u_n)):
-        u_n[i] = 0.0
-    first = int(least(index))
-    last = first if lanes_in(index) == 1 else int(most(index))
-    for g in range(first, min(last + 1, len(data.gains))):
-        for i in range(len(u_n)):
-            total = 0.0
-            for j in range(len(deviation)):
-                total += data.gains[g, i, j] * deviation[j]
-            if data.interpolated and g + 1 < len(data.gains):
-                share = (beyond - boundary) / (beyond - held)
-                inner = 0.0
-                for j in range(len(deviation)):
-                    inner += data.gains[g + 1, i, j] * deviation[j]
-                total = choose(inside, inner + share * (total - inner), total)
-            u_n[i] = choose(index == g, total, u_n[i])
-    return index, inside
+    return float(lib.hsv_level(doubles(vector(ellipsoid)), len(ellipsoid), doubles(vector(x))))
 
 
 class FamilyLaw:
@@ -128,16 +83,15 @@ class FamilyLaw:
 
     def __init__(self, data: NominalData) -> None:
         self.data = data
-        self._nominal_input = bound(nominal_input)
 
     def reset(self) -> None:
         """Nothing to forget."""
 
     def step(self, deviation: np.ndarray) -> LawResult:
         """Return the nominal input for x_n (9)."""
-        u_n = np.empty(self.data.gains.shape[1])
-        found, inside = self._nominal_input(self.data, np.ascontiguousarray(deviation, float), u_n)
-        index = int(found)
+        u_n, found = np.empty(self.data.gains.shape[1]), ffi.new("double *")
+        inside = lib.hsv_nominal_input(self.data.pointer, doubles(vector(deviation)), doubles(u_n), found)
+        index = int(found[0])
         status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
         gain = self.data.gains[index] if len(self.data.gains) else np.empty(0)
         return LawResult(u_n, gain, index, status)

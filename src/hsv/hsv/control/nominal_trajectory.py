@@ -7,14 +7,13 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import bound, njit_in_flight
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
+from hsv.core import doubles, lib
 from hsv.errors import ParameterError
-from hsv.lanes import weighted_sum
-from hsv.lpv.polytope import AxisWeights, PolytopeData, vertex_weights
+from hsv.lpv.polytope import AxisWeights, PolytopeData
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.actuators import ACTUATOR_PARAMETERS
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
@@ -26,39 +25,6 @@ NOMINAL_PARAMETERS = (
     *REFERENCE_PARAMETERS,
     Parameter("nominal.law", "family", "nested gains, the same LMI solved in flight, or a QP", choices=LAWS),
 )
-
-
-@njit_in_flight()
-def nominal_advance(
-    polytope: Any,
-    altitude: Any,
-    velocity: Any,
-    deviation: Any,
-    u_n: Any,
-    defect: Any,
-    weights: Any,
-    S: Any,
-    new: Any,
-) -> Any:
-    """Replace ``deviation`` x_n (n) by A(p) x_n + B(p) u_n + d_r (paper eq. 20, eq. 46), p the measured h and V.
-
-    ``defect`` d_r (n) is that of the reference (:mod:`hsv.control.reference_trajectory`); ``weights`` (r),
-    ``S`` (e) and ``new`` (n) are scratch. Returns whether p lay inside the envelope.
-    """
-    inside = vertex_weights(polytope, altitude, velocity, weights)
-    weighted_sum(weights, polytope.S, S)
-    n, m = len(deviation), len(u_n)
-    entries, starts = polytope.entries, polytope.starts
-    for i in range(n):
-        total = 0.0
-        for e in range(starts[2 * i], starts[2 * i + 1]):
-            total += S[e] * deviation[entries[e] - i * (n + m)]
-        for e in range(starts[2 * i + 1], starts[2 * i + 2]):
-            total += S[e] * u_n[entries[e] - i * (n + m) - n]
-        new[i] = total + defect[i]
-    for i in range(n):
-        deviation[i] = new[i]
-    return inside
 
 
 class NominalResult(NamedTuple):
@@ -92,17 +58,9 @@ class NominalTrajectory:
         self.data = nominal_data(design) if design else NO_NOMINAL
         self.law = law or FamilyLaw(self.data)
         self._deviation = np.zeros(N_STATES)
-        vertices, entries = self.data.polytope.S.shape
-        self._scratch = np.empty(vertices), np.empty(entries), np.empty(N_STATES)
         self._step = 0
         self._planned = reference
         self._input = np.zeros(N_INPUTS)
-        self._nominal_advance = bound(nominal_advance)
-        # Compile now: a cold cache must not stall a flight.
-        FamilyLaw(self.data).step(self._deviation)
-        if len(self.data.gains):
-            given = np.zeros(N_STATES), self._input, reference.data.defect[0]
-            self._nominal_advance(self.data.polytope, *reference.data.state[0, :2], *given, *self._scratch)
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], design: ControlDesign | None = None) -> Self:
@@ -149,22 +107,24 @@ class NominalTrajectory:
     def step(self, state: np.ndarray) -> NominalResult:
         """Return reference and nominal state of this step from the measured ``state`` (9), then advance x_n."""
         row = self.reference.row(self._step)
-        _, references, reference_inputs, defects = self.reference.data
-        reference = references[row]
+        data = self.reference.data
+        reference = data.state[row]
         if self._step == 0 and len(self.data.gains):
             self._deviation[:] = state - reference
         self._step += 1
         deviation = self._deviation.copy()
         chosen = self.law.step(deviation)
-        own = self._deviation, self._input
         self._input[:] = chosen.input
-        in_envelope = not len(self.data.gains) or self._nominal_advance(
-            self.data.polytope, state[0], state[1], *own, defects[row], *self._scratch
+        in_envelope = not len(self.data.gains) or lib.hsv_nominal_advance(
+            self.data.polytope.pointer,
+            state[0],
+            state[1],
+            *map(doubles, (self._deviation, self._input, data.defect[row])),
         )
         status = chosen.status if in_envelope else chosen.status | NominalStatus.OUTSIDE_ENVELOPE
         return NominalResult(
             reference,
-            reference_inputs[row],
+            data.input[row],
             deviation,
             chosen.input,
             chosen.gain,
@@ -185,7 +145,7 @@ NO_NOMINAL = NominalData(
 
 
 def nominal_data(design: ControlDesign) -> NominalData:
-    """Return the nominal system and the nested family of ``design`` for compiled functions."""
+    """Return the nominal system and the nested family of ``design`` as the core takes them."""
     return NominalData(design.polytope.data(), design.nominal_gains, design.nominal_ellipsoids, design.interpolated)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import bound, njit_in_flight
 from hsv.control.estimator import Estimator
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.core import Data, doubles, lib
 from hsv.elementary import tangent
 from hsv.elimination import solve
 from hsv.errors import ParameterError
@@ -67,8 +67,11 @@ def default_sections() -> tuple[NotchSection, ...]:
     return flown_sections({})
 
 
-class NotchData(NamedTuple):
-    """Discrete sections in series for compiled functions: A (n, 2, 2), B, C (n, 2), D (n), G (n, 2): rest per input."""
+@dataclass(frozen=True, eq=False)
+class NotchData(Data):
+    """Sections in series: A (n, 2, 2), B, C (n, 2), D (n), and G (n, 2), the equilibrium for an input of one."""
+
+    KIND = "hsv_notch"
 
     A: np.ndarray
     B: np.ndarray
@@ -171,26 +174,6 @@ def series(data: NotchData) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     return A, B, C, D
 
 
-@njit_in_flight()
-def rest(data: Any, value: Any, state: Any) -> None:
-    """Write into ``state`` (2 n) the equilibrium of all sections for a constant input ``value``."""
-    for i in range(len(data.D)):
-        state[2 * i] = data.G[i, 0] * value
-        state[2 * i + 1] = data.G[i, 1] * value
-
-
-@njit_in_flight()
-def filter_step(data: Any, state: Any, value: Any) -> Any:
-    """Return the filtered ``value`` from ``state`` (2 n), then update ``state``: y = C s + D v, s = A s + B v."""
-    for i in range(len(data.D)):
-        a, b = state[2 * i], state[2 * i + 1]
-        output = data.C[i, 0] * a + data.C[i, 1] * b + data.D[i] * value
-        state[2 * i] = data.A[i, 0, 0] * a + data.A[i, 0, 1] * b + data.B[i, 0] * value
-        state[2 * i + 1] = data.A[i, 1, 0] * a + data.A[i, 1, 1] * b + data.B[i, 1] * value
-        value = output
-    return value
-
-
 def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     """Return the sections of the filter in flight: those of the flight if given, else those of the design.
 
@@ -233,10 +216,6 @@ class NotchFilter:
         self.data = discretise(sections, period)
         self._state = np.zeros(2 * len(sections))
         self._started = False
-        self._filter = bound(filter_step)
-        # Compile now: a cold cache must not stall a flight.
-        self.step(0.0)
-        self.reset()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
@@ -259,7 +238,7 @@ class NotchFilter:
     def step(self, pitch_rate: float) -> NotchResult:
         """Filter the next ``pitch_rate`` (rad/s)."""
         if not self._started:
-            rest(self.data, pitch_rate, self._state)
+            lib.hsv_notch_rest(self.data.pointer, pitch_rate, doubles(self._state))
             self._started = True
         before = self._state.copy()
-        return NotchResult(self._filter(self.data, self._state, pitch_rate), before)
+        return NotchResult(lib.hsv_notch_step(self.data.pointer, doubles(self._state), pitch_rate), before)

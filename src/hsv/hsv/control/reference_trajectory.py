@@ -22,18 +22,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple, Self
+from dataclasses import dataclass
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import njit
-from hsv.elementary import arcsine
+from hsv.core import Data, doubles, lib, vector
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, vehicle_struct
 from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.trim import CONVERGED, INITIAL_GUESS, balance, check_equilibrium
+from hsv.vehicle.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
 from hsv.vehicle.vehicle import Vehicle
 
 TRIMS = ("climbing", "static")
@@ -68,59 +67,22 @@ class Corner(NamedTuple):
     blend: float
 
 
-class ReferenceData(NamedTuple):
-    """Rows for compiled functions: x_r (r, 9), u_r (r, 2), d_r (r, 9); row 0 is that of step ``first``.
+@dataclass(frozen=True, eq=False)
+class ReferenceData(Data):
+    """x_r (r, 9), u_r (r, 2), d_r (r, 9) as the core takes them; row 0 is that of step ``first``.
 
     The reference stands still before the first row and after the last.
     """
 
+    KIND = "hsv_reference"
     first: int
     state: np.ndarray
     input: np.ndarray
     defect: np.ndarray
 
-
-@njit(cache=True)
-def _trimmed(
-    rigid: Any,
-    command: np.ndarray,
-    rate: np.ndarray,
-    bend: np.ndarray,
-    period: float,
-    guess: np.ndarray,
-    state: np.ndarray,
-    inputs: np.ndarray,
-    defect: np.ndarray,
-    size: np.ndarray,
-    work: np.ndarray,
-) -> None:
-    """Fill x_r, u_r, d_r and the imbalance (r) of the equilibria.
-
-    They are those of altitude and velocity (r, 2), their rates, and ``bend`` (r), the rate of the climb rate.
-    """
-    rows = len(command)
-    for k in range(rows):
-        if k > 0 and np.all(command[k] == command[k - 1]) and np.all(rate[k] == rate[k - 1]):
-            state[k], inputs[k], size[k] = state[k - 1], inputs[k - 1], size[k - 1]
-            continue
-        state[k, 0], state[k, 1] = command[k, 0], command[k, 1]
-        sine = rate[k, 0] / command[k, 1]
-        if not abs(sine) < 1.0:
-            size[k] = np.inf
-            continue
-        # The trim next to this one is near, but only a fixed start gives the same bits whatever came before.
-        unknown = guess.copy()
-        turn = bend[k] / (command[k, 1] * np.sqrt(1.0 - sine * sine))
-        size[k] = balance(rigid, arcsine(sine), rate[k, 1], unknown, state[k], inputs[k], turn)
-    for k in range(rows):
-        defect[k] = 0.0
-        if k + 1 < rows and not (
-            np.all(command[k] == command[k + 1]) and np.all(rate[k] == 0.0) and np.all(rate[k + 1] == 0.0)
-        ):
-            flown = state[k].copy()
-            advance(flown, inputs[k], rigid, period, SUBSTEPS, work)
-            for i in range(len(flown)):
-                defect[k, i] = flown[i] - state[k + 1, i]
+    def rows(self, chosen: np.ndarray | slice) -> ReferenceData:
+        """Return the chosen rows, the first of which is that of step 0."""
+        return ReferenceData(0, self.state[chosen], self.input[chosen], self.defect[chosen])
 
 
 class ReferenceTrajectory:
@@ -167,12 +129,18 @@ class ReferenceTrajectory:
         self.data = ReferenceData(
             first, np.zeros((rows, N_STATES)), np.zeros((rows, N_INPUTS)), np.zeros((rows, N_STATES))
         )
-        self._along = ReferenceData(0, *(column[:0] for column in self.data[1:]))
+        self._along = self.data.rows(slice(0))
         self.corners = tuple(map(Corner, *(map(float, column) for column in (times, altitudes, velocities, blends))))
         """The commands, one corner after the other."""
-        size = np.full(rows, np.inf)
-        _, state, inputs, defect = self.data
-        _trimmed(rigid, command, rate, bend, period, INITIAL_GUESS, state, inputs, defect, size, workspace())
+        size, inputs = np.full(rows, np.inf), self.data.input
+        lib.hsv_reference_rows(
+            vehicle_struct(rigid).pointer,
+            rows,
+            *map(doubles, map(vector, (command, rate, bend, INITIAL_GUESS))),
+            period,
+            SUBSTEPS,
+            *map(doubles, (self.data.state, inputs, self.data.defect, size)),
+        )
         good = (size < CONVERGED) & np.all((inputs >= rigid.input_minimum) & (inputs <= rigid.input_maximum), axis=1)
         for row in np.flatnonzero(~good)[:1]:
             climb, acceleration = rate[row]
@@ -212,7 +180,7 @@ class ReferenceTrajectory:
         along = self._along
         if len(along.state) != steps:
             rows = self.rows(steps)
-            self._along = along = ReferenceData(0, *(column[rows] for column in self.data[1:]))
+            self._along = along = self.data.rows(rows)
         return along
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
-from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, memory_of, tube_step, watch_of
+from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_memory, tube_step
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import N_RIGID
@@ -44,9 +44,7 @@ class RobustMpc(Controller):
         self.kernel = TubeData(
             gains[gain_index][None], np.zeros(1, np.int64), *limits, False, False, no_notch, 0.0, design.period
         )
-        self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
-        x, u = np.zeros(gains.shape[2]), np.zeros(gains.shape[1])
-        self.step(ControllerInput(0, x, 0.0, x, u, x, u, np.empty(0)))  # compile now: a cold cache must not stall
+        self._memory = tube_memory()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
@@ -65,8 +63,7 @@ class RobustMpc(Controller):
 
         The nominal trajectory is not used, there is no set, and the error is the deviation from the reference.
         """
-        u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        tube_step(self.kernel, self._memory, self._watch, inputs.step, False, *inputs[1:], u_feedback, total, u)
+        feedback, total, u, _ = tube_step(self.kernel, self._memory, inputs, monitored=False)
         finite = math.isfinite(total[0]) and math.isfinite(total[1])
         return TubeResult(
             input=u,
@@ -77,7 +74,7 @@ class RobustMpc(Controller):
             level=math.nan,
             inside=False,
             component="",
-            u_feedback=u_feedback,
+            u_feedback=feedback,
             u_nominal=np.zeros(2),
             tau=np.ones(1),
             status=TubeStatusCode.NO_SET if finite else TubeStatusCode.INVALID_INPUT,

@@ -16,7 +16,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import bound, njit_in_flight
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
@@ -25,10 +24,7 @@ from hsv.control.effectiveness import (
     Effectiveness,
     EffectivenessData,
     effectiveness_data,
-    effectiveness_hold,
     effectiveness_in,
-    effectiveness_shape,
-    effectiveness_step,
 )
 from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
 from hsv.control.nominal_law import level
@@ -37,14 +33,13 @@ from hsv.control.notch_filter import (
     NotchData,
     NotchSection,
     discretise,
-    filter_step,
     flown_sections,
 )
 from hsv.control.tube_factor import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
+from hsv.core import Data, doubles, dtype, lib, records, vector
 from hsv.errors import SignalError
-from hsv.lanes import choose
 from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.vehicle import COUPLING_PARAMETER
 
@@ -72,22 +67,17 @@ TUBE_PARAMETERS = (
 )
 """Parameters of the tube law in addition to those of the design; declared hardware affects the status only."""
 
-_N_INTEGRATED = 2
-"""Altitude and velocity, the first two states."""
-
-_ELEVATOR = 1
-"""The elevator among the inputs."""
-
-
-class TubeData(NamedTuple):
-    """The law for compiled functions.
+@dataclass(frozen=True, eq=False)
+class TubeData(Data):
+    """The law as the core takes it.
 
     ``gains`` F diag(tau) (c, 2, 9), each from its step in ``starts`` (c) on, the first from the beginning; input limits
     (2); whether the error is one from the plan ``x_r + x_n``, or from x_r alone; whether the plan's pitch rate is
     ``filtered``, by which ``notch``; rate (1/s) and ``period`` (s) of the integral action; the estimator of the
-    elevator's effectiveness, where there is one.
+    elevator's effectiveness, or None.
     """
 
+    KIND = "hsv_tube"
     gains: np.ndarray
     starts: np.ndarray
     minimum: np.ndarray
@@ -115,94 +105,49 @@ def no_tube(vehicle: VehicleParameters) -> TubeData:
     )
 
 
-def memory_of(data: TubeData) -> np.ndarray:
-    """Return the room of :func:`tube_step`: s_n (2 s) of the plan's filter, integral (2)."""
-    return np.zeros(2 * len(data.notch.D) + _N_INTEGRATED)
+class TubeStep(NamedTuple):
+    """A step of the law: feedback, sum of all parts and limited input (2 each), the index of the gain that holds."""
+
+    feedback: np.ndarray
+    unsaturated: np.ndarray
+    input: np.ndarray
+    gain: int
 
 
-def watch_of(data: TubeData) -> np.ndarray:
-    """Return the room (r, 9) of the estimator in :func:`tube_step`, no rows where there is none."""
-    return np.zeros(effectiveness_shape(data.effectiveness))
+def tube_memory() -> np.ndarray:
+    """Return the memory of the law, a record, which step 0 begins."""
+    return np.zeros((), dtype("hsv_tube_memory"))
 
 
-@njit_in_flight()
-def active_gain(data: Any, step: int) -> int:
-    """Return the index of the gain that holds in ``step``."""
-    index = 0
-    while index + 1 < len(data.starts) and data.starts[index + 1] <= step:
-        index += 1
-    return index
+def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, monitored: bool = True) -> TubeStep:
+    """Return a step of the law (paper eq. 21, eq. 36), see ``core/tube_law.h``.
 
-
-# Inlined where it is called: the arrays of a call cost as much as its arithmetic.
-@njit_in_flight(inline="always")
-def tube_step(
-    data: Any,
-    memory: Any,
-    watch: Any,
-    step: int,
-    monitored: bool,
-    x: Any,
-    q_f: Any,
-    x_r: Any,
-    u_r: Any,
-    x_n: Any,
-    u_n: Any,
-    s: Any,
-    u_feedback: Any,
-    u_total: Any,
-    u: Any,
-) -> int:
-    """Write feedback, sum of all parts and limited input, (2) each (paper eq. 21, eq. 36); return the gain's index.
-
-    The filter of the plan's pitch rate q'_n (eq. 48) starts from the state ``s`` of the one in the loop, which is exact
-    where x = x_r + x_n; it is stepped where the law needs it or is ``monitored``, and where there is one in the loop.
-    The integral stands still in every step in which an input is limited. Where the sum is not finite (a measurement
-    that is not a number) the input is the reference's: an actuator gets a number whatever happens. Sum and limited
-    input are what is commanded: where the elevator's effectiveness is estimated, what is to arrive divided by that.
+    Args:
+        data: The law.
+        memory: See :func:`tube_memory`, updated.
+        inputs: Those of the controller.
+        monitored: Whether the filter of the plan is stepped even where the law does not need it.
     """
-    active = active_gain(data, step)
-    size = 2 * len(data.notch.D)
-    if step == 0:
-        for i in range(min(len(s), size)):
-            memory[i] = s[i]
-        for i in range(_N_INTEGRATED):
-            memory[size + i] = 0.0
-    pitch_rate_error = q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE] if data.planned else q_f - x_r[PITCH_RATE]
-    if (data.filtered or monitored) and 0 < size == len(s):
-        planned_rate = filter_step(data.notch, memory, x_r[PITCH_RATE] + x_n[PITCH_RATE])
-        if data.filtered:
-            pitch_rate_error = q_f - planned_rate
-    effectiveness = effectiveness_step(data.effectiveness, watch, step, x)
-    limited = False
-    for i in range(len(u)):
-        feedback, integral = 0.0, 0.0
-        # The error is computed once for each input: kept in an array, it would have to be read back from there.
-        for j in range(len(x)):
-            error = x[j] - x_n[j] - x_r[j] if data.planned else x[j] - x_r[j]
-            feedback += data.gains[active, i, j] * (pitch_rate_error if j == PITCH_RATE else error)
-        u_plan = u_n[i] if data.planned else 0.0
-        if data.integral_rate > 0.0:
-            for j in range(_N_INTEGRATED):
-                integral += data.integral_rate * data.gains[active, i, j] * memory[size + j]
-            u_plan += integral
-        arriving = feedback + u_plan + u_r[i]
-        u_total[i] = arriving / effectiveness if i == _ELEVATOR else arriving
-        u_feedback[i] = feedback + integral
-        wanted = choose(math.isfinite(u_total[i]), u_total[i], u_r[i])
-        u[i] = min(max(wanted, data.minimum[i]), data.maximum[i])
-        limited = limited | (u[i] != u_total[i])
-    effectiveness_hold(data.effectiveness, watch, u)
-    if data.integral_rate > 0.0:
-        for j in range(_N_INTEGRATED):
-            more = memory[size + j] + data.period * (x[j] - x_r[j] - x_n[j])
-            memory[size + j] = choose(limited, memory[size + j], more)
-    return active
+    k, estimate, q_f, *others = inputs
+    given = [doubles(vector(each)) for each in others]
+    found = [np.empty(N_INPUTS) for _ in range(3)]
+    active = lib.hsv_tube_step(
+        data.pointer,
+        records("hsv_tube_memory", memory),
+        k,
+        monitored,
+        len(inputs.filter_state),
+        doubles(vector(estimate)),
+        q_f,
+        *given,
+        *map(doubles, found),
+    )
+    return TubeStep(*found, int(active))
 
 
-def _plain(array: Any) -> np.ndarray:
-    """Return ``array`` as float64 one after the other in memory: itself, in a flight."""
-    return np.ascontiguousarray(array, float)
+def active_gain(data: TubeData, step: int) -> int:
+    """Return the index of the gain that holds in ``step``."""
+    return max(int(np.searchsorted(data.starts, step, side="right")) - 1, 0)
 
 
 @dataclass(frozen=True)
@@ -266,13 +211,7 @@ class TubeLaw(Controller):
         self._effectiveness = effectiveness
         self._tau, self._scheduled = design.tau, list(changes)
         self.reset()
-        self._memory, self._watch = memory_of(self.kernel), watch_of(self.kernel)
-        self._step, self._level = bound(tube_step), bound(level)
-        # Compile now: a cold cache must not stall a flight.
-        x, u = np.zeros(design.feedback_gain.shape[1]), np.zeros(len(design.input_minimum))
-        given = ControllerInput(0, x, 0.0, x, u, x, u, np.zeros(2 * len(flown)))
-        self.step(given)
-        self.reset()
+        self._memory = tube_memory()
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any], design: ControlDesign | None = None) -> Self:
@@ -334,25 +273,22 @@ class TubeLaw(Controller):
         Raises:
             SignalError: The filter's states are neither those of the notch filter flown nor none.
         """
-        k, estimate, q_f, *others = inputs
-        # As the bound function takes them for granted, whoever made them.
-        x, reference, _, deviation, _, filter_state = given = [_plain(array) for array in (estimate, *others)]
-        memory, size, due = self._memory, len(filter_state), 2 * len(self._notch.D)
+        k, filter_state = inputs.step, inputs.filter_state
+        size, due = len(filter_state), 2 * len(self._notch.D)
         if size not in (0, due):
             raise SignalError(
                 "filter_state", f"filter_state: {size} numbers, expected {due} of the notch filter flown, or none"
             )
         in_loop = 0 < size == due
-        planned = filter_state if k == 0 else memory[:size].copy()
-        u_feedback, total, u = np.empty(2), np.empty(2), np.empty(2)
-        active = self._step(self.kernel, memory, self._watch, k, True, x, q_f, *given[1:], u_feedback, total, u)
+        planned = filter_state if k == 0 else self._memory["planned"][:size].copy()
+        feedback, total, u, active = tube_step(self.kernel, self._memory, inputs)
         self._next = k + 1
-        error, tube = (x - reference - deviation)[:N_RIGID], None
+        error, tube = (inputs.estimate - inputs.reference - inputs.deviation)[:N_RIGID], None
         if in_loop:
             error, tube = np.concatenate((error, filter_state - planned)), self._tube
-        level = float(self._level(tube.shape, error - tube.centre)) if tube else math.nan
+        tube_level = level(tube.shape, error - tube.centre) if tube else math.nan
         valid = math.isfinite(total[0]) and math.isfinite(total[1])
-        inside = valid and level <= 1.0
+        inside = valid and tube_level <= 1.0
         if not valid:
             status = TubeStatusCode.INVALID_INPUT
         elif tube is None:
@@ -369,12 +305,12 @@ class TubeLaw(Controller):
             error=error,
             tube_centre=tube.centre if tube else np.empty(0),
             tube_half_width=tube.half_width if tube else np.empty(0),
-            level=level,
+            level=tube_level,
             inside=inside,
             component=tube.farthest(error) if tube and not inside else "",
-            u_feedback=u_feedback,
+            u_feedback=feedback,
             u_nominal=inputs.nominal_input,
             tau=self._compact[active],
             status=status,
-            effectiveness=effectiveness_in(self._watch) if self._effectiveness else None,
+            effectiveness=effectiveness_in(self._memory) if self._effectiveness else None,
         )

@@ -4,6 +4,7 @@ The compiler is that of CC, or else the one that Python was built with; HSV_CFLA
 """
 
 import os
+import re
 import shlex
 import shutil
 import sys
@@ -24,9 +25,11 @@ if not shutil.which(compiler) or not Path(sysconfig.get_path("include"), "Python
 
 own = shlex.split(os.environ.get("HSV_CFLAGS", ""))
 header = (FOLDER / "core.h").read_text(encoding="utf-8")
+visible = header.split("/* begin */")[1].split("/* end */")[0]
 
 ffibuilder = FFI()
-ffibuilder.cdef(header.split("/* begin */")[1].split("/* end */")[0])
+ffibuilder.cdef(re.sub(r"#include \"(.*)\"", lambda found: (FOLDER / found[1]).read_text(encoding="utf-8"), visible))
+ffibuilder.cdef('extern "Python" int32_t hsv_call_python(int64_t, const double *, double *, double *, const double *);')
 ffibuilder.set_source(
     "hsv.core._core",
     '#include "core.h"',

@@ -22,15 +22,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit
-from hsv.control.notch_filter import NotchData, filter_step, rest
-from hsv.design.error_system import lag_response, tube_errors
+from hsv.control.notch_filter import NotchData
+from hsv.core import doubles, lib
+from hsv.design.error_system import along_filter, lag_response, tube_errors
 from hsv.design.rounding import outward
 from hsv.lpv.actuated import SampledActuators, respond
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
-from hsv.lpv.polytope import Polytope, schedule
-from hsv.vehicle.dynamics import N_RIGID, N_STATES
+from hsv.lpv.polytope import Polytope
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
 
@@ -55,15 +55,15 @@ CHANNELS = (
 """Order of the columns of G in :class:`hsv.design.error_system.ErrorSystem`."""
 
 _FILTERED_NOMINAL = 4
-_ACCELERATED = (1, 2, 4)
-_REMAINING = (0, 3)
+_ACCELERATED = [1, 2, 4]
+_REMAINING = [0, 3]
 
 
 def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
     """Return the effect (5, 3) on the rigid states of unit accelerations held over ``period`` (s), at mid-envelope."""
     A, _ = linearise(vehicle.decoupled, *vehicle.centre)
     unit = np.zeros((N_RIGID, 3))
-    unit[list(_ACCELERATED), [0, 1, 2]] = 1.0
+    unit[_ACCELERATED, [0, 1, 2]] = 1.0
     return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
 
 
@@ -120,30 +120,14 @@ class ChannelModel:
 
     def signals(self, record: Record) -> Signals:
         """Return the disturbances f, w and Delta that acted in a flight (paper eq. 13, eq. 16, eq. 18)."""
-        n = len(record.state) - 1
-        signals = Signals(np.empty((n, len(CHANNELS))), np.empty((n, N_STATES)), np.empty((n, N_STATES)))
-        rows = list(_ACCELERATED)
         commanded, lost = record.command, record.actuator[:, 1] - record.command[:, 1]
         through = lost
         if self.actuators is not None:
             at_rest = self._at_rest(record)
             commanded = at_rest + respond(self.actuators, record.command - at_rest)[1]
-            through = respond(self.actuators, np.stack((np.zeros_like(lost), lost), axis=1))[1][:, 1].copy()
-        _signals(
-            self.polytope.data(),
-            self.notch,
-            np.linalg.inv(self.columns[rows]),
-            np.ascontiguousarray(self.columns[list(_REMAINING)]),
-            record.state,
-            record.deviation,
-            commanded,
-            lost,
-            through,
-            record.reference,
-            record.reference_input,
-            record.defect,
-            *signals,
-        )
+            through = respond(self.actuators, np.stack((np.zeros_like(lost), lost), axis=1))[1][:, 1]
+        inverse, remaining = np.linalg.inv(self.columns[_ACCELERATED]), self.columns[_REMAINING]
+        signals = decompose(self.polytope, self.notch, inverse, remaining, record, commanded, lost, through)
         if self.filtered:
             signals.channels[:, _FILTERED_NOMINAL] = 0.0
         return signals
@@ -160,9 +144,7 @@ class ChannelModel:
         beyond = record.actuator - plan
         e = tube_errors(record.state, record.deviation, record.reference, self.notch, self.actuators, beyond)
         lag = at_rest + respond(self.actuators, plan - at_rest)[1] - plan
-        late, feedback = lag_response(
-            self.polytope, self.gain, self.notch, self.actuators, record.state[:, :2], np.ascontiguousarray(lag)
-        )
+        late, feedback = lag_response(self.polytope, self.gain, self.notch, self.actuators, record.state[:, :2], lag)
         return e - late, feedback
 
     def _at_rest(self, record: Record) -> np.ndarray:
@@ -170,51 +152,57 @@ class ChannelModel:
         return trim(self.vehicle.decoupled, record.state[0, 0], record.state[0, 1]).input
 
 
-@njit(cache=True, nogil=True)
-def _signals(
-    polytope: Any,
-    notch: Any,
+def decompose(
+    polytope: Polytope,
+    notch: NotchData,
     inverse: np.ndarray,
     remaining: np.ndarray,
-    state: np.ndarray,
-    deviation: np.ndarray,
+    record: Record,
     command: np.ndarray,
     lost: np.ndarray,
     through: np.ndarray,
-    x_r: np.ndarray,
-    u_r: np.ndarray,
-    defect: np.ndarray,
-    channels: np.ndarray,
-    delta: np.ndarray,
-    fault: np.ndarray,
-) -> None:
-    n, m = state.shape[1], command.shape[1]
-    weights, S = np.empty(len(polytope.S)), np.empty(n * (n + m))
-    filter_state = np.zeros(2 * len(notch.D))
-    rest(notch, deviation[0, 4] + x_r[0, 4], filter_state)
-    for k in range(len(delta)):
-        schedule(polytope, state[k, 0], state[k, 1], weights, S)
-        for i in range(n):
-            row = i * (n + m)
-            predicted = x_r[k + 1, i] + defect[k, i]
-            for j in range(n):
-                predicted += S[row + j] * (state[k, j] - x_r[k, j])
-            for j in range(m):
-                predicted += S[row + n + j] * (command[k, j] - u_r[k, j])
-            delta[k, i] = state[k + 1, i] - predicted
-            fault[k, i] = S[row + n + 1] * through[k]
-        for c in range(3):
-            channels[k, c] = 0.0
-            for j, row in enumerate((1, 2, 4)):
-                channels[k, c] += inverse[c, j] * (delta[k, row] - fault[k, row])
-        channels[k, 3] = lost[k]
-        planned = deviation[k, 4] + x_r[k, 4]
-        channels[k, 4] = filter_step(notch, filter_state, planned) - planned
-        for c, row in enumerate((0, 3)):
-            explained = 0.0
-            for j in range(3):
-                explained += remaining[c, j] * channels[k, j]
-            channels[k, 5 + c] = delta[k, row] - fault[k, row] - explained
+) -> Signals:
+    """Return the disturbances of a flight; sums run over columns one after the other, with the same bits everywhere.
+
+    Args:
+        polytope: The design's model.
+        notch: The discrete filter.
+        inverse: (3, 3) from the rates that accelerations change to the accelerations.
+        remaining: (2, 3) effect of the accelerations on altitude and pitch angle.
+        record: n + 1 rows.
+        command: (n + 1, 2) commanded input, or where the actuators are on average.
+        lost: (n + 1) lost elevator.
+        through: (n + 1) what of it comes through the actuators.
+    """
+    x, x_r, n = record.state[:-1], record.reference[:-1], len(record.state) - 1
+    S = scheduled(polytope, x[:, :2])
+    # The difference of the whole state and input from the reference, as columns of [A(p), B(p)] take it.
+    moved = np.hstack((x - x_r, (command - record.reference_input)[:-1]))
+    predicted = record.reference[1:] + record.defect[:-1]
+    for j in range(N_STATES + N_INPUTS):
+        predicted += S[:, :, j] * moved[:, j, None]
+    delta = record.state[1:] - predicted
+    fault = S[:, :, -1] * through[:-1, None]
+    rest = delta - fault
+    channels = np.zeros((n, len(CHANNELS)))
+    for j, row in enumerate(_ACCELERATED):
+        channels[:, :3] += inverse[:, j] * rest[:, row, None]
+    channels[:, 3] = lost[:-1]
+    planned = (record.deviation[:-1] + x_r)[:, PITCH_RATE]
+    channels[:, _FILTERED_NOMINAL] = along_filter(notch, planned)[0] - planned
+    explained = np.zeros((n, len(_REMAINING)))
+    for j in range(3):
+        explained += remaining[:, j] * channels[:, j, None]
+    channels[:, 5:] = rest[:, _REMAINING] - explained
+    return Signals(channels, delta, fault)
+
+
+def scheduled(polytope: Polytope, points: np.ndarray) -> np.ndarray:
+    """Return [A(p), B(p)] (n, 9, 11) (paper eq. 11) at ``points`` (n, 2), altitude (m) and velocity (m/s)."""
+    data, S = polytope.data(), np.empty((len(points), N_STATES, N_STATES + N_INPUTS))
+    for point, found in zip(points.tolist(), S, strict=True):
+        lib.hsv_schedule(data.pointer, *point, doubles(found))
+    return S
 
 
 @dataclass(frozen=True)

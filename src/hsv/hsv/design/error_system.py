@@ -15,16 +15,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from hsv.compiled import njit
-from hsv.control.notch_filter import NotchData, filter_step, rest, with_notch
+from hsv.control.notch_filter import NotchData, with_notch
+from hsv.core import doubles, lib, vector
 from hsv.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
-from hsv.lpv.polytope import Polytope, schedule
+from hsv.lpv.polytope import Polytope
 from hsv.vehicle.actuators import ActuatorSet
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
+from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
 
 
 @dataclass(frozen=True)
@@ -138,21 +137,17 @@ def tube_errors(
         beyond_plan: (k, 2) what they are commanded beyond the plan, u - u_n - u_r, a loss of it included.
     """
     rigid = (state - deviation - reference)[:, :N_RIGID]
-    errors = np.zeros((len(state), N_RIGID + 2 * len(notch.D)))
-    errors[:, :N_RIGID] = rigid
-    filter_state = np.zeros(2 * len(notch.D))
-    _filter_errors(notch, np.ascontiguousarray(rigid[:, PITCH_RATE]), filter_state, errors[:, N_RIGID:])
-    if actuators is None or beyond_plan is None:
-        return errors
-    return np.hstack((errors, respond(actuators, beyond_plan)[0]))
+    errors = [rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]]
+    if actuators is not None and beyond_plan is not None:
+        errors.append(respond(actuators, beyond_plan)[0])
+    return np.hstack(errors)
 
 
-@njit(cache=True, nogil=True)
-def _filter_errors(notch: Any, rate: np.ndarray, filter_state: np.ndarray, errors: np.ndarray) -> None:
-    rest(notch, rate[0], filter_state)
-    for k in range(len(rate)):
-        errors[k] = filter_state
-        filter_step(notch, filter_state, rate[k])
+def along_filter(notch: NotchData, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``rate`` (k) filtered, from rest for its first value, and the filter's states (k, s) before each step."""
+    filtered, states = np.empty(len(rate)), np.empty((len(rate), 2 * len(notch.D)))
+    lib.hsv_notch_along(notch.pointer, len(rate), *map(doubles, (vector(rate), filtered, states)))
+    return filtered, states
 
 
 def lag_response(
@@ -173,65 +168,14 @@ def lag_response(
         scheduled: (k, 2) altitude and velocity of the flight.
         lag: (k, 2) mean position of actuators driven by the plan, less the plan.
     """
-    a, s = len(actuators.A), 2 * len(notch.D)
-    errors, feedback = np.zeros((len(lag), N_RIGID + s + a)), np.zeros((len(lag), len(gain)))
-    _lag_response(
-        polytope.data(),
-        np.ascontiguousarray(gain),
-        notch,
-        actuators,
-        np.ascontiguousarray(scheduled),
-        lag,
-        errors,
-        feedback,
+    a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
+    errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))
+    lib.hsv_lag_response(
+        data.pointer,
+        doubles(vector(gain)),
+        notch.pointer,
+        len(lag),
+        a,
+        *(doubles(vector(each)) for each in (*actuators, scheduled, lag, errors, feedback)),
     )
     return errors, feedback
-
-
-@njit(cache=True, nogil=True)
-def _lag_response(
-    polytope: Any,
-    gain: np.ndarray,
-    notch: Any,
-    actuators: Any,
-    scheduled: np.ndarray,
-    lag: np.ndarray,
-    errors: np.ndarray,
-    feedback: np.ndarray,
-) -> None:
-    A_a, B_a, C_a, D_a = actuators
-    n, m = N_RIGID, N_INPUTS
-    weights, S = np.empty(len(polytope.S)), np.empty(N_STATES * (N_STATES + m))
-    x, new, held = np.zeros(n), np.zeros(n), np.zeros(m)
-    s, a, turned = np.zeros(2 * len(notch.D)), np.zeros(len(A_a)), np.zeros(len(A_a))
-    for k in range(len(lag)):
-        errors[k, :n], errors[k, n : n + len(s)], errors[k, n + len(s) :] = x, s, a
-        schedule(polytope, scheduled[k, 0], scheduled[k, 1], weights, S)
-        filtered = filter_step(notch, s, x[PITCH_RATE])
-        for i in range(m):
-            total = gain[i, PITCH_RATE] * filtered
-            for j in range(n):
-                if j != PITCH_RATE:
-                    total += gain[i, j] * x[j]
-            feedback[k, i] = total
-        for i in range(m):
-            held[i] = lag[k, i]
-            for j in range(len(a)):
-                held[i] += C_a[i, j] * a[j]
-            for j in range(m):
-                held[i] += D_a[i, j] * feedback[k, j]
-        for i in range(len(a)):
-            turned[i] = 0.0
-            for j in range(len(a)):
-                turned[i] += A_a[i, j] * a[j]
-            for j in range(m):
-                turned[i] += B_a[i, j] * feedback[k, j]
-        a[:] = turned
-        for i in range(n):
-            row = i * (N_STATES + m)
-            new[i] = 0.0
-            for j in range(n):
-                new[i] += S[row + j] * x[j]
-            for j in range(m):
-                new[i] += S[row + N_STATES + j] * held[j]
-        x[:] = new

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import bound
+from hsv.core import Struct, doubles, lib
 from hsv.errors import ParameterError
-from hsv.faults.laws import FaultRows, apply_command_faults, fault_memory, fault_rows
+from hsv.faults.laws import FaultRows, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
 from hsv.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
-from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state, receive
+from hsv.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
 from hsv.timing import NEVER, first_step
@@ -81,9 +81,6 @@ class FaultInjector:
         self.period, self.seed = period, seed
         self.link = link or command_link({}, period)
         self._before = np.zeros(N_INPUTS) if before is None else before
-        self._apply = bound(apply_command_faults)
-        self.reset()
-        self.step(0, np.zeros(N_INPUTS))  # compile now: a cold cache must not stall a flight
         self.reset()
 
     @classmethod
@@ -127,17 +124,16 @@ class FaultInjector:
         """Return to the schedule: everything injected or cleared in flight is discarded."""
         self.known = list(self.scheduled)
         self._next = 0
-        self._rows = self.rows((COMMAND,))
-        self._memory = fault_memory(self._rows)
+        self._know(self.rows((COMMAND,)))
         self._link_state = self.link_state()
 
     def link_state(self) -> np.ndarray:
         """Return the state of the link with which a flight begins."""
         return link_state(self.link, N_INPUTS, self._before)
 
-    def rows(self, sides: Sequence[str]) -> FaultRows:
-        """Return the faults of some sides that are known now, for compiled functions."""
-        return fault_rows(sides, self.known, self.period)
+    def rows(self, sides: Sequence[str], earlier: FaultRows | None = None) -> FaultRows:
+        """Return the faults of some sides that are known now; those that were known ``earlier`` keep their memory."""
+        return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:
         """Return the faults known now, those injected or cleared in flight included, as :data:`FAULT_PARAMETERS`."""
@@ -160,7 +156,7 @@ class FaultInjector:
         self.clear(fault.channel, fault.type)
         start = self._first(fault)
         self.known.append(ScheduledFault(fault, start, min(start + steps, NEVER)))
-        self._compile()
+        self._know(self.rows((COMMAND,), self._rows))
         return start
 
     def clear(self, channel: str = "", kind: str = "") -> int:
@@ -181,15 +177,15 @@ class FaultInjector:
             if channel in ("", fault.channel) and kind in ("", fault.type) and start <= self._first(fault) < stop:
                 ended.append(self._first(fault))
                 self.known[i] = ScheduledFault(fault, start, ended[-1])
-        self._compile()
+        self._know(self.rows((COMMAND,), self._rows))
         return min(ended, default=self._next)
 
     def step(self, step: int, command: np.ndarray) -> FaultResult:
         """Return what becomes of ``command`` (2) in ``step``."""
         actuator = np.array(command, float)
-        if not self.link.ideal:
-            receive(self.link, self._link_state, step, self.seed, actuator)
-        self._apply(self._rows, self._memory, step, self.seed, actuator, 0)
+        link, payload = self.link.pointer, doubles(actuator)
+        lib.hsv_receive(link, doubles(self._link_state), len(self._link_state), step, self.seed, payload, N_INPUTS)
+        lib.hsv_apply_command_faults(self._known.pointer, step, self.seed, payload)
         self._next = step + 1
         return FaultResult(actuator, self.acting(step))
 
@@ -205,10 +201,9 @@ class FaultInjector:
         """Return the first step in which a fault can still be begun or ended."""
         return self._next + 1 if fault.kind.side == SENSOR else self._next
 
-    def _compile(self) -> None:
-        rows = self.rows((COMMAND,))
-        self._memory = fault_memory(rows, self._rows, self._memory)
+    def _know(self, rows: FaultRows) -> None:
         self._rows = rows
+        self._known = Struct("hsv_faults", rows)
 
 
 def read_parameters(text: str) -> dict[str, float]:

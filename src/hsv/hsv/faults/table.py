@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Self
 
+from hsv.core import lib
 from hsv.errors import ParameterError, did_you_mean
 from hsv.parameters import Parameter, read_number
 from hsv.units import UnitSystem, parse_quantity, readable
@@ -50,40 +51,10 @@ CHANNELS = {
 
 COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effector", "engine", "sensor"
 
-(
-    LOSS,
-    REVERSAL,
-    DELAY,
-    DEAD_ZONE,
-    BACKLASH,
-    BANDWIDTH,
-    RATE_LIMIT,
-    STOP_LIMIT,
-    SCALE,
-    BIAS,
-    DRIFT,
-    OSCILLATION,
-    LOCK,
-    LOCK_AT,
-    FLOAT,
-    HARD_OVER,
-    SOLID_OSCILLATION,
-    THRUST_LOSS,
-    UNSTART,
-    UNSTART_OUTSIDE,
-    SENSOR_SCALE,
-    SENSOR_NOISE,
-    SENSOR_BIAS,
-    SENSOR_RUNAWAY,
-    SENSOR_DROP_OUT,
-    SENSOR_FREEZE,
-) = range(26)
-"""Codes of the kinds for compiled functions, in the order in which they act."""
-
-REPLACING = (LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION)
+REPLACING = (lib.LOCK, lib.LOCK_AT, lib.FLOAT, lib.HARD_OVER, lib.SOLID_OSCILLATION)
 """Types that replace the position of an effector; the most recent one applies."""
 
-LONGEST_DELAY = 50
+LONGEST_DELAY = lib.MAX_DELAY
 """Steps."""
 
 
@@ -163,14 +134,14 @@ _OUTSIDE = (
 
 FAULT_KINDS = {
     "loss_of_effectiveness": FaultKind(
-        LOSS,
+        lib.LOSS,
         COMMAND,
         INPUT_NAMES,
         "the actuator receives effectiveness times the command (paper eq. 15); effectiveness may be lost over a ramp",
         (_EFFECTIVENESS, _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
     ),
     "reversal": FaultKind(
-        REVERSAL,
+        lib.REVERSAL,
         COMMAND,
         INPUT_NAMES,
         "the command is multiplied by -1",
@@ -186,160 +157,160 @@ FAULT_KINDS = {
         ),
     ),
     "delay": FaultKind(
-        DELAY,
+        lib.DELAY,
         COMMAND,
         INPUT_NAMES,
         "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
         (_P("steps", "delay in control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
     ),
     "dead_zone": FaultKind(
-        DEAD_ZONE,
+        lib.DEAD_ZONE,
         COMMAND,
         INPUT_NAMES,
         "commands within a dead zone about the one at the start of the fault have no effect",
         (_WIDTH,),
     ),
     "backlash": FaultKind(
-        BACKLASH,
+        lib.BACKLASH,
         COMMAND,
         INPUT_NAMES,
         "there is play between command and actuator, centred at the start of the fault",
         (_WIDTH,),
     ),
     "bandwidth": FaultKind(
-        BANDWIDTH,
+        lib.BANDWIDTH,
         DYNAMICS,
         INPUT_NAMES,
         "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
         (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
     ),
     "rate_limit": FaultKind(
-        RATE_LIMIT,
+        lib.RATE_LIMIT,
         DYNAMICS,
         INPUT_NAMES,
         "the rate of the actuator is limited",
         (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
     ),
     "stop_limit": FaultKind(
-        STOP_LIMIT,
+        lib.STOP_LIMIT,
         DYNAMICS,
         INPUT_NAMES,
         "the travel of the actuator is limited; from a position beyond the limits it returns at its largest rate",
         (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
     ),
     "effector_scale": FaultKind(
-        SCALE,
+        lib.SCALE,
         EFFECTOR,
         INPUT_NAMES,
         "the position of the effector is a multiple of that of the actuator",
         (_P("factor", "multiple", "", -1.0, 2.0),),
     ),
     "bias": FaultKind(
-        BIAS,
+        lib.BIAS,
         EFFECTOR,
         INPUT_NAMES,
         "a constant offset is added to the position of the effector",
         (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
     ),
     "drift": FaultKind(
-        DRIFT,
+        lib.DRIFT,
         EFFECTOR,
         INPUT_NAMES,
         "an offset that grows at a constant rate up to a limit is added to the position of the effector",
         _GROWING_OFFSET,
     ),
     "oscillation": FaultKind(
-        OSCILLATION,
+        lib.OSCILLATION,
         EFFECTOR,
         INPUT_NAMES,
         "an oscillation is added to the position of the effector (liquid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
     ),
     "lock_in_place": FaultKind(
-        LOCK, EFFECTOR, INPUT_NAMES, "the effector stays at its position at the start of the fault"
+        lib.LOCK, EFFECTOR, INPUT_NAMES, "the effector stays at its position at the start of the fault"
     ),
     "lock_at": FaultKind(
-        LOCK_AT,
+        lib.LOCK_AT,
         EFFECTOR,
         INPUT_NAMES,
         "the effector stays at a given position",
         (_P("position", "position", "{}", -1.0, 1.0),),
     ),
     "float": FaultKind(
-        FLOAT,
+        lib.FLOAT,
         EFFECTOR,
         INPUT_NAMES[1:],
         "the effector moves freely: no force at zero deflection, or along the flow",
         (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
     ),
     "hard_over": FaultKind(
-        HARD_OVER,
+        lib.HARD_OVER,
         EFFECTOR,
         INPUT_NAMES,
         "the effector moves to a stop and stays there",
         (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
     ),
     "solid_oscillation": FaultKind(
-        SOLID_OSCILLATION,
+        lib.SOLID_OSCILLATION,
         EFFECTOR,
         INPUT_NAMES,
         "the effector oscillates about its position at the start of the fault, whatever the command (solid failure)",
         (_AMPLITUDE, _FREQUENCY, _PHASE),
     ),
     "thrust_loss": FaultKind(
-        THRUST_LOSS,
+        lib.THRUST_LOSS,
         ENGINE_SIDE,
         (ENGINE,),
         "only a share of the thrust remains",
         (_P("share", "share that remains", "", 0.0, 1.0),),
     ),
     "inlet_unstart": FaultKind(
-        UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
+        lib.UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
     ),
     "inlet_unstart_outside": FaultKind(
-        UNSTART_OUTSIDE,
+        lib.UNSTART_OUTSIDE,
         ENGINE_SIDE,
         (ENGINE,),
         "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
         (*_UNSTART, *_OUTSIDE),
     ),
     "sensor_scale": FaultKind(
-        SENSOR_SCALE,
+        lib.SENSOR_SCALE,
         SENSOR,
         STATE_NAMES,
         "the output of the sensor is multiplied by a factor",
         (_P("factor", "factor", "", -1.0, 2.0),),
     ),
     "sensor_noise": FaultKind(
-        SENSOR_NOISE,
+        lib.SENSOR_NOISE,
         SENSOR,
         STATE_NAMES,
         "white noise is added to the output of the sensor",
         (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
     ),
     "sensor_bias": FaultKind(
-        SENSOR_BIAS,
+        lib.SENSOR_BIAS,
         SENSOR,
         STATE_NAMES,
         "a constant offset is added to the output of the sensor",
         (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
     ),
     "sensor_runaway": FaultKind(
-        SENSOR_RUNAWAY,
+        lib.SENSOR_RUNAWAY,
         SENSOR,
         STATE_NAMES,
         "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
         _GROWING_OFFSET,
     ),
     "sensor_drop_out": FaultKind(
-        SENSOR_DROP_OUT,
+        lib.SENSOR_DROP_OUT,
         SENSOR,
         STATE_NAMES,
         "samples are lost at random; the last one is held",
         (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
     ),
     "sensor_freeze": FaultKind(
-        SENSOR_FREEZE, SENSOR, STATE_NAMES, "the output of the sensor stays at its value at the start of the fault"
+        lib.SENSOR_FREEZE, SENSOR, STATE_NAMES, "the output of the sensor stays at its value at the start of the fault"
     ),
 }
 """The vocabulary, in the order in which faults that act at once are composed."""

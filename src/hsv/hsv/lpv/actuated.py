@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit
+from hsv.core import doubles, lib, vector
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.actuators import ActuatorSet
 from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
@@ -79,30 +79,8 @@ def respond(actuators: SampledActuators, commands: np.ndarray) -> tuple[np.ndarr
     They start from zero: commands are deviations from where the actuators rest.
     """
     states, means = np.empty((len(commands), len(actuators.A))), np.empty((len(commands), N_INPUTS))
-    _respond(actuators, np.ascontiguousarray(commands), states, means)
+    lib.hsv_respond(*states.shape, *(doubles(vector(each)) for each in (*actuators, commands, states, means)))
     return states, means
-
-
-@njit(cache=True, nogil=True)
-def _respond(actuators: Any, commands: np.ndarray, states: np.ndarray, means: np.ndarray) -> None:
-    A, B, C, D = actuators
-    a = np.zeros(len(A))
-    new = np.zeros(len(A))
-    for k in range(len(commands)):
-        for i in range(len(D)):
-            means[k, i] = 0.0
-            for j in range(len(a)):
-                means[k, i] += C[i, j] * a[j]
-            for j in range(len(D)):
-                means[k, i] += D[i, j] * commands[k, j]
-        for i in range(len(a)):
-            states[k, i] = a[i]
-            new[i] = 0.0
-            for j in range(len(a)):
-                new[i] += A[i, j] * a[j]
-            for j in range(len(D)):
-                new[i] += B[i, j] * commands[k, j]
-        a[:] = new
 
 
 def held_behind(

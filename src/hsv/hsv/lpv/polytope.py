@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit_in_flight
+from hsv.core import Data, doubles, lib
 from hsv.elimination import solve
 from hsv.errors import DesignError
-from hsv.lanes import BLOCK, choose, lanes_in, least, most
 
 INTERPOLATIONS = ("linear", "cubic")
 
+BLOCK = lib.SUMS
+"""Entries that the core sums at a time."""
+
 
 class AxisWeights(NamedTuple):
-    """Weights of the vertices along one scheduling variable, as a piecewise polynomial; for compiled functions.
+    """Weights of the vertices along one scheduling variable, as a piecewise polynomial.
 
     ``breakpoints`` (s), ``coefficients`` (4, s - 1, r): power 3 first, local to each piece, one column per vertex.
     """
@@ -94,14 +96,16 @@ def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
     return np.asarray(((c[0] * local + c[1]) * local + c[2]) * local + c[3])
 
 
-class PolytopeData(NamedTuple):
-    """A polytopic model as compiled functions take it.
+@dataclass(frozen=True, eq=False)
+class PolytopeData(Data):
+    """A polytopic model as the core takes it.
 
-    ``S`` (r, e) holds what is not zero in all vertices of [A_i, B_i] row by row, then zeros up to a multiple of
-    :data:`hsv.lanes.BLOCK`. ``entries``: the places of these numbers in the flattened [A_i, B_i] (n (n + m)).
-    ``starts`` (2 n + 1): where those of the rows of A and of B begin, in turn.
+    ``S`` (r, e) holds the entries of [A_i, B_i] that are not zero in all vertices, row by row, then zeros up to a
+    multiple of :data:`BLOCK`. ``entries``: their places in the flattened [A_i, B_i] (n (n + m)). ``starts`` (2 n + 1):
+    where those of the rows of A and of B begin, in turn.
     """
 
+    KIND = "hsv_polytope"
     S: np.ndarray
     entries: np.ndarray
     starts: np.ndarray
@@ -129,7 +133,7 @@ class Polytope:
             raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
 
     def data(self) -> PolytopeData:
-        """Return the form that compiled functions take."""
+        """Return the form that the core takes."""
         n, m = self.B.shape[1:]
         S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
         entries = np.flatnonzero(S.any(axis=0))
@@ -143,82 +147,6 @@ class Polytope:
         """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
         n, m = self.B.shape[1:]
         S = np.empty(n * (n + m))
-        schedule(self.data(), altitude, velocity, np.empty(len(self.A)), S)
+        lib.hsv_schedule(self.data().pointer, altitude, velocity, doubles(S))
         S = S.reshape(n, n + m)
         return S[:, :n], S[:, n:]
-
-
-@njit_in_flight(inline="always")
-def _clamp(value: Any, low: float, high: float) -> Any:
-    # Written so that a NaN (a diverged flight) becomes ``low`` and never an index.
-    return choose(value > low, choose(value > high, high, value), low)
-
-
-@njit_in_flight(inline="always")
-def _piece(breakpoints: np.ndarray, value: float) -> int:
-    i = 0
-    while i < len(breakpoints) - 2 and value >= breakpoints[i + 1]:
-        i += 1
-    return i
-
-
-@njit_in_flight(inline="always")
-def _pieces(breakpoints: np.ndarray, value: Any) -> tuple[int, int]:
-    """Return the pieces of the least lane and of the largest."""
-    first = _piece(breakpoints, least(value))
-    return first, first if lanes_in(value) == 1 else _piece(breakpoints, most(value))
-
-
-@njit_in_flight(inline="always")
-def _cubic(axis: Any, piece: int, value: Any, vertex: int) -> Any:
-    c = axis.coefficients
-    local = value - axis.breakpoints[piece]
-    return ((c[0, piece, vertex] * local + c[1, piece, vertex]) * local + c[2, piece, vertex]) * local + c[
-        3, piece, vertex
-    ]
-
-
-@njit_in_flight(inline="always")
-def _weight(axis: Any, first: int, last: int, value: Any, vertex: int) -> Any:
-    """Return the weight of a vertex; ``first`` and ``last``: see :func:`_pieces`."""
-    weight = _cubic(axis, first, value, vertex)
-    for piece in range(first + 1, last + 1):
-        weight = choose(value >= axis.breakpoints[piece], _cubic(axis, piece, value, vertex), weight)
-    return weight
-
-
-@njit_in_flight(inline="always")
-def vertex_weights(polytope: Any, altitude: Any, velocity: Any, weights: Any) -> Any:
-    """Write the ``weights`` (r) of the vertices (paper eq. 11); tell whether p lay inside the envelope."""
-    h_axis, v_axis = polytope.altitude, polytope.velocity
-    h = _clamp(altitude, h_axis.breakpoints[0], h_axis.breakpoints[-1])
-    v = _clamp(velocity, v_axis.breakpoints[0], v_axis.breakpoints[-1])
-    h_first, h_last = _pieces(h_axis.breakpoints, h)
-    v_first, v_last = _pieces(v_axis.breakpoints, v)
-    n_h = h_axis.coefficients.shape[2]
-    n_v = v_axis.coefficients.shape[2]
-    # Those along the velocity stand in the first places until these are multiplied, last of all.
-    for j in range(n_v):
-        weights[j] = _weight(v_axis, v_first, v_last, v, j)
-    for i in range(n_h - 1, -1, -1):
-        h_weight = _weight(h_axis, h_first, h_last, h, i)
-        for j in range(n_v):
-            weights[i * n_v + j] = h_weight * weights[j]
-    return (h == altitude) & (v == velocity)
-
-
-@njit_in_flight()
-def schedule(polytope: Any, altitude: Any, velocity: Any, weights: Any, S: Any) -> Any:
-    """Write [A(p), B(p)] (paper eq. 11), flattened, into ``S`` (n (n + m)); tell whether p lay inside the envelope.
-
-    ``weights`` (r): scratch.
-    """
-    inside = vertex_weights(polytope, altitude, velocity, weights)
-    for e in range(len(S)):
-        S[e] = 0.0
-    for e in range(len(polytope.entries)):
-        total = 0.0
-        for r in range(len(weights)):
-            total += weights[r] * polytope.S[r, e]
-        S[polytope.entries[e]] = total
-    return inside

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.compiled import njit
-from hsv.elementary import logarithm
+from hsv.elementary import logarithm, of_each
 from hsv.errors import QuantityError
 from hsv.units import parse_quantity, rounded
 
@@ -51,22 +50,17 @@ _TAIL = (
 )
 
 
-@njit(cache=True)
 def standard_quantiles(shares: np.ndarray) -> np.ndarray:
-    """Return below what ``shares`` (n), 1e-10 to 1 - 1e-10, of the standard normal distribution lie, to 1e-15."""
-    quantiles = np.empty(len(shares))
-    for k, share in enumerate(shares):
-        q = share - 0.5
-        middle = abs(q) <= 0.425
-        r = 0.180625 - q * q if middle else np.sqrt(-logarithm(share if q < 0.0 else 1.0 - share)) - 1.6
-        numerator = denominator = 0.0
-        for i in range(8):
-            above, below = _MIDDLE[i] if middle else _TAIL[i]
-            numerator = numerator * r + above
-            denominator = denominator * r + below
-        sign = q if middle else -1.0 if q < 0.0 else 1.0
-        quantiles[k] = sign * (numerator / denominator)
-    return quantiles
+    """Return the quantiles of the standard normal distribution at ``shares`` (n), 1e-10 to 1 - 1e-10, to 1e-15."""
+    q = shares - 0.5
+    middle = np.abs(q) <= 0.425
+    tail = np.sqrt(-of_each(logarithm, np.where(q < 0.0, shares, 1.0 - shares))) - 1.6
+    r = np.where(middle, 0.180625 - q * q, tail)
+    numerator, denominator = np.zeros((2, len(shares)))
+    for (above, below), (tail_above, tail_below) in zip(_MIDDLE, _TAIL, strict=True):
+        numerator = numerator * r + np.where(middle, above, tail_above)
+        denominator = denominator * r + np.where(middle, below, tail_below)
+    return np.where(middle, q, np.where(q < 0.0, -1.0, 1.0)) * (numerator / denominator)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -29,29 +28,20 @@ _ROWS = 2000
 def fingerprint(flown: np.ndarray) -> str:
     """Return ``v1:`` and the SHA-256 of the rows ``flown`` (n + 1, 25).
 
-    Rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command, actuator (2 each). Digested are little-endian float64
+    Rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command, actuator (2 each). The digest is of little-endian float64
     numbers, row after row, every NaN as the same one.
     """
     digest = hashlib.sha256()
-    # So many at a time that they stay in the processor's cache.
+    # As many at a time as the processor's cache holds.
     for start in range(0, len(flown), _ROWS):
-        rows = np.ascontiguousarray(flown[start : start + _ROWS], "<f8")
-        if (unknown := np.isnan(rows)).any():
-            rows = np.where(unknown, np.nan, rows)
-        digest.update(rows.data)
+        digest.update(digested(flown[start : start + _ROWS]).data)
     return written(digest.digest())
 
 
-def fingerprints(flown: Sequence[np.ndarray]) -> list[str]:
-    """Return the fingerprint of each of several flights, rows as :func:`fingerprint` takes them, two at a time."""
-    # Imported here, because most who use this module have one flight.
-    from hsv.sha256_pairs import AVAILABLE, digests
-
-    found: list[str] = []
-    for start in range(0, len(flown), 2):
-        pair = [np.ascontiguousarray(rows, "<f8") for rows in flown[start : start + 2]]
-        found += map(written, digests(pair)) if AVAILABLE and len(pair) == 2 else map(fingerprint, pair)
-    return found
+def digested(flown: np.ndarray) -> np.ndarray:
+    """Return rows of a history as their fingerprint has them."""
+    rows = np.ascontiguousarray(flown, "<f8")
+    return np.where(unknown, np.nan, rows) if (unknown := np.isnan(rows)).any() else rows
 
 
 def written(digest: bytes) -> str:

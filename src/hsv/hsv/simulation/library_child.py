@@ -1,4 +1,4 @@
-"""Child process of a shared library, which loads the library and flies the compiled loop with it.
+"""Child process of a shared library, which loads the library and flies the loop with it.
 
 Two processes: the first waits for the second, which does all that, to crash, tells the parent of it, and forks another
 one. It never loads the library itself, so that the next one starts afresh, and at once.
@@ -30,7 +30,6 @@ from hsv.control.library_process import SharedMemory, use_in_this_process
 from hsv.errors import HsvError, ProcessError
 from hsv.simulation.closed_loop import Components, fly_into
 from hsv.simulation.history import History
-from hsv.warm import warm
 
 
 class LoadedLibrary:
@@ -96,7 +95,6 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     path, connection, memory = Path(sys.argv[1]), Connection(int(sys.argv[2])), SharedMemory(int(sys.argv[3]))
     connection.send(None)
-    prepare = cache(warm)
     with suppress(ConnectionError):
         while True:
             pid = os.fork()
@@ -105,8 +103,6 @@ def main() -> None:
             code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
             end = f"crashed ({signal.Signals(-code).name})" if code < 0 else f"ended its process with exit code {code}"
             connection.send(ProcessError(end))
-            # Where one flight crashed, others may: the next processes inherit the compiled code.
-            prepare()
 
 
 def serve(library: LoadedLibrary, connection: Connection[Any, Any]) -> NoReturn:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+
+from hsv.core import doubles, ffi, lib
+from hsv.simulation.history import ACTUATOR, BESIDE, FLOWN, Q_F, U_N, U_UNSATURATED, X_N, U, X
 
 SETTLING_BAND = 0.02
 """Share of the step within which a response counts as settled."""
@@ -184,26 +187,42 @@ class FlightData:
     @cached_property
     def flight_curves(self) -> FlightCurves:
         """What metrics are made of."""
-        # Here, as most that name metrics compute none: what is compiled takes a while to load.
-        from hsv.simulation.curves import read_flight
-
-        curves, saturated = np.empty((CURVES, len(self.state))), np.empty(self.command.shape, bool)
-        read_flight(self.state, self.reference, self.deviation, self.command, self.unlimited, curves, saturated)
+        rows = len(self.state)
+        flown, beside = np.zeros((rows, FLOWN)), np.zeros((rows, BESIDE))
+        flown[:, X:Q_F], flown[:, X_N:U_N], flown[:, U:ACTUATOR] = self.state, self.deviation, self.command
+        beside[:, U_UNSATURATED:] = self.unlimited
+        curves, saturated = np.empty((CURVES, rows)), np.empty(self.command.shape, bool)
+        read_curves(flown, beside, np.ascontiguousarray(self.reference, float), curves, saturated)
         return FlightCurves(self.time, curves, saturated, self.fault_start)
+
+
+def read_curves(
+    flown: np.ndarray, beside: np.ndarray, reference: np.ndarray, curves: np.ndarray, saturated: np.ndarray
+) -> None:
+    """Write the ``curves`` (10, n) and the saturation (n, 2) of the rows of a history, see ``core/metrics.h``.
+
+    ``curves`` may be columns of a longer array.
+    """
+    stride = curves.strides[0] // curves.itemsize
+    given = map(doubles, (flown, beside, reference))
+    lib.hsv_curves(len(flown), stride, *given, _start(curves, "double *"), _start(saturated, "uint8_t *"))
+
+
+def _start(array: np.ndarray, kind: str) -> Any:
+    return ffi.cast(kind, array.ctypes.data)
 
 
 def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
     """Return the metrics of ``flight``, SI; those that it does not define (no step, no fault) are left out."""
-    from hsv.simulation.curves import integrate
-
     values: dict[str, float] = {}
     time, curves = flight.time, flight.curves
     faultless = len(time) if flight.fault_start is None else int(np.searchsorted(time, flight.fault_start - 1e-9))
     before, after = slice(faultless), slice(faultless, None)
-    magnitude, integrals = np.empty(len(time)), np.empty(len(time) - 1)
+    steps = np.diff(time)
     for axis, error in zip(("altitude", "velocity"), curves[:2], strict=True):
         values |= {f"{axis}_{name}": value for name, value in _step_metrics(time[before], error[before]).items()}
-        integrate(error, time, magnitude, integrals)
+        magnitude = np.abs(error)
+        integrals = 0.5 * (magnitude[1:] + magnitude[:-1]) * steps
         values[f"{axis}_integral_absolute_error"] = float(np.sum(integrals))
         values[f"{axis}_error_maximum"] = float(np.max(magnitude))
         values[f"{axis}_end_error"] = float(error[-1])
@@ -228,16 +247,15 @@ def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:
 
 def _step_metrics(time: np.ndarray, error: np.ndarray) -> dict[str, float]:
     """Return rise time, settling time and overshoot of a step whose size is the first error."""
-    from hsv.simulation.curves import step_marks
-
     if len(time) < 2 or abs(error[0]) < 1e-6:
         return {}
-    most, begun, risen, off = step_marks(error)
-    values = {"overshoot": max(0.0, most - 1.0)}
-    if risen >= 0:
-        values["rise_time"] = float(time[risen] - time[begun])
-    if off + 1 < len(time):
-        values["settling_time"] = float(time[off + 1])
+    done = 1.0 - error / error[0]
+    values = {"overshoot": max(0.0, float(np.max(done)) - 1.0)}
+    if (risen := done >= 0.9).any():
+        values["rise_time"] = float(time[np.argmax(risen)] - time[np.argmax(done >= 0.1)])
+    off = np.flatnonzero(np.abs(done - 1.0) > SETTLING_BAND)[-1:]
+    if not len(off) or off[0] + 1 < len(time):
+        values["settling_time"] = float(time[off[0] + 1 if len(off) else 0])
     return values
 
 

@@ -1,100 +1,80 @@
-"""Flights that differ little, several at a time in vector registers: each with the bits that it has alone."""
+"""Flights that differ little, several at a time in the lanes of a register: each with the bits that it has alone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple, TypeVar
+from dataclasses import fields, is_dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
-from hsv.compiled import ENABLED
-from hsv.control.controller import CONTROLLER_INPUTS
-from hsv.control.tube_law import TubeData, memory_of, watch_of
-from hsv.lane_types import WIDTH
-from hsv.lanes import LaneArray, LaneRecord
-from hsv.signals import VARYING
-from hsv.simulation.closed_loop import CommandFaults, Components, LoopArrays, Workspace, fly, fly_loop, is_ideal
+from hsv.core import Struct, lanes
+from hsv.simulation.closed_loop import Components, flight_struct, fly, fly_together, is_ideal, loop_memory
 from hsv.simulation.flight import Flight, flight_of
-from hsv.simulation.history import BESIDE, FLOWN, History
+from hsv.simulation.history import History
 from hsv.threads import over_threads
-from hsv.vehicle.dynamics import N_INPUTS
+from hsv.vehicle.plant import PlantFaults
 
 Result = TypeVar("Result")
 
 
 class FlightGroup:
-    """Flies up to :data:`hsv.lane_types.WIDTH` flights side by side, and keeps the memory for that."""
+    """Flies up to :func:`hsv.core.lanes` flights at a time, in pieces, and keeps the memory for that."""
 
-    def __init__(self, steps: int) -> None:
-        """Make room for flights of so many control periods."""
-        self._rows = steps + 1
-        self._history = LaneHistory(self._rows)
+    def __init__(self, rows: int) -> None:
+        """Make room for pieces of so many ``rows``."""
+        self.lanes = lanes()
+        self.history = History.over(np.empty((self.lanes, rows * History.numbers())), rows)
+        self._memory = loop_memory(self.lanes)
+        self._flights: list[Struct] = []
 
     @staticmethod
     def takes(components: Sequence[Components]) -> bool:
-        """Tell whether flights can be flown side by side.
+        """Return whether flights can be flown side by side.
 
-        They can where equipment and air are ideal and the bench's own laws fly, and nothing is different but vehicle,
-        beginning, faults on the command, gains and reference.
+        They can where all blocks are the core's own, and nothing differs but vehicle, seed, beginning, faults,
+        reference, gains, and the numbers of sensors, links and air.
         """
-        return ENABLED and 1 < len(components) <= WIDTH and all(_fits(components[0], other) for other in components)
+        return 1 < len(components) <= lanes() and all(_fits(components[0], other) for other in components)
 
-    def fly(self, components: Sequence[Components]) -> list[Flight]:
-        """Return the flights of ``components``, which are valid until the next ones are flown."""
-        ended = np.full(WIDTH, self._rows)
-        fly_loop(*lane_loop(components, self._rows), self._history.lanes, ended, 0, self._rows)  # type: ignore[call-arg]
-        flown, beside = self._history.arrays
-        return [
-            flight_of(own, History(flown[i], beside[i], None).cut(int(ended[i]))) for i, own in enumerate(components)
+    def begin(self, components: Sequence[Components], rows: int, tube_set: Struct | None = None) -> None:
+        """Prepare the flights of ``components``, of so many ``rows``; spare lanes fly the last one again.
+
+        ``tube_set``: the invariant set whose level is computed, if any.
+        """
+        full = [*components, *[components[-1]] * (self.lanes - len(components))]
+        estimated = not is_ideal(full[0])
+        self._flights = [
+            flight_struct(own, self.lane(i, estimated=estimated), ended=rows, set=tube_set) for i, own in enumerate(full)
         ]
 
+    def lane(self, i: int, *, estimated: bool = True) -> History:
+        """Return the history of the last piece in a lane."""
+        flown, beside, estimate = (matrix[i] for matrix in self.history)
+        return History(flown, beside, estimate if estimated else None)
 
-class LaneHistory:
-    """Memory for so many rows of :data:`hsv.lane_types.WIDTH` flights, ideal ones, as arrays and as lanes."""
+    def fly(self, start: int, stop: int) -> int:
+        """Fly the steps ``start`` ... ``stop`` - 1; return the one after the last that any flight has flown."""
+        return fly_together(self._flights, self._memory, start, stop)
 
-    def __init__(self, rows: int) -> None:
-        """Make room for so many ``rows`` of each."""
-        flown, beside, _ = History.over(np.empty((WIDTH, rows * (FLOWN + BESIDE))), rows, estimated=False)
-        self.arrays = flown, beside
-        self.lanes = LaneArray(flown, split=True), LaneArray(beside, split=True), None
+    def ended(self, i: int) -> int:
+        """Return the steps that the flight in a lane has flown, or is to fly."""
+        return int(self._flights[i].pointer.ended)
+
+    def worst(self, i: int) -> float:
+        """Return the greatest level so far of the flight in a lane."""
+        return float(self._flights[i].pointer.worst)
 
 
-def lane_loop(components: Sequence[Components], rows: int) -> tuple[Any, ...]:
-    """Return the first arguments of :func:`fly_loop`, for flights side by side of so many ``rows``.
-
-    Where there are fewer flights than lanes, the last one flies in those that are left.
-    """
-    lanes = [*components, *[components[-1]] * (WIDTH - len(components))]
-    first = lanes[0]
-    plants, notch = [own.plant for own in lanes], first.notch_filter.data
-    nominal, tube = first.nominal_trajectory, _tube([own.controller.kernel for own in lanes])
-    memory = plants[0].memory()
-    faults = tuple(CommandFaults.of(own) for own in lanes)
-    m, s = N_INPUTS, 2 * len(notch.D)
-    zeros: Any = LaneArray.zeros
-    vehicle: Any = LaneRecord([plant.vehicle for plant in plants])
-    sizes = (s if signal.size == VARYING else signal.size for signal in CONTROLLER_INPUTS)
-    memories = (zeros(len(memory_of(tube))), zeros(watch_of(tube).shape))
-    arrays = (*map(zeros, sizes), zeros(m), zeros(1), zeros(1), *memories)
-    return (
-        LaneArray.of([plant.initial.state for plant in plants]),
-        plants[0].data._replace(vehicle=vehicle),
-        memory._replace(effector=zeros(m), work=zeros(memory.work.shape)),
-        None,
-        None,
-        notch,
-        nominal.data,
-        None,
-        tube,
-        None,
-        None,
-        None,
-        faults,
-        min(own.first for own in faults),
-        _reference(lanes, rows),
-        LoopArrays(*arrays),
-        Workspace.of(zeros, notch, nominal.data),
-    )
+def fly_group(group: FlightGroup, components: Sequence[Components]) -> list[Flight]:
+    """Return the flights of ``components``, which are valid until the group flies the next ones."""
+    rows = components[0].plant.steps + 1
+    group.begin(components, rows)
+    group.fly(0, rows)
+    ideal = is_ideal(components[0])
+    return [
+        flight_of(own, group.lane(i, estimated=not ideal).cut(group.ended(i))) for i, own in enumerate(components)
+    ]
 
 
 def fly_perturbed(
@@ -114,65 +94,47 @@ def fly_perturbed(
     Raises:
         ControllerError, ParameterError: As :func:`hsv.simulation.closed_loop.fly`.
     """
+    width = lanes()
 
     def of_some(some: Sequence[Mapping[str, float]]) -> list[Result]:
         varied = [components.perturbed(perturbation) for perturbation in some]
         together = FlightGroup.takes(varied)
-        flown = FlightGroup(components.plant.steps).fly(varied) if together else map(fly, varied)
+        flown = fly_group(FlightGroup(components.plant.steps + 1), varied) if together else map(fly, varied)
         return [job(perturbation, flight) for perturbation, flight in zip(some, flown, strict=True)]
 
-    groups = [perturbations[start : start + WIDTH] for start in range(0, len(perturbations), WIDTH)]
-    done = over_threads(of_some, groups, lambda groups: progress(min(groups * WIDTH, len(perturbations))))
+    groups = [perturbations[start : start + width] for start in range(0, len(perturbations), width)]
+    done = over_threads(of_some, groups, lambda groups: progress(min(groups * width, len(perturbations))))
     return [result for results in done for result in results]
 
 
 def _fits(first: Components, other: Components) -> bool:
     for own in (first, other):
-        compiled = own.controller.compiled_with_loop and own.nominal_trajectory.law.compiled_with_loop
-        if not compiled or not is_ideal(own):
+        if not (own.controller.compiled_with_loop and own.nominal_trajectory.law.compiled_with_loop):
             return False
-    return first is other or all(
-        _same(a, b)
-        for a, b in (
-            (first.plant.steps, other.plant.steps),
-            (first.plant.data[1:-1], other.plant.data[1:-1]),
-            (first.notch_filter.data, other.notch_filter.data),
-            (first.nominal_trajectory.data, other.nominal_trajectory.data),
-            (first.controller.kernel[1:], other.controller.kernel[1:]),
-            (first.controller.kernel.gains.shape, other.controller.kernel.gains.shape),
-        )
+    return first is other or all(map(_same, _shared(first), _shared(other)))
+
+
+def _shared(components: Components) -> tuple[Any, ...]:
+    """Return all that flights side by side have in common."""
+    plant, notch, tube = components.plant, components.notch_filter, components.controller.kernel
+    data, nominal = plant.data, components.nominal_trajectory.data
+    faults = PlantFaults.of(components.fault_injector.known, plant.period)
+    calm = data.atmosphere.still and not len(faults.engine.rows)
+    return (
+        (plant.steps, plant.period, data.substeps, data.late, calm, data.vehicle.angle_limit, is_ideal(components)),
+        data.actuators,
+        notch.data,
+        notch.estimator and notch.estimator.data,
+        nominal,
+        [getattr(tube, field.name) for field in fields(tube) if field.name not in ("gains", "starts")],
     )
 
 
 def _same(a: Any, b: Any) -> bool:
     if a is b:
         return True
-    if isinstance(a, tuple):
+    if is_dataclass(a) and is_dataclass(b):
+        return all(_same(getattr(a, field.name), getattr(b, field.name)) for field in fields(a))
+    if isinstance(a, tuple | list):
         return len(a) == len(b) and all(map(_same, a, b))
     return np.array_equal(a, b)
-
-
-def _tube(tubes: Sequence[TubeData]) -> Any:
-    if all(tube is tubes[0] for tube in tubes):
-        return tubes[0]
-    gains: Any = LaneArray.of([tube.gains for tube in tubes])
-    return tubes[0]._replace(gains=gains)
-
-
-def _reference(lanes: Sequence[Components], rows: int) -> Any:
-    trajectories = [own.nominal_trajectory.reference for own in lanes]
-    if all(trajectory is trajectories[0] for trajectory in trajectories):
-        return trajectories[0].data
-    columns = (
-        [getattr(trajectory.along(rows), name) for trajectory in trajectories] for name in _Reference._fields[1:]
-    )
-    return _Reference(0, *map(LaneArray.of, columns))
-
-
-class _Reference(NamedTuple):
-    """What a :class:`hsv.control.reference_trajectory.ReferenceData` is of one flight."""
-
-    first: int
-    state: LaneArray
-    input: LaneArray
-    defect: LaneArray

@@ -1,8 +1,8 @@
-"""Actuators of the vehicle: dynamics of first and second order with limits, discretised exactly, compiled.
+"""Actuators of the vehicle: published sets, their parameters, and the data that ``core/actuators.h`` steps.
 
-An actuator moves on substeps of a quarter of the control period, and the vehicle on the same ones, held over each where
-the actuator is at its middle. A channel whose actuator is ideal is where its command is; with all channels ideal and no
-fault of theirs the vehicle takes the command itself, as if this module were not there.
+An actuator moves on substeps of a quarter of the control period, and so does the vehicle, whose effector is held over
+each at the mean of the substep's two ends. A channel whose actuator is ideal is where its command is; with all channels
+ideal and no fault of theirs the vehicle takes the command itself.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit_in_flight
-from hsv.elementary import exponential, sine_cosine
+from hsv.core import ffi, lib
 from hsv.errors import ParameterError
 from hsv.parameters import Parameter, check_all
 from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS
@@ -23,9 +22,6 @@ from hsv.vehicle.parameters import VehicleParameters
 
 SUBSTEPS = 4
 """Substeps of a control period, if an actuator is not ideal."""
-
-POSITION, RATE = 0, 1
-"""Columns of the state (2, 2), a row a channel."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +105,7 @@ ACTUATOR_PARAMETERS = _parameters()
 
 
 class ActuatorData(NamedTuple):
-    """Actuators for compiled functions, an entry a channel (2), and the length ``substep`` (s) of a substep.
+    """Actuators as the core takes them, an entry a channel (2), and the length ``substep`` (s) of a substep.
 
     ``map`` (2, 4) is that of :func:`actuator_map`, over a substep.
     """
@@ -126,7 +122,6 @@ class ActuatorData(NamedTuple):
     ideal: bool
 
 
-@njit_in_flight(error_model="numpy")
 def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
     """Return F11, F12, F21, F22 of position less command and rate over ``h`` (s), the command held: exact.
 
@@ -136,79 +131,9 @@ def actuator_map(order: int, frequency: float, damping: float, h: float) -> tupl
         damping: Up to 1, of an order of 2.
         h: s.
     """
-    if order == 1:
-        return exponential(-frequency * h), 0.0, 0.0, 0.0
-    decay = exponential(-damping * frequency * h)
-    damped = frequency * np.sqrt(1.0 - damping * damping)
-    sin, cos = sine_cosine(damped * h)
-    scaled = sin / damped if damped > 0.0 else h
-    return (
-        decay * (cos + damping * frequency * scaled),
-        decay * scaled,
-        -frequency * frequency * decay * scaled,
-        decay * (cos - damping * frequency * scaled),
-    )
-
-
-@njit_in_flight(error_model="numpy")
-def actuator_step(
-    order: int,
-    map: Any,
-    position: float,
-    rate: float,
-    command: float,
-    minimum: float,
-    maximum: float,
-    rate_limit: float,
-    acceleration_limit: float,
-    h: float,
-) -> tuple[float, float, float]:
-    """Return position and rate ``h`` (s) later, the command held (limits in GHV's order, see :data:`ACTUATOR_SETS`).
-
-    The command goes to the stops; the exact map; acceleration; rate; the stops. A position that is beyond a stop, which
-    has moved, may stay there and return, but not go further. In equilibrium nothing changes, to the bit. The third
-    number is what the vehicle is given: the middle of the way, but for an ideal actuator, which is where its command is
-    at once.
-
-    Args:
-        order: 0, 1 or 2.
-        map: Of :func:`actuator_map` (4).
-        position: Of the actuator; that and the rest in the channel's unit.
-        rate: Per second; an order below 2 does not need it.
-        command: Position that is asked for.
-        minimum: Stop.
-        maximum: Stop.
-        rate_limit: Infinite: none.
-        acceleration_limit: Infinite: none; for an order of 2.
-        h: s.
-    """
-    wanted = min(max(command, minimum), maximum)
-    if order == 2:
-        error = position - wanted
-        moved = wanted + (map[0] * error + map[1] * rate)
-        speed = map[2] * error + map[3] * rate
-        change = acceleration_limit * h
-        speed = min(max(speed, rate - change), rate + change)
-        speed = min(max(speed, -rate_limit), rate_limit)
-    elif order == 1:
-        moved = wanted + map[0] * (position - wanted)
-        speed = 0.0
-    else:
-        moved = wanted
-        speed = 0.0
-    reach = rate_limit * h
-    if abs(moved - position) > reach:
-        moved = position + (reach if moved > position else -reach)
-    low, high = min(minimum, position), max(maximum, position)
-    if moved <= low:
-        moved = low
-        speed = max(speed, 0.0)
-    elif moved >= high:
-        moved = high
-        speed = min(speed, 0.0)
-    if order < 2:
-        speed = (moved - position) / h
-    return moved, speed, 0.5 * (position + moved) if order > 0 or rate_limit < np.inf else moved
+    found = ffi.new("double[4]")
+    lib.hsv_actuator_map(int(order), frequency, damping, h, found)
+    return tuple(found)
 
 
 def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> ActuatorData:
@@ -264,7 +189,7 @@ def _one(values: Mapping[str, Any], name: str, standard: float) -> float:
 
 
 def actuators_at_rest(position: np.ndarray) -> np.ndarray:
-    """Return the state (2, 2) of actuators that rest at ``position`` (2), as flights begin in trim."""
+    """Return positions and rates (2, 2) of actuators that rest at ``position`` (2), as flights begin in trim."""
     state = np.zeros((N_INPUTS, 2))
-    state[:, POSITION] = position
+    state[:, 0] = position
     return state

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
+import numpy as np
 
-from hsv.compiled import njit_in_flight
+from hsv.core import doubles, lib, vector
 
 FOOT = 0.3048
 """Metres in a foot, by definition."""
 
 
-@njit_in_flight()
-def in_model_range(x: Any, angle_limit: Any) -> Any:
-    """Tell whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
-    inside = (abs(x[2]) <= angle_limit) & (abs(x[3]) <= angle_limit) & (x[1] > 0.0)
-    for i in range(len(x)):
-        inside = inside & math.isfinite(x[i])
-    return inside
+def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
+    """Return whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
+    return bool(lib.hsv_in_model_range(doubles(vector(x)), angle_limit))

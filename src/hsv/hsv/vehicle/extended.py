@@ -9,11 +9,10 @@ not move the vehicle. ``printed`` selects that reading; the other is the physica
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hsv.compiled import njit
 from hsv.vehicle.dynamics import N_INPUTS, N_STATES, PITCH_RATE, derivative
 from hsv.vehicle.parameters import VehicleParameters
 
@@ -27,50 +26,41 @@ class Filter(NamedTuple):
     D: float
 
 
-@njit(cache=True, error_model="numpy")
-def extended_derivative(x: Any, u: Any, p: Any, notch: Any, printed: bool, out: Any) -> None:
-    """Write dx'/dt into ``out`` (9 + k) (paper eq. 40); complex arguments are taken, too."""
-    filtered = x[PITCH_RATE]
-    vehicle = x[:N_STATES].copy()
+def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool) -> np.ndarray:
+    """Return dx'/dt (9 + k) (paper eq. 40), complex where ``x`` (9 + k) or ``u`` (2) is."""
+    filtered, s = x[PITCH_RATE], x[N_STATES:]
     passed = 0.0 * filtered
-    for i in range(len(notch.B)):
-        passed += notch.C[i] * x[N_STATES + i]
-    rate = (filtered - passed) / notch.D
+    for c, value in zip(notch.C, s, strict=True):
+        passed += c * value
+    # Python divides both parts of a complex number; numpy multiplies them by the inverse, with other last bits.
+    rate = (filtered - passed).item() / float(notch.D)
+    vehicle = x[:N_STATES].copy()
     vehicle[PITCH_RATE] = rate
-    derivative(vehicle, u, p, out)
+    out = derivative(vehicle, u, p)
     if printed:
         out[2] += filtered - rate
         out[3] = filtered
     out[PITCH_RATE] *= notch.D
-    for i in range(len(notch.B)):
-        change = notch.B[i] * rate
-        for j in range(len(notch.B)):
-            change += notch.A[i, j] * x[N_STATES + j]
-        out[N_STATES + i] = change
-        out[PITCH_RATE] += notch.C[i] * change
+    change = notch.B * rate
+    for column, value in zip(notch.A.T, s, strict=True):
+        change = change + column * value
+    for c, value in zip(notch.C, change, strict=True):
+        out[PITCH_RATE] += c * value
+    return np.concatenate((out, change))
 
 
-@njit(cache=True, error_model="numpy")
 def extended_jacobian(
-    x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Any, printed: bool
+    x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return A' (9 + k, 9 + k) and B' (9 + k, 2) (paper eq. 42, eq. 43), by the complex step."""
     step = 1e-40
     n = len(x)
-    A, B = np.empty((n, n)), np.empty((n, N_INPUTS))
-    z, v = x.astype(np.complex128), u.astype(np.complex128)
-    out = np.empty(n, np.complex128)
-    for j in range(n):
-        z[j] += 1j * step
-        extended_derivative(z, v, p, notch, printed, out)
-        A[:, j] = out.imag / step
-        z[j] = x[j]
-    for j in range(N_INPUTS):
-        v[j] += 1j * step
-        extended_derivative(z, v, p, notch, printed, out)
-        B[:, j] = out.imag / step
-        v[j] = u[j]
-    return A, B
+    columns = []
+    for change in 1j * step * np.eye(n + N_INPUTS):
+        rates = extended_derivative(x + change[:n], u + change[n:], p, notch, printed)
+        columns.append(rates.imag / step)
+    both = np.array(columns).T
+    return both[:, :n].copy(), both[:, n:].copy()
 
 
 def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:

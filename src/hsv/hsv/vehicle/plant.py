@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.compiled import bound, njit_in_flight
-from hsv.faults.effectors import advance_equipped
-from hsv.faults.laws import FaultRows, apply_engine_faults, fault_memory, fault_rows
+from hsv.core import Data, Struct, doubles, lib, vector
+from hsv.faults.laws import FaultRows, fault_rows
 from hsv.faults.schedule import ActiveFault, ScheduledFault
 from hsv.faults.table import COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
 from hsv.links import (
@@ -22,24 +22,20 @@ from hsv.links import (
     computation,
     link_state,
     measurement_link,
-    receive,
 )
 from hsv.noise import SEED_PARAMETER
 from hsv.parameters import Parameter, check_all
-from hsv.sensors import SENSOR_PARAMETERS, SensorData, measure, sensor_data, sensor_state
+from hsv.sensors import SENSOR_PARAMETERS, SensorData, sensor_data, sensor_state
 from hsv.vehicle.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, ActuatorData, actuator_data, actuators_at_rest
 from hsv.vehicle.atmosphere import (
     ATMOSPHERE_PARAMETERS,
     AtmosphereData,
     atmosphere_data,
     atmosphere_state,
-    atmosphere_step,
-    speed_of_sound,
 )
-from hsv.vehicle.dynamics import N_STATES, air_relative, forces, forces_in
+from hsv.vehicle.dynamics import N_STATES, forces
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
-from hsv.vehicle.integration import advance, workspace
 from hsv.vehicle.parameters import COEFFICIENT_UNITS, VehicleParameters
 from hsv.vehicle.trim import Trim
 from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
@@ -89,17 +85,19 @@ def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, pe
 
 
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Conditions of :func:`hsv.vehicle.dynamics.forces_in` in still air, with an engine that works."""
+"""Conditions of air and engine in still air, with an engine that works."""
 
 _CALM = CALM.tolist()
 
 
-class PlantData(NamedTuple):
-    """The plant for compiled functions; ``period`` T (s).
+@dataclass(frozen=True, eq=False)
+class PlantData(Data):
+    """The plant as the core takes it; ``period`` T (s).
 
     The actuators have the command of a period ``late`` substeps after its beginning.
     """
 
+    KIND = "hsv_plant"
     vehicle: VehicleParameters
     period: float
     substeps: int
@@ -110,13 +108,18 @@ class PlantData(NamedTuple):
     late: float
     seed: int
 
+    @property
+    def ideal(self) -> bool:
+        """Whether the equipment is ideal, the air still and the command in time."""
+        ideal = self.actuators.ideal and self.sensors.ideal and self.link.ideal
+        return ideal and self.atmosphere.still and self.late == 0.0
+
 
 class PlantMemory(NamedTuple):
-    """State of the plant between steps besides the state x, updated in place.
+    """What the plant remembers besides the state x, updated in place.
 
-    Position and rate of the actuators (2, 2); what reached them last and what the vehicle was given last (2 each); the
-    states of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period;
-    scratch.
+    Position and rate of the actuators (2, 2); the command and the effectors of the period before (2 each); the memories
+    of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period.
     """
 
     actuators: np.ndarray
@@ -126,74 +129,20 @@ class PlantMemory(NamedTuple):
     sensors: np.ndarray
     link: np.ndarray
     conditions: np.ndarray
-    work: np.ndarray
 
 
 class PlantFaults(NamedTuple):
-    """Faults of actuators and effectors, of the engine and of the sensors, with their memories."""
+    """Faults of actuators and effectors, of the engine and of the sensors."""
 
     effector: FaultRows
-    effector_memory: np.ndarray
     engine: FaultRows
-    engine_memory: np.ndarray
     sensor: FaultRows
-    sensor_memory: np.ndarray
 
     @classmethod
     def of(cls, scheduled: Sequence[ScheduledFault], period: float, before: PlantFaults | None = None) -> PlantFaults:
-        """Return those among the ``scheduled``; what was known ``before`` keeps its memory."""
-        found: list[Any] = []
-        for i, sides in enumerate(((DYNAMICS, EFFECTOR), (ENGINE_SIDE,), (SENSOR,))):
-            rows = fault_rows(sides, scheduled, period)
-            earlier: Any = before[2 * i : 2 * i + 2] if before else (None, None)
-            found += rows, fault_memory(rows, *earlier)
-        return cls(*found)
-
-
-@njit_in_flight(error_model="numpy")
-def advance_plant(x: np.ndarray, actuator: np.ndarray, data: Any, memory: Any, faults: Any, step: int) -> None:
-    """Replace ``x`` (9) in ``step`` by the state one period later.
-
-    Args:
-        x: State, replaced.
-        actuator: What reaches the actuators (2), from then on held.
-        data: :class:`PlantData`.
-        memory: :class:`PlantMemory`.
-        faults: :class:`PlantFaults`.
-        step: k.
-    """
-    actuators, before, effector, atmosphere, _, _, conditions, work = memory
-    air, period, substeps, seed = data.atmosphere, data.period, data.substeps, data.seed
-    driven = (data.actuators, actuators, faults.effector, faults.effector_memory, step, seed, effector, work)
-    if air.still and len(faults.engine.table) == 0:
-        advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, None, before, data.late)
-        _hold(actuator, before)
-        return
-    if not air.still:
-        atmosphere_step(air, atmosphere, step, seed, x[0], x[1], conditions[:3])
-    speed, turn, _, _ = air_relative(x[1], x[3] - x[2], conditions[0], conditions[1])
-    mach = speed / speed_of_sound(x[0])
-    engine, engine_memory = faults.engine, faults.engine_memory
-    apply_engine_faults(engine, engine_memory, step, seed, x[2] - turn, mach, actuator[0], conditions[3:])
-    advance_equipped(x, actuator, data.vehicle, period, substeps, *driven, conditions, before, data.late)
-    _hold(actuator, before)
-
-
-@njit_in_flight(error_model="numpy", inline="always")
-def _hold(actuator: np.ndarray, before: np.ndarray) -> None:
-    for i in range(len(before)):
-        before[i] = actuator[i]
-
-
-@njit_in_flight(error_model="numpy")
-def sense(x: np.ndarray, data: Any, memory: Any, faults: Any, step: int, measurement: np.ndarray) -> None:
-    """Write into ``measurement`` (9) what comes of what sensors say of ``x`` (9); see :func:`advance_plant`."""
-    if data.sensors.ideal and len(faults.sensor.table) == 0:
-        for i in range(len(x)):
-            measurement[i] = x[i]
-    else:
-        measure(data.sensors, memory.sensors, faults.sensor, faults.sensor_memory, step, data.seed, x, measurement)
-    receive(data.link, memory.link, step, data.seed, measurement)
+        """Return those among the ``scheduled``; the faults that were known ``before`` keep their memory."""
+        sides = ((DYNAMICS, EFFECTOR), (ENGINE_SIDE,), (SENSOR,))
+        return cls._make(fault_rows(side, scheduled, period, before and before[i]) for i, side in enumerate(sides))
 
 
 class PlantResult(NamedTuple):
@@ -255,15 +204,6 @@ class Plant:
             SUBSTEPS * computation(values, period)[1],
             check_all((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
-        self._in_model_range = bound(in_model_range)
-        self._advance_ideal, self._advance_plant = bound(advance), bound(advance_plant)
-        self._forces_in_calm, self._forces_in = bound(forces), bound(forces_in)
-        self._sense = bound(sense)
-        self.reset()
-        # Compile now, also what a fault in flight would need: a cold cache must not stall a flight.
-        self.step(initial.input)
-        self._advance_plant(self._state, initial.input, self.data, self._memory, self._faults, 0)
-        self._sense(self._state, self.data, self._memory, self._faults, 0, np.empty_like(self._state))
         self.reset()
 
     @classmethod
@@ -287,25 +227,22 @@ class Plant:
         """Return the same with a ``vehicle`` of the same limits and another ``seed``; what these leave is shared."""
         other = copy(self)
         other.vehicle = vehicle
-        other.data = self.data._replace(vehicle=vehicle, seed=seed)
+        other.data = replace(self.data, vehicle=vehicle, seed=seed)
         other.reset()
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
         """Tell whether the equipment is ideal and the air still, and no fault in a schedule changes that."""
-        data = self.data
-        ideal = data.actuators.ideal and data.sensors.ideal and data.link.ideal
-        in_time = data.atmosphere.still and data.late == 0.0
-        return ideal and in_time and all(row.fault.kind.side == COMMAND for row in scheduled)
+        return self.data.ideal and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
         self._state = self.initial.state.copy()
         self._step = 0
         self._memory = self.memory()
+        self._remembered = Struct("hsv_plant_memory", self._memory)
         self._active: tuple[ActiveFault, ...] = ()
-        self._faults = PlantFaults.of((), self.period)
-        self._ideal = self.is_ideal(())
+        self._know(PlantFaults.of((), self.period))
         return self._result()
 
     def memory(self) -> PlantMemory:
@@ -313,8 +250,11 @@ class Plant:
         held = self.initial.input
         air = atmosphere_state(self.data.atmosphere)
         sensors, link = sensor_state(), link_state(self.data.link, N_STATES)
-        at_rest = actuators_at_rest(held)
-        return PlantMemory(at_rest, held.copy(), held.copy(), air, sensors, link, CALM.copy(), workspace())
+        return PlantMemory(actuators_at_rest(held), held.copy(), held.copy(), air, sensors, link, CALM.copy())
+
+    def _know(self, faults: PlantFaults) -> None:
+        self._faults = faults
+        self._known = Struct("hsv_plant_faults", faults)
 
     def place(self, step: int, state: np.ndarray) -> None:
         """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""
@@ -328,37 +268,31 @@ class Plant:
         """
         if active != self._active:
             known = [ScheduledFault(fault, since) for fault, since in active]
-            self._faults = PlantFaults.of(known, self.period, self._faults)
-            self._ideal = self.is_ideal(known)
+            self._know(PlantFaults.of(known, self.period, self._faults))
             self._active = active
-        self._advance(actuator)
+        memory, faults = self._remembered.pointer, self._known.pointer
+        given = doubles(vector(actuator)), doubles(self._state)
+        lib.hsv_advance_plant(self.data.pointer, memory, faults, self._step, *given)
         self._step += 1
         return self._result()
 
-    def _advance(self, actuator: np.ndarray) -> None:
-        data, memory = self.data, self._memory
-        if not self._ideal:
-            self._advance_plant(self._state, actuator, data, memory, self._faults, self._step)
-            return
-        # What advance_plant would do as well; but to hand it all its data takes longer than the step.
-        effector = memory.effector
-        np.minimum(np.maximum(actuator, data.actuators.minimum), data.actuators.maximum, out=effector)
-        memory.actuators[:, 0], memory.actuators[:, 1] = effector, 0.0
-        self._advance_ideal(self._state, effector, self.vehicle, self.period, data.substeps, memory.work, None)
-
     def _result(self) -> PlantResult:
-        if not self._in_model_range(self._state, self.vehicle.angle_limit):
+        if not in_model_range(self._state, self.vehicle.angle_limit):
             status = FlightStatus.DIVERGED
         elif self._step >= self.steps:
             status = FlightStatus.FINISHED
         else:
             status = FlightStatus.RUNNING
         effector, conditions = self._memory.effector.copy(), self._memory.conditions.copy()
-        if conditions.tolist() == _CALM:
-            felt = self._forces_in_calm(self._state, effector, self.vehicle)
-        else:
-            *felt, _ = self._forces_in(conditions, self._state, effector, self.vehicle)
-        measurement = self._state.copy()
-        if not self._ideal:
-            self._sense(self._state, self.data, self._memory, self._faults, self._step, measurement)
+        calm = conditions.tolist() == _CALM
+        *felt, _ = forces(self._state, effector, self.vehicle, None if calm else conditions)
+        measurement = np.empty(N_STATES)
+        lib.hsv_sense(
+            self.data.pointer,
+            self._remembered.pointer,
+            self._known.pointer,
+            self._step,
+            doubles(self._state),
+            doubles(measurement),
+        )
         return PlantResult(self._step, self._state.copy(), measurement, tuple(felt), effector, conditions[:3], status)

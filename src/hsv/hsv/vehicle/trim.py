@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hsv.compiled import njit
+from hsv.core import doubles, lib
 from hsv.elementary import arcsine
-from hsv.elimination import solve
 from hsv.errors import TrimError
-from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS, N_STATES, derivative, jacobian
+from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS, N_STATES, derivative, vehicle_struct
 from hsv.vehicle.parameters import VehicleParameters
 
 CONVERGED = 1e-9
@@ -33,9 +31,8 @@ class Trim:
     residual: float
 
 
-@njit(cache=True)
 def balance(
-    rigid: Any,
+    rigid: VehicleParameters,
     path_angle: float,
     acceleration: float,
     unknown: np.ndarray,
@@ -43,59 +40,21 @@ def balance(
     u: np.ndarray,
     pitch_rate: float = 0.0,
 ) -> float:
-    """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the largest remaining imbalance.
+    """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the greatest remaining imbalance.
 
-    Newton's method with exact derivatives in angle of attack, fuel equivalence ratio and elevator deflection, from
-    ``unknown`` (3), which is replaced by the best that was found; the velocity equation, less ``acceleration``
-    (m/s^2), and those of angle of attack and pitch rate go to zero. The pitch angle follows from ``path_angle`` (rad).
-    The elastic coordinates are N_i / omega_i^2: the pitching moment is zero, whatever the inertial coupling.
+    See ``hsv_balance`` in ``core/trim.h``.
 
     Args:
         rigid: Parameters of the decoupled vehicle.
-        path_angle: Flight-path angle, pitch angle less angle of attack.
-        acceleration: dV/dt.
-        unknown: First guess.
+        path_angle: Flight-path angle (rad), pitch angle less angle of attack.
+        acceleration: dV/dt (m/s^2).
+        unknown: First guess (3), replaced by the best that was found.
         x: Altitude and velocity given; the others are written.
         u: Written.
-        pitch_rate: That of a steady pull-up, the rate of the flight-path angle; the angle of attack does not change.
+        pitch_rate: That of a steady pull-up (rad/s), the rate of the flight-path angle.
     """
-    rates = np.empty(N_STATES)
-    slope, right = np.empty((3, 3)), np.empty((3, 1))
-    trial = unknown.copy()
-    best_size = np.inf
-    x[4:] = 0.0
-    x[4] = pitch_rate
-    for _ in range(60):
-        x[2], x[3] = trial[0], trial[0] + path_angle
-        u[0], u[1] = trial[1], trial[2]
-        derivative(x, u, rigid, rates)
-        rates[1] -= acceleration
-        size = max(abs(rates[1]), abs(rates[2]), abs(rates[4]))
-        if not np.isfinite(size):
-            break
-        if size >= best_size and best_size < CONVERGED:
-            break  # rounding level: no further step helps
-        if size < best_size:
-            for i in range(3):
-                unknown[i] = trial[i]
-            best_size = size
-        A, B = jacobian(x, u, rigid)
-        for i, row in enumerate((1, 2, 4)):
-            # The path angle is given: pitch angle and angle of attack change together.
-            slope[i, 0] = A[row, 2] + A[row, 3]
-            for j in range(N_INPUTS):
-                slope[i, 1 + j] = B[row, j]
-            right[i, 0] = rates[row]
-        change = solve(slope, right)  # not finite where the slope is singular
-        for i in range(3):
-            trial[i] -= change[i, 0]
-    x[2], x[3] = unknown[0], unknown[0] + path_angle
-    u[0], u[1] = unknown[1], unknown[2]
-    # At zero coordinates the elastic accelerations of the decoupled model are the generalised forces.
-    derivative(x, u, rigid, rates)
-    x[5] = rates[6] / (rigid.natural_frequency_1 * rigid.natural_frequency_1)
-    x[7] = rates[8] / (rigid.natural_frequency_2 * rigid.natural_frequency_2)
-    return best_size
+    struct = vehicle_struct(rigid).pointer
+    return float(lib.hsv_balance(struct, path_angle, acceleration, pitch_rate, *map(doubles, (unknown, x, u))))
 
 
 def trim(
@@ -128,8 +87,7 @@ def trim(
     x[0], x[1] = altitude, velocity
     size = balance(vehicle.decoupled(), arcsine(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
     check_equilibrium(where, size, u, vehicle)
-    rates = np.empty(N_STATES)
-    derivative(x, u, vehicle, rates)
+    rates = derivative(x, u, vehicle)
     rates[:2] -= climb_rate, acceleration
     return Trim(x, u, float(np.max(np.abs(rates))))
 

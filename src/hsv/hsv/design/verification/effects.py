@@ -22,17 +22,12 @@ from hsv.design.verification.plan import Plan
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.lpv.grid import linearise
 from hsv.sensors import ALPHA, PITCH
-from hsv.vehicle.dynamics import (
-    N_RIGID,
-    N_STATES,
-    PITCH_RATE,
-    derivative,
-)
+from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE, derivative
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
 
 _WIND_FORWARD, _WIND_UP, _DENSITY = 0, 1, 2
-"""Indices into the conditions that :func:`hsv.vehicle.dynamics.forces_in` takes."""
+"""Indices into the conditions that :func:`hsv.vehicle.dynamics.forces` takes."""
 
 N_SCHEDULING = 2
 """The nominal model is scheduled by the first states, altitude and velocity."""
@@ -137,11 +132,11 @@ def air(vehicle: Vehicle, period: float, forward: float = 0.0, up: float = 0.0, 
         point = trim(vehicle.decoupled, *vehicle.centre)
         slopes = np.empty((N_STATES, len(bounds)))
         for column, (index, step) in enumerate(zip((_WIND_FORWARD, _WIND_UP, _DENSITY), _STEP, strict=True)):
-            ends = np.empty((2, N_STATES))
-            for end, sign in zip(ends, (1.0, -1.0), strict=True):
+            ends = []
+            for sign in (1.0, -1.0):
                 conditions = _STILL.copy()
                 conditions[index] += sign * step
-                derivative(point.state, point.input, vehicle.decoupled, end, conditions)
+                ends.append(derivative(point.state, point.input, vehicle.decoupled, conditions))
             slopes[:, column] = (ends[0] - ends[1]) / (2.0 * step)
         A, _ = linearise(vehicle.decoupled, *vehicle.centre)
         rigid = zero_order_hold(A[:N_RIGID, :N_RIGID], slopes[:N_RIGID], period)[1]

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design import ControlDesign
-from hsv.design.disturbance import CHANNELS, DisturbanceSet, Record, acceleration_channels, widened
+from hsv.design.disturbance import CHANNELS, DisturbanceSet, Record, acceleration_channels, scheduled, widened
 from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, incomplete_share, measure, record
 from hsv.design.tube_problem import channel_model, known_actuators
 from hsv.design.verification.checks import Subject
 from hsv.lpv.actuated import respond, sampled_actuators
-from hsv.lpv.polytope import schedule
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.vehicle.dynamics import N_RIGID
 from hsv.vehicle.trim import trim
 
 _ACCELERATED, _REMAINING = [1, 2, 4], [0, 3]
@@ -73,23 +72,18 @@ class Plan:
         The nominal model is scheduled with what is measured, so its prediction of x_n is off by
         [A(p + error) - A(p)] x_n + [B(p + error) - B(p)] u_n. Both ends of both errors are looked at.
         """
-        polytope = self.subject.design.polytope.data()
-        width = N_STATES + N_INPUTS
-        x_n, u_n = self.record.deviation, self.record.nominal_input
-        there, here = np.empty(N_STATES * width), np.empty(N_STATES * width)
-        weights = np.empty(len(polytope.S))
+        polytope, points = self.subject.design.polytope, self.record.state[:, :2]
+        here = scheduled(polytope, points)
+        ends = [scheduled(polytope, points + np.multiply(signs, errors)) for signs in product((-1.0, 1.0), repeat=2)]
         columns = acceleration_channels(self.subject.vehicle, self.subject.design.period)
         inverse = np.linalg.inv(columns[_ACCELERATED])
         largest = np.zeros(len(CHANNELS))
-        for k, row in enumerate(np.column_stack((x_n, u_n))):
+        for k, row in enumerate(np.column_stack((self.record.deviation, self.record.nominal_input))):
             # Where the plan has come to rest there is nothing to be wrong about.
             if not np.abs(row).max() > 0.0:
                 continue
-            altitude, velocity = self.record.state[k, :2]
-            schedule(polytope, altitude, velocity, weights, here)
-            for first, second in product((-1.0, 1.0), repeat=2):
-                schedule(polytope, altitude + first * errors[0], velocity + second * errors[1], weights, there)
-                off = ((there - here).reshape(N_STATES, width) @ row)[:N_RIGID]
+            for there in ends:
+                off = ((there[k] - here[k]) @ row)[:N_RIGID]
                 accelerations = inverse @ off[_ACCELERATED]
                 largest[_EXPLAINED] = np.maximum(largest[_EXPLAINED], np.abs(accelerations))
                 remains = off[_REMAINING] - columns[_REMAINING] @ accelerations

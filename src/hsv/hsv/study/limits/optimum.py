@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from hsv.compiled import njit
+from hsv.core import doubles, ffi, lib, vector
 from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian
-from hsv.vehicle.integration import advance
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, jacobian, vehicle_struct
 from hsv.vehicle.parameters import VehicleParameters
 
 STATE_SCALE = np.array([100.0, 50.0, 0.03, 0.03, 0.05, 1.0, 10.0, 1.0, 10.0])
@@ -33,6 +32,7 @@ DEFECT = 1e-7
 _PENALTY = 30.0
 _ITERATIONS = 400
 _SIZE = N_STATES + N_INPUTS + 1
+_STEP = 1e-40  # of hsv_transitions
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,6 @@ def finer(point: Point, factor: int) -> Point:
     return Point(point.scalar, state, np.repeat(point.input, factor, 0), np.repeat(point.multipliers, factor, 0))
 
 
-@njit(cache=True)
 def transitions(
     state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, vehicle: VehicleParameters
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -113,25 +112,25 @@ def transitions(
 
     These are by state, input and length of the period (s), by the complex step: exact.
     """
-    step = 1e-40
-    n = len(state)
-    end, slope = np.empty((n, N_STATES)), np.empty((n, N_STATES, _SIZE))
-    x, u = np.empty(N_STATES, np.complex128), np.empty(N_INPUTS, np.complex128)
-    work = np.empty((3, N_STATES), np.complex128)
-    for k in range(n):
-        for j in range(_SIZE):
-            for i in range(N_STATES):
-                x[i] = complex(state[k, i], step if i == j else 0.0)
-            for i in range(N_INPUTS):
-                u[i] = complex(inputs[k, i], step if N_STATES + i == j else 0.0)
-            length: Any = complex(period[k], step if j == _SIZE - 1 else 0.0)
-            advance(x, u, vehicle, length, substeps[k], work)
-            slope[k, :, j] = x.imag / step
-        end[k] = x.real
-    return end, slope
+    end, changes = _complex_steps(state, inputs, period, substeps, vehicle)
+    return end, changes / _STEP
 
 
-@njit(cache=True)
+def _complex_steps(
+    state: np.ndarray, inputs: np.ndarray, period: np.ndarray, substeps: np.ndarray, vehicle: VehicleParameters
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what :func:`transitions` does, the derivatives times the complex step."""
+    end, changes = np.empty((len(period), N_STATES)), np.empty((len(period), N_STATES, _SIZE))
+    lib.hsv_transitions(
+        len(period),
+        *(doubles(vector(each)) for each in (state, inputs, period)),
+        ffi.from_buffer("int64_t[]", np.ascontiguousarray(substeps, np.int64)),
+        vehicle_struct(vehicle).pointer,
+        *map(doubles, (end, changes)),
+    )
+    return end, changes
+
+
 def curvatures(
     state: np.ndarray,
     inputs: np.ndarray,
@@ -144,32 +143,23 @@ def curvatures(
 
     By state, input and length of the period: complex steps, differenced. The elastic states enter linearly: zero.
     """
-    step = 1e-40
-    n = len(state)
-    curved = np.array([0, 1, 2, 3, 4, 9, 10, 11])
-    reach = np.array([1.0, 1.0, 1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0, 0.0, 1e-3, 1e-3, 1e-5])
-    found = np.zeros((n, _SIZE, _SIZE))
-    point, gradient = np.empty(_SIZE), np.empty((2, _SIZE))
-    x, u = np.empty(N_STATES, np.complex128), np.empty(N_INPUTS, np.complex128)
-    work = np.empty((3, N_STATES), np.complex128)
-    for k in range(n):
-        for a in curved:
-            for side in range(2):
-                point[:N_STATES], point[N_STATES:-1], point[-1] = state[k], inputs[k], period[k]
-                point[a] += reach[a] * (1.0 - 2.0 * side)
-                for b in curved:
-                    for i in range(N_STATES):
-                        x[i] = complex(point[i], step if i == b else 0.0)
-                    for i in range(N_INPUTS):
-                        u[i] = complex(point[N_STATES + i], step if N_STATES + i == b else 0.0)
-                    length: Any = complex(point[-1], step if b == _SIZE - 1 else 0.0)
-                    advance(x, u, vehicle, length, substeps[k], work)
-                    gradient[side, b] = np.sum(weights[k] * x.imag) / step
-            for b in curved:
-                half = (gradient[0, b] - gradient[1, b]) / (4.0 * reach[a])
-                found[k, a, b] += half
-                found[k, b, a] += half
-    return found
+    reach = {0: 1.0, 1: 1.0, 2: 1e-4, 3: 1e-4, 4: 1e-4, 9: 1e-3, 10: 1e-3, 11: 1e-5}
+    curved = list(reach)
+    point = np.column_stack((state, inputs, period))
+    half = np.zeros((len(point), _SIZE, _SIZE))
+    for a, distance in reach.items():
+        gradients = []
+        for sign in (1.0, -1.0):
+            moved = point.copy()
+            moved[:, a] += sign * distance
+            parts = moved[:, :N_STATES], moved[:, N_STATES:-1], moved[:, -1]
+            _, changes = _complex_steps(*parts, substeps, vehicle)
+            gradient = np.zeros((len(point), _SIZE))
+            for i in range(N_STATES):
+                gradient += weights[:, i, None] * changes[:, i]
+            gradients.append(gradient / _STEP)
+        half[:, a, curved] = ((gradients[0] - gradients[1]) / (4.0 * distance))[:, curved]
+    return half + half.swapaxes(1, 2)
 
 
 def defects(problem: Problem, point: Point) -> np.ndarray:
@@ -178,9 +168,7 @@ def defects(problem: Problem, point: Point) -> np.ndarray:
     end, _ = transitions(point.state[:-1], point.input, period, problem.substeps, problem.vehicle)
     missing = [(end - point.state[1:]) / STATE_SCALE]
     if problem.at_rest:
-        rates = np.empty(N_STATES)
-        derivative(point.state[-1], point.input[-1], problem.vehicle, rates)
-        missing.append(rates[None] / STATE_SCALE)
+        missing.append(derivative(point.state[-1], point.input[-1], problem.vehicle)[None] / STATE_SCALE)
     return np.vstack(missing).ravel()
 
 
@@ -260,8 +248,7 @@ class _Local:
         entries.append((-np.ones(self._states), np.arange(self._states), np.arange(self._states)))
         right = [((point.state[1:] - end) / STATE_SCALE).ravel()]
         if problem.at_rest:
-            rates = np.empty(N_STATES)
-            derivative(point.state[-1], point.input[-1], problem.vehicle, rates)
+            rates = derivative(point.state[-1], point.input[-1], problem.vehicle)
             by_state, by_input = jacobian(point.state[-1], point.input[-1], problem.vehicle)
             last = np.hstack((by_state, by_input)) * self._scale[:-1] / STATE_SCALE[:, None]
             where = np.concatenate((np.arange(N_STATES) - N_STATES + self._states, columns[-1, N_STATES:-1]))

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.compiled import njit
 from hsv.errors import TrimError
 from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.limits.transfer import free_states
 from hsv.study.linear_loop import TARGET
+from hsv.vehicle.dynamics import advance
 from hsv.vehicle.envelope import in_model_range
-from hsv.vehicle.integration import advance
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import Vehicle
@@ -119,13 +118,11 @@ def turning_limit(vehicle: VehicleParameters, delay: float, resolution: float = 
     return high
 
 
-@njit(cache=True)
 def _turns(vehicle: VehicleParameters, state: np.ndarray, inputs: np.ndarray, kept: int, share: float) -> bool:
-    x, u, work = state.copy(), np.empty(2), np.empty((3, len(state)))
+    x = state
+    stop = np.array([vehicle.fuel_equivalence_ratio_minimum, vehicle.elevator_deflection_maximum])
     for k in range(int(20.0 / PERIOD)):
-        u[0] = inputs[0] if k < kept else vehicle.fuel_equivalence_ratio_minimum
-        u[1] = share * (inputs[1] if k < kept else vehicle.elevator_deflection_maximum)
-        advance(x, u, vehicle, PERIOD, SUBSTEPS, work)
+        x = advance(x, (inputs if k < kept else stop) * [1.0, share], vehicle, PERIOD, SUBSTEPS)
         if k >= kept and x[4] < 0.0 and x[2] <= state[2]:
             return True
         if not in_model_range(x, vehicle.angle_limit):

@@ -12,8 +12,7 @@ from hsv.faults.schedule import ScheduledFault
 from hsv.faults.table import Fault
 from hsv.study.limits.optimum import INPUT_SCALE, STATE_SCALE, Point, Problem, transitions
 from hsv.timing import NEVER
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, advance
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.plant import FlightStatus, Plant
 from hsv.vehicle.trim import Trim, trim
@@ -104,12 +103,12 @@ def fly_optimum(
     vehicle = problem.vehicle
     period = float(problem.periods(optimum.scalar)[0] / held[0])
     loop = Loop(vehicle, period, int(problem.substeps[0] // held[0]), effectiveness)
-    wanted, acting, work = [optimum.state[0]], [], workspace()
+    wanted, acting = [optimum.state[0]], []
     for k, count in enumerate(held):
-        x = optimum.state[k].copy()
+        x = optimum.state[k]
         for _ in range(count):
-            advance(x, optimum.input[k], vehicle, period, loop.substeps, work)
-            wanted.append(x.copy())
+            x = advance(x, optimum.input[k], vehicle, period, loop.substeps)
+            wanted.append(x)
             acting.append(optimum.input[k])
     end = trim(vehicle, *optimum.state[-1, :2])
     extra = round(after / period)

@@ -6,14 +6,17 @@ altitude and velocity are within 2 % of their steps of the target and stay there
 
 from __future__ import annotations
 
+from array import array
+from itertools import product
+
 import numpy as np
 from scipy.optimize import minimize
 
-from hsv.compiled import njit
+from hsv.core import ffi, lib
 from hsv.simulation.metrics import SETTLING_BAND
 from hsv.study.limits.optimum import Bounds, Point, Problem, guess
 from hsv.study.linear_loop import START, TARGET
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, derivative, forces
+from hsv.vehicle.dynamics import N_STATES, vehicle_struct
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
 
@@ -97,10 +100,11 @@ def time_bound(vehicle: VehicleParameters) -> float:
     alpha = np.linspace(-vehicle.angle_limit, vehicle.angle_limit, 241)
     path = np.radians([-5.0, 0.0, 5.0])
     scale = np.array([vehicle.gravity / start[1], start[1], 1.0])
+    climb, acceleration, turn, moment = _rates(vehicle, altitudes, velocities, alpha, path, fuel, elevator)
 
     def inverse(weights: np.ndarray) -> float:
         a, b, c = weights * scale
-        largest = _largest_rate(vehicle, (a, b, c), altitudes, velocities, alpha, path, fuel, elevator)
+        largest = (acceleration + a * climb - b * turn + c * moment / vehicle.moment_of_inertia).max()
         return -float((change[1] + a * change[0]) / largest)
 
     simplex = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [1.0, 0.2, 0.0], [1.0, 0.2, -10.0]])
@@ -108,30 +112,27 @@ def time_bound(vehicle: VehicleParameters) -> float:
     return -float(found.fun) * (1.0 - GRID_ERROR)
 
 
-@njit(cache=True)
-def _largest_rate(
+def _rates(
     vehicle: VehicleParameters,
-    weights: tuple[float, float, float],
     altitudes: np.ndarray,
     velocities: np.ndarray,
     alphas: np.ndarray,
     paths: np.ndarray,
     fuels: np.ndarray,
     elevators: np.ndarray,
-) -> float:
-    """Return the largest R of :func:`time_bound` on a grid; it is affine in the fuel, the thrust being so."""
-    x, u, rates = np.zeros(N_STATES), np.empty(N_INPUTS), np.empty(N_STATES)
-    largest = -np.inf
-    for altitude in altitudes:
-        for velocity in velocities:
-            for alpha in alphas:
-                for path in paths:
-                    for fuel in fuels:
-                        for elevator in elevators:
-                            x[0], x[1], x[2], x[3] = altitude, velocity, alpha, alpha + path
-                            u[0], u[1] = fuel, elevator
-                            derivative(x, u, vehicle, rates)
-                            moment = forces(x, u, vehicle)[3]
-                            rate = rates[1] + weights[0] * rates[0] - weights[1] * rates[2]
-                            largest = max(largest, rate + weights[2] * moment / vehicle.moment_of_inertia)
-    return largest
+) -> np.ndarray:
+    """Return rates of altitude, velocity and angle of attack and the pitching moment on a grid, (4, points).
+
+    The R of :func:`time_bound` is affine in the fuel, the thrust being so.
+    """
+    struct = vehicle_struct(vehicle).pointer
+    x, u, rates, force = (ffi.new(f"double[{size}]") for size in (N_STATES, 2, N_STATES, 6))
+    found = array("d")
+    axes = (axis.tolist() for axis in (altitudes, velocities, alphas, paths, fuels, elevators))
+    for altitude, velocity, alpha, path, fuel, elevator in product(*axes):
+        x[0:4] = altitude, velocity, alpha, alpha + path
+        u[0:2] = fuel, elevator
+        lib.hsv_derivative(x, u, struct, ffi.NULL, rates)
+        lib.hsv_forces(x, u, struct, ffi.NULL, force)
+        found.extend((rates[0], rates[1], rates[2], force[3]))
+    return np.array(found).reshape(-1, 4).T.copy()

@@ -1,0 +1,237 @@
+"""The numeric core in C99, called through cffi: structs filled from Python objects by the names of their fields.
+
+``core.h`` declares every struct once. :class:`Struct` fills one from an object with attributes of the same names and
+checks each array against the shape in the comment beside its field; counts such as ``sections`` follow from the shapes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from functools import cache, cached_property
+from importlib.resources import files
+from types import SimpleNamespace
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from hsv.core._core import ffi, lib
+from hsv.errors import ParameterError
+
+__all__ = ["Callback", "Data", "Struct", "doubles", "dtype", "ffi", "lanes", "lib", "records", "vector"]
+
+_STRUCT = re.compile(r"typedef struct \{(.*?)\n\} (\w+);", re.DOTALL)
+_POINTER = re.compile(r"(const )?\w+ \*(\w+); *(?:/\* \(([^)]*)\))?")
+_DIMENSION = re.compile(r"(?:(\d+)|(\w+)(?: \+ (\d+))?(?: <= (\d+))?)$")
+_CORES = {"sse2": 1, "avx2": 4, "avx512": 8}
+_ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t": np.dtype(np.uint8)}
+
+
+class _Pointer(NamedTuple):
+    """A pointer field as core.h declares it."""
+
+    constant: bool
+    dimensions: tuple[str, ...]
+
+
+@cache
+def _pointers(kind: str) -> dict[str, _Pointer]:
+    text = files("hsv.core").joinpath("core.h").read_text(encoding="utf-8")
+    [body] = [body for body, name in _STRUCT.findall(text) if name == kind]
+    return {
+        name: _Pointer(bool(constant), tuple(filter(None, map(str.strip, shape.split(",")))))
+        for constant, name, shape in _POINTER.findall(body)
+    }
+
+
+@cache
+def dtype(kind: str) -> np.dtype[Any]:
+    """Return the numpy type of a struct of core.h that holds no pointers."""
+    fields = ffi.typeof(kind).fields
+    formats = []
+    for _, field in fields:
+        element, shape = field.type, []
+        while element.kind == "array":
+            shape.append(element.length)
+            element = element.item
+        formats.append((_ELEMENTS[element.cname], tuple(shape)))
+    return np.dtype(
+        {
+            "names": [name for name, _ in fields],
+            "formats": formats,
+            "offsets": [field.offset for _, field in fields],
+            "itemsize": ffi.sizeof(kind),
+        }
+    )
+
+
+def vector(value: Any) -> np.ndarray:
+    """Return ``value`` as an array of float64 without gaps: itself where it is one."""
+    return np.ascontiguousarray(value, float)
+
+
+def doubles(array: np.ndarray) -> Any:
+    """Return the pointer to the numbers of an array of float64 without gaps."""
+    if array.dtype != np.float64:
+        raise TypeError(f"array of {array.dtype}, expected float64")
+    return ffi.from_buffer("double[]", array)
+
+
+def records(kind: str, array: np.ndarray) -> Any:
+    """Return the pointer to the records of an array of the type :func:`dtype` gives."""
+    return ffi.cast(f"{kind} *", ffi.from_buffer(array))
+
+
+@cache
+def lanes() -> int:
+    """Return how many flights the core flies at a time on this processor; ``HSV_CORE`` lowers it.
+
+    Raises:
+        ParameterError: ``HSV_CORE`` names another core, or one that this processor does not have.
+    """
+    widest = int(lib.hsv_lanes())
+    usable = [name for name, number in _CORES.items() if number <= widest]
+    chosen = os.environ.get("HSV_CORE") or usable[-1]
+    if chosen not in usable:
+        raise ParameterError(f"HSV_CORE = {chosen!r}: expected one of {', '.join(usable)} on this processor")
+    return _CORES[chosen]
+
+
+class Struct:
+    """A struct of core.h, filled from an object; what it points to lives as long as this does."""
+
+    def __init__(self, kind: str, source: Any) -> None:
+        """Fill the struct ``kind``.
+
+        Args:
+            kind: Its name in core.h.
+            source: Has an attribute for each field but the counts of arrays. An array that the core writes to is not
+                copied; a nested struct is an object likewise, or a :class:`Struct`.
+
+        Raises:
+            ParameterError: A value of another type or shape than declared; the field is named.
+        """
+        self.kind = kind
+        self.source = source
+        self.pointer = ffi.new(f"{kind} *")
+        self._kept: list[Any] = []
+        self._fill(kind, self.pointer, source)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Struct, (self.kind, self.source)
+
+    def _fill(self, kind: str, target: Any, source: Any) -> None:
+        counts: dict[str, int] = {}
+        pointers = _pointers(kind)
+        counted = {_DIMENSION.match(each)[2] for pointer in pointers.values() for each in pointer.dimensions}
+        for name, field in ffi.typeof(kind).fields:
+            if name not in counted:
+                self._set(kind, target, name, field.type, getattr(source, name), counts)
+        for name, count in counts.items():
+            setattr(target, name, count)
+
+    def _set(self, kind: str, target: Any, name: str, declared: Any, value: Any, counts: dict[str, int]) -> None:
+        try:
+            if declared.kind == "primitive":
+                setattr(target, name, float(value) if declared.cname == "double" else int(value))
+            elif declared.kind == "array":
+                setattr(target, name, value.tolist() if isinstance(value, np.ndarray) else value)
+            elif declared.kind == "struct":
+                self._nest(declared.cname, getattr(target, name), value)
+            else:
+                setattr(target, name, self._address(kind, name, declared, value, counts))
+        except (TypeError, ValueError, OverflowError, IndexError) as error:
+            raise ParameterError(f"{kind}.{name}: {error}") from error
+
+    def _nest(self, kind: str, target: Any, value: Any) -> None:
+        if isinstance(value, Struct):
+            ffi.memmove(ffi.addressof(target), value.pointer, ffi.sizeof(kind))
+            self._kept.append(value)
+        else:
+            self._fill(kind, target, value)
+
+    def _address(self, kind: str, name: str, declared: Any, value: Any, counts: dict[str, int]) -> Any:
+        if value is None:
+            return ffi.NULL
+        value = value.struct if isinstance(value, Data) else value
+        if isinstance(value, Struct):
+            self._kept.append(value)
+            return value.pointer
+        if not isinstance(value, np.ndarray | list | tuple):
+            self._kept.append(value)
+            return value if isinstance(value, ffi.CData) else ffi.cast(declared, value)
+        constant, dimensions = _pointers(kind)[name]
+        element = declared.item.cname
+        kind_of = _ELEMENTS[element] if element in _ELEMENTS else dtype(element)
+        array = np.ascontiguousarray(value, kind_of)
+        if not constant and array is not value:
+            raise TypeError("expected an array that the core can write to")
+        if dimensions:
+            _measure(array.shape, dimensions, counts)
+        self._kept.append(array)
+        return ffi.cast(declared, ffi.from_buffer(array))
+
+
+class Data:
+    """Base of a frozen dataclass whose fields are those of a struct of core.h."""
+
+    KIND: ClassVar[str]
+    """Name of the struct"""
+
+    @cached_property
+    def struct(self) -> Struct:
+        """The data as the core takes them."""
+        return Struct(self.KIND, self)
+
+    @property
+    def pointer(self) -> Any:
+        """The pointer to :attr:`struct`."""
+        return self.struct.pointer
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "struct"}
+
+
+def _measure(shape: tuple[int, ...], dimensions: tuple[str, ...], counts: dict[str, int]) -> None:
+    """Note the counts that follow from the shape of an array.
+
+    Raises:
+        ValueError: It has another shape than declared.
+    """
+    expected = f"array of shape {shape}, expected ({', '.join(dimensions)})"
+    if len(shape) != len(dimensions):
+        raise ValueError(expected)
+    for size, dimension in zip(shape, dimensions, strict=True):
+        found = _DIMENSION.match(dimension)
+        assert found, dimension
+        number, name, more, greatest = found.groups()
+        count = size - int(more or 0)
+        if (number and size != int(number)) or (name and counts.setdefault(name, count) != count):
+            known = ", ".join(f"{name} = {count}" for name, count in counts.items())
+            raise ValueError(f"{expected}{f' with {known}' if known else ''}")
+        if count < 0 or (greatest and count > int(greatest)):
+            raise ValueError(expected)
+
+
+class Callback:
+    """A Python function as a step function of ``hsv_block.h``, for as long as this object lives; keeps its exception."""
+
+    def __init__(self, function: Callable[[int, Any, Any], None]) -> None:
+        """Call ``function`` with k and the pointers to its inputs and outputs."""
+        self.function = function
+        self.error: BaseException | None = None
+        self._handle = ffi.new_handle(self)
+        state = ffi.cast("double *", self._handle)
+        self.call = SimpleNamespace(function=lib.hsv_call_python, state=state, par=None)
+
+
+def _keep_exception(kind: type[BaseException], error: BaseException, traceback: Any) -> None:
+    callback = ffi.from_handle(ffi.cast("void *", traceback.tb_frame.f_locals["state"]))
+    callback.error = error
+
+
+@ffi.def_extern(name="hsv_call_python", error=1, onerror=_keep_exception)  # type: ignore[misc]
+def _call_python(k: int, given: Any, out: Any, state: Any, par: Any) -> int:
+    ffi.from_handle(ffi.cast("void *", state)).function(k, given, out)
+    return 0

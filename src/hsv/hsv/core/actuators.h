@@ -1,0 +1,149 @@
+/* Actuators of first and second order with limits, discretised exactly, and the faults of actuators and effectors.
+ *
+ *   order 1: dp/dt = omega (c - p),   order 2: d2p/dt2 = omega^2 (c - p) - 2 zeta omega dp/dt
+ *
+ * with the command c held (sets and order of limits: Zipfel's CADAC GHAME6, Wiese's generic hypersonic vehicle). An
+ * actuator moves on substeps of a quarter of the control period, and so does the vehicle, whose effector is held over
+ * each at the mean of the substep's two ends. An ideal actuator is where its command is at once.
+ *
+ * Order: dynamics with the limits that faults leave; scale, bias, drift and oscillation of the effector; what replaces
+ * its position, the newest of which wins; the stops.
+ */
+#ifndef ACTUATORS_H
+#define ACTUATORS_H
+#include "faults.h"
+
+enum { POSITION, RATE };
+
+/* Write F11, F12, F21, F22 that take position less command and rate over h (s). */
+void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map)
+{
+    if (order == 1) {
+        map[0] = exponential(-frequency * h), map[1] = map[2] = map[3] = 0.0;
+        return;
+    }
+    const double decay = exponential(-damping * frequency * h), damped = frequency * root(1.0 - damping * damping);
+    double sine, cosine;
+    sine_cosine(damped * h, &sine, &cosine);
+    const double scaled = damped > 0.0 ? sine / damped : h;
+    map[0] = decay * (cosine + damping * frequency * scaled);
+    map[1] = decay * scaled;
+    map[2] = -frequency * frequency * decay * scaled;
+    map[3] = decay * (cosine - damping * frequency * scaled);
+}
+
+/* Write position, rate and mean position h (s) later, from "state" (position, rate). A position beyond a stop that has
+ * moved may stay there and return, but not go further. In equilibrium nothing changes, to the bit. */
+void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum_stop,
+                       double maximum_stop, double rate_limit, double acceleration_limit, double h, double *out)
+{
+    const double position = state[POSITION], rate = state[RATE], target = limited(command, minimum_stop, maximum_stop);
+    double moved = target, speed = 0.0;
+    if (order == 2) {
+        const double error = position - target, change = acceleration_limit * h;
+        moved = target + (map[0] * error + map[1] * rate);
+        speed = limited(map[2] * error + map[3] * rate, rate - change, rate + change);
+        speed = limited(speed, -rate_limit, rate_limit);
+    } else if (order == 1)
+        moved = target + map[0] * (position - target);
+    const double reach = rate_limit * h;
+    if (magnitude(moved - position) > reach)
+        moved = position + (moved > position ? reach : -reach);
+    const double low = minimum(minimum_stop, position), high = maximum(maximum_stop, position);
+    if (moved <= low)
+        moved = low, speed = maximum(speed, 0.0);
+    else if (moved >= high)
+        moved = high, speed = minimum(speed, 0.0);
+    if (order < 2)
+        speed = (moved - position) / h;
+    out[0] = moved, out[1] = speed;
+    out[2] = order > 0 || rate_limit < INFINITY ? 0.5 * (position + moved) : moved;
+}
+
+/* The position of an effector with a fault, "elapsed" (s) after the fault's start and "since" its onset. */
+static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, double elapsed, double since,
+                        double alpha, double position)
+{
+    const double *p = fault->parameter;
+    switch (fault->code) {
+    case SCALE:
+        return p[0] * position;
+    case BIAS:
+        return position + p[0];
+    case DRIFT:
+        return position + limited(p[0] * elapsed, -p[1], p[1]);
+    case OSCILLATION:
+    case SOLID_OSCILLATION: {
+        const double turns = p[1] * elapsed;
+        double sine, cosine;
+        sine_cosine(6.283185307179586 * (turns - __builtin_floor(turns)) + p[2], &sine, &cosine);
+        return (fault->code == OSCILLATION ? position : memory->kept) + p[0] * sine;
+    }
+    case LOCK:
+        return memory->kept;
+    case LOCK_AT:
+        return p[0];
+    case FLOAT: /* at zero, or along the flow */
+        return -p[0] * alpha;
+    case HARD_OVER:
+        return memory->kept + p[0] * since;
+    }
+    return position;
+}
+
+/* Move the actuators, state (2, 2), over a length of substeps, "substep" after the beginning of step k; replace the
+ * positions of the effectors (2). */
+void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_faults *faults, int64_t k, double substep,
+                        double length, const double *command, double alpha, double *effector)
+{
+    const double middle = (substep + 0.5 * length) * actuators->substep, h = length * actuators->substep;
+    for (int channel = 0; channel < INPUTS; channel++) {
+        int64_t order = actuators->order[channel];
+        double frequency = actuators->natural_frequency[channel], rate = actuators->rate_limit[channel];
+        double low = actuators->minimum[channel], high = actuators->maximum[channel];
+        double own_map[4], moved[3];
+        const double *map = actuators->map[channel];
+        int changed = length != 1.0;
+        for (int64_t i = 0; i < faults->count; i++) {
+            const hsv_fault *fault = &faults->rows[i];
+            if (!faults->memory[i].acting || fault->channel != channel)
+                continue;
+            if (fault->code == BANDWIDTH && fault->parameter[0] < frequency) {
+                frequency = fault->parameter[0];
+                order = order > 1 ? order : 1;
+                changed = 1;
+            } else if (fault->code == RATE_LIMIT)
+                rate = minimum(rate, fault->parameter[0]);
+            else if (fault->code == STOP_LIMIT)
+                low = maximum(low, fault->parameter[0]), high = minimum(high, fault->parameter[1]);
+        }
+        if (changed && order > 0) {
+            hsv_actuator_map(order, frequency, actuators->damping_ratio[channel], h, own_map);
+            map = own_map;
+        }
+        double *own = state + 2 * channel;
+        hsv_actuator_step(order, map, own, command[channel], low, high, rate, actuators->acceleration_limit[channel], h,
+                          moved);
+        double position = moved[2];
+        int replaced = 0;
+        for (int64_t i = 0; i < faults->count; i++) {
+            const hsv_fault *fault = &faults->rows[i];
+            hsv_fault_memory *memory = &faults->memory[i];
+            if (!memory->acting || fault->channel != channel || fault->code < SCALE)
+                continue;
+            if (memory->onset == (double)k && substep == 0.0)
+                memory->kept = effector[channel];
+            if (fault->code >= LOCK)
+                replaced = fault->code != FLOAT;
+            const double elapsed = ((double)k - fault->start) * faults->period + middle;
+            const double since = ((double)k - memory->onset) * faults->period + middle;
+            position = deflected(fault, memory, elapsed, since, alpha, position);
+        }
+        position = limited(position, actuators->minimum[channel], actuators->maximum[channel]);
+        /* An actuator whose position is replaced is held, and goes on from there. */
+        own[POSITION] = replaced ? position : moved[0];
+        own[RATE] = replaced ? 0.0 : moved[1];
+        effector[channel] = position;
+    }
+}
+#endif

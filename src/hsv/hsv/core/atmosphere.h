@@ -1,0 +1,104 @@
+/* Air that moves and whose density differs from the model's: wind, shear, turbulence, gusts, density variation.
+ *
+ * Dryden turbulence (MIL-F-8785C, MIL-HDBK-1797) is white noise of unit density through
+ *
+ *   H_u(s) = sigma_u sqrt(2 tau_u) / (1 + tau_u s),
+ *   H_w(s) = sigma_w sqrt(tau_w) (1 + sqrt(3) tau_w s) / (1 + tau_w s)^2,   tau = L / V.
+ *
+ * Both filters are discretised exactly over the distance flown in a period, and stationary from the first step on. The
+ * density varies as a Gauss-Markov process along the path. A gust is (1 - cos) shaped (MIL-F-8785C, CS-25.341), its
+ * mean over a period in closed form. Speed of sound: US Standard Atmosphere 1976.
+ */
+#ifndef ATMOSPHERE_H
+#define ATMOSPHERE_H
+#include "noise.h"
+#include "vehicle.h"
+
+/* The memory: turbulence along the path and the two states of that across it, in units of sigma, the density's
+ * variation likewise, and how far each gust was flown into (m). */
+enum { ALONG, ACROSS_1, ACROSS_2, VARIATION, DISTANCE };
+
+/* Write F (2, 2) and the lower factor of I - F F' (three entries) of H_w over the distance r L. The states are standard
+ * normal and uncorrelated; w is sigma / 2 times the first plus sqrt(3) times the second. */
+void hsv_dryden_cross_map(double r, double *map)
+{
+    const double decay = exponential(-r), square = decay * decay;
+    const double first = root(maximum(1.0 - square * (1.0 + 2.0 * r + 2.0 * r * r), 0.0));
+    const double across = 2.0 * square * r * r, lower = first > 0.0 ? across / first : 0.0;
+    map[0] = decay * (1.0 + r), map[1] = decay * r, map[2] = -decay * r, map[3] = decay * (1.0 - r);
+    map[4] = first, map[5] = lower;
+    map[6] = root(maximum(1.0 - square * (1.0 - 2.0 * r + 2.0 * r * r) - lower * lower, 0.0));
+}
+
+/* The integral from 0 to x (m) of (1 - cos(pi x / length)) / 2, which ends after two lengths or stays after one. */
+static double gust_integral(double x, double length, int64_t stays)
+{
+    const double pi = 3.141592653589793, end = stays ? length : 2.0 * length, inside = limited(x, 0.0, end);
+    double sine, cosine;
+    sine_cosine(pi * (inside / length), &sine, &cosine);
+    const double area = 0.5 * (inside - length / pi * sine);
+    return stays && x > end ? area + (x - end) : area;
+}
+
+/* The mean of a gust between two distances (m) flown into it, relative to its greatest velocity. */
+double hsv_gust_mean(double begin, double end, double length, int64_t stays)
+{
+    return (gust_integral(end, length, stays) - gust_integral(begin, length, stays)) / (end - begin);
+}
+
+/* Advance a standard Gauss-Markov process by r correlation lengths; step 0 draws its first value. */
+static void advance_markov(double *value, double r, int64_t k, int64_t seed, int64_t stream)
+{
+    const double drawn = first_normal(seed, k, stream, 0), decay = exponential(-r);
+    *value = k == 0 ? drawn : decay * *value + root(maximum(1.0 - decay * decay, 0.0)) * drawn;
+}
+
+/* Write wind forward, wind up (m/s) and the relative density of step k at an altitude (m), flown through at a speed
+ * (m/s), into the first of the conditions. */
+void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, int64_t seed, double altitude,
+                         double speed, double *conditions)
+{
+    const double way = speed * air->period;
+    conditions[WIND_FORWARD] = air->wind[0] + air->shear * (altitude - air->shear_altitude);
+    conditions[WIND_UP] = air->wind[1];
+    conditions[DENSITY] = 1.0 + air->density_offset;
+    if (air->sigma[0] > 0.0) {
+        advance_markov(&memory[ALONG], way / air->length[0], k, seed, TURBULENCE_FORWARD);
+        conditions[WIND_FORWARD] += air->sigma[0] * memory[ALONG];
+    }
+    if (air->sigma[1] > 0.0) {
+        double drawn[2], F[7];
+        hsv_normals(seed, k, TURBULENCE_UP, 0, drawn);
+        if (k == 0)
+            memory[ACROSS_1] = drawn[0], memory[ACROSS_2] = drawn[1];
+        else {
+            hsv_dryden_cross_map(way / air->length[1], F);
+            const double a = memory[ACROSS_1], b = memory[ACROSS_2];
+            memory[ACROSS_1] = F[0] * a + F[1] * b + F[4] * drawn[0];
+            memory[ACROSS_2] = F[2] * a + F[3] * b + (F[5] * drawn[0] + F[6] * drawn[1]);
+        }
+        const double root_3 = 1.7320508075688772;
+        conditions[WIND_UP] += 0.5 * air->sigma[1] * (memory[ACROSS_1] + root_3 * memory[ACROSS_2]);
+    }
+    if (air->density_sigma > 0.0) {
+        advance_markov(&memory[VARIATION], way / air->density_length, k, seed, DENSITY_VARIATION);
+        conditions[DENSITY] += air->density_sigma * memory[VARIATION];
+    }
+    for (int64_t i = 0; i < air->gusts; i++)
+        if (k >= air->gust_start[i]) {
+            double *distance = &memory[DISTANCE + i];
+            const double mean = hsv_gust_mean(*distance, *distance + way, air->gust_length[i], air->gust_stays[i] != 0.0);
+            conditions[WIND_FORWARD] += air->gust[2 * i] * mean;
+            conditions[WIND_UP] += air->gust[2 * i + 1] * mean;
+            *distance = *distance + way;
+        }
+}
+
+/* m/s, at a geometric altitude of 11 to 32 km. */
+double hsv_speed_of_sound(double altitude)
+{
+    const double geopotential = 6356766.0 * altitude / (6356766.0 + altitude);
+    const double temperature = 216.65 + 0.001 * maximum(geopotential - 20000.0, 0.0);
+    return root(1.4 * 287.05287 * temperature);
+}
+#endif

@@ -1,0 +1,363 @@
+/* The numeric core as Python sees it. cffi reads what stands between the two marks, so that the layout of a struct is
+ * declared once; hsv.core fills structs by the names of their fields and checks every array against the shape in the
+ * comment beside it, from which the counts follow. SI units and radians. */
+#ifndef CORE_H
+#define CORE_H
+#include <stdint.h>
+/* begin */
+typedef double number;
+enum {
+    STATES = 9,
+    INPUTS = 2,
+    RIGID = 5,       /* the first states are those of the rigid body */
+    CONDITIONS = 7,  /* of air and engine, see vehicle.h */
+    MAX_SECTIONS = 4,
+    MAX_DELAY = 50,  /* steps of a delaying fault, and of the latency of a sensor */
+    INTEGRATED = 2,  /* altitude and velocity */
+    HISTORY = 25,    /* x, q_f, x_n, u_n, u, actuator: what the fingerprint is made of */
+    AUXILIARY = 3,   /* index of the nominal gain, input before the limits */
+    SUMS = 12        /* entries of the scheduled model that are summed at a time */
+};
+
+/* Kinds of faults, in the order in which those that act at once are composed, and ways in which they occur. */
+enum {
+    LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, /* of the command */
+    BANDWIDTH, RATE_LIMIT, STOP_LIMIT,          /* of an actuator's dynamics */
+    SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION, /* of an effector */
+    THRUST_LOSS, UNSTART, UNSTART_OUTSIDE, /* of the engine */
+    SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
+};
+enum { ALWAYS, PERIODIC, RANDOM };
+
+/* First stream of random numbers of each block, which has 256 of them. A number that was assigned once stays: flights
+ * are repeated by it. */
+enum {
+    TURBULENCE_FORWARD = 256,
+    TURBULENCE_UP = 512,
+    DENSITY_VARIATION = 768,
+    SENSOR_NOISE_STREAM = 4096,
+    SENSOR_CONSTANTS = 4352,
+    SENSOR_LOSS = 4608,
+    SENSOR_FAULT_NOISE = 4864,
+    SENSOR_FAULT_LOSS = 5120,
+    FAULT_OCCURRENCE = 8192,
+    LINK_LOSS = 12288,
+    LINK_DELAY = 12544,
+    LINK_CORRUPTION = 12800
+};
+
+typedef struct {
+#include "vehicle_fields.h"
+    number fuel_equivalence_ratio_minimum, fuel_equivalence_ratio_maximum;
+    number elevator_deflection_minimum, elevator_deflection_maximum;
+    number angle_limit;
+} hsv_vehicle;
+
+/* Second-order sections in series. */
+typedef struct {
+    const double *A; /* (sections <= 4, 2, 2) */
+    const double *B; /* (sections, 2) */
+    const double *C; /* (sections, 2) */
+    const double *D; /* (sections) */
+    const double *G; /* (sections, 2) rest for an input of one */
+    int64_t sections;
+} hsv_notch;
+
+/* Weights of the vertices along a scheduling variable, a polynomial on each piece, power 3 first. */
+typedef struct {
+    const double *coefficients; /* (4, pieces, vertices) */
+    const double *breakpoints;  /* (pieces + 1) */
+    int64_t pieces, vertices;
+} hsv_axis;
+
+/* The entries of [A_i, B_i] that are not zero in all vertices, and their places. */
+typedef struct {
+    const double *S;        /* (vertices <= 64, size <= 108) */
+    const int64_t *entries; /* (used <= 99) places in the flattened [A_i, B_i] */
+    const int64_t *starts;  /* (19) where the entries of each row of A and of B begin, in turn */
+    int64_t vertices, size, used;
+    hsv_axis altitude, velocity;
+} hsv_polytope;
+
+/* Nested gains and ellipsoids, outermost first. */
+typedef struct {
+    hsv_polytope polytope;
+    const double *gains;      /* (count, 2, 9) */
+    const double *ellipsoids; /* (count, 5, 5) */
+    int64_t count, interpolated;
+} hsv_nominal;
+
+/* Rows of the reference; row 0 is that of the step "first". */
+typedef struct {
+    const double *state;  /* (rows, 9) */
+    const double *input;  /* (rows, 2) */
+    const double *defect; /* (rows, 9) */
+    int64_t first, rows;
+} hsv_reference;
+
+/* Estimator of the elevator's effectiveness. */
+typedef struct {
+    hsv_vehicle vehicle;
+    double start[9];
+    double period, inertia, effect, least, bound, offset, learning, drift, noise, steps;
+} hsv_effectiveness;
+
+typedef struct {
+    const double *gains;   /* (count, 2, 9) F diag(tau) */
+    const int64_t *starts; /* (count) the step from which each holds */
+    int64_t count, planned, filtered;
+    double minimum[2], maximum[2], integral_rate, period;
+    hsv_notch notch;
+    const hsv_effectiveness *effectiveness; /* NULL: not estimated */
+} hsv_tube;
+
+typedef struct {
+    double planned[8];          /* s_n of the filter of the plan */
+    double integral[2];
+    double predicted[9], held[2]; /* of the effectiveness estimator: state of the step before, input held since */
+    double known[9];
+} hsv_tube_memory;
+
+/* Extended Kalman filter of constant gain. */
+typedef struct {
+    double gain[11][5];
+    double start[9];
+    hsv_vehicle vehicle;
+    double period;
+    int64_t substeps;
+} hsv_estimator;
+
+typedef struct {
+    int64_t order[2];
+    double natural_frequency[2], damping_ratio[2], map[2][4];
+    double minimum[2], maximum[2], rate_limit[2], acceleration_limit[2];
+    double substep;
+    int64_t ideal;
+} hsv_actuators;
+
+typedef struct {
+    double wind[2], shear, shear_altitude, sigma[2], length[2];
+    const int64_t *gust_start;  /* (gusts) */
+    const double *gust;         /* (gusts, 2) forward, up */
+    const double *gust_length;  /* (gusts) */
+    const double *gust_stays;   /* (gusts) */
+    double density_offset, density_sigma, density_length, period;
+    int64_t still, gusts;
+} hsv_atmosphere;
+
+typedef struct {
+    int64_t on[9];
+    double noise[9], bias[9], bias_sigma[9], drift_sigma[9], drift_decay[9], walk[9], scale[9], scale_sigma[9];
+    double lag_decay[9];
+    int64_t latency[9];
+    double drop_out[9], quantum[9], minimum[9], maximum[9];
+    int64_t inertial_angle_of_attack, ideal;
+} hsv_sensors;
+
+typedef struct {
+    double lagged, drift, walk, bias, scale, held, given;
+    double queue[51]; /* samples on their way */
+} hsv_sensor_memory;
+
+typedef struct {
+    int64_t channel, delay, jitter;
+    double loss, loss_after_arrival, loss_after_loss, corruption;
+    int64_t checksum, ideal;
+} hsv_link;
+
+/* A fault, and what it remembers. */
+typedef struct {
+    double start, stop; /* steps [start, stop) */
+    int64_t channel, code, occurrence;
+    double cycle[2];      /* period and duty in steps, or probabilities of going and of coming in a step */
+    double parameter[12];
+} hsv_fault;
+
+typedef struct {
+    int64_t acting, away;
+    double last, onset, since, kept; /* steps in which it acted last, and since which; what is kept of the signal */
+    double queue[51];
+} hsv_fault_memory;
+
+typedef struct {
+    const hsv_fault *rows;    /* (count) in the order in which they are composed */
+    hsv_fault_memory *memory; /* (count) */
+    int64_t count;
+    double period;
+} hsv_faults;
+
+typedef struct {
+    hsv_vehicle vehicle;
+    double period;
+    int64_t substeps;
+    hsv_actuators actuators;
+    hsv_atmosphere atmosphere;
+    hsv_sensors sensors;
+    hsv_link link;
+    double late; /* substeps after which the command of a period is there */
+    int64_t seed;
+} hsv_plant;
+
+typedef struct {
+    double *actuators;           /* (2, 2) position and rate of each */
+    double *command;             /* (2) of the period before */
+    double *effector;            /* (2) */
+    double *atmosphere;          /* (air) */
+    hsv_sensor_memory *sensors;  /* (9) */
+    double *link;                /* (payloads) */
+    double *conditions;          /* (7) */
+    int64_t air, payloads;
+} hsv_plant_memory;
+
+typedef struct {
+    hsv_faults effector, engine, sensor;
+} hsv_plant_faults;
+
+/* A function of hsv_block.h with its arrays. */
+typedef int32_t (*hsv_step_function)(int64_t k, const double *in, double *out, double *state, const double *par);
+typedef struct {
+    hsv_step_function function; /* NULL: the core's own law flies */
+    double *state;
+    const double *par;
+} hsv_call;
+
+/* Invariant set of the tube: (e - c)' P (e - c) <= 1 for the errors of the rigid states and of the notch filter. */
+typedef struct {
+    hsv_notch notch;
+    const double *shape;  /* (size, size) P */
+    const double *centre; /* (size) c */
+    int64_t size;
+} hsv_tube_set;
+
+/* A flight: what flies, and what it remembers. */
+typedef struct {
+    double x[9]; /* the initial state */
+    const hsv_plant *plant;
+    hsv_plant_memory *plant_memory;
+    hsv_plant_faults *plant_faults;
+    const hsv_notch *notch;
+    const hsv_estimator *estimator; /* NULL: none */
+    const hsv_nominal *nominal;
+    const hsv_reference *reference;
+    const hsv_tube *tube;
+    const hsv_link *link;
+    double *link_memory; /* (payloads) */
+    int64_t payloads;
+    hsv_faults *faults; /* on the command */
+    hsv_call nominal_law, controller;
+    const hsv_tube_set *set; /* NULL: no level is computed */
+    double *history;   /* (rows, 25) */
+    double *auxiliary; /* (rows, 3) */
+    double *estimated; /* (rows, 9), or NULL */
+    int64_t rows;      /* of the history, the first of which is the step at which a piece begins */
+    int64_t ended;     /* steps flown, written where it diverges */
+    int64_t returned;  /* by the controller, written */
+    double answer[2];  /* of the controller, written */
+    double worst;      /* level in the set, written */
+} hsv_flight;
+
+/* Elementary functions and random numbers. */
+void hsv_sine_cosine(double x, double *sine, double *cosine);
+double hsv_tangent(double x);
+double hsv_arcsine(double x);
+double hsv_arctangent2(double y, double x);
+double hsv_exponential(double x);
+double hsv_logarithm(double x);
+void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words);
+void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
+void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
+
+/* Vehicle: conditions may be NULL. Forces: lift, drag, thrust, moment, dynamic pressure, angle of attack. */
+void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
+void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out);
+void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
+void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
+void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double *conditions, double period,
+                 int64_t substeps);
+int hsv_in_model_range(const double *x, double angle_limit);
+void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double *A, double *B);
+void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
+                     const hsv_vehicle *p, double *end, double *changes);
+
+/* Equilibria and small linear systems. */
+void hsv_solve(int64_t n, int64_t m, double *A, double *b);
+double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate,
+                   double *unknown, double *x, double *u);
+void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *command, const double *rate,
+                        const double *bend, const double *guess, double period, int64_t substeps, double *state,
+                        double *input, double *defect, double *imbalance);
+int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
+                        int64_t iterations, double settled, double *gain);
+void hsv_transition(const double *A, const double *B, double period, double *F);
+
+/* Equipment, one flight. */
+void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map);
+void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum,
+                       double maximum, double rate_limit, double acceleration_limit, double h, double *out);
+int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed);
+void hsv_apply_command_faults(hsv_faults *faults, int64_t k, int64_t seed, double *actuator);
+void hsv_apply_engine_faults(hsv_faults *faults, int64_t k, int64_t seed, double alpha, double mach, double fuel,
+                             double *engine);
+void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_faults *faults, int64_t k, double substep,
+                        double length, const double *command, double alpha, double *effector);
+void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, int64_t seed, double altitude,
+                         double speed, double *conditions);
+void hsv_dryden_cross_map(double r, double *map);
+double hsv_gust_mean(double begin, double end, double length, int64_t stays);
+double hsv_speed_of_sound(double altitude);
+void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faults *faults, int64_t k, int64_t seed,
+                 const double *x, double *measurement);
+void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n);
+void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload,
+                 int64_t n);
+void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k, const double *x,
+               double *measurement);
+void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
+                          const double *x, double fuel);
+
+/* Blocks of the loop, one step. */
+void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
+                       const double *actuator, double *x);
+void hsv_notch_rest(const hsv_notch *notch, double rate, double *s);
+double hsv_notch_step(const hsv_notch *notch, double *s, double rate);
+void hsv_estimate(const hsv_estimator *estimator, double *memory, int64_t k, const double *measurement,
+                  const double *command, double *estimate);
+int hsv_nominal_input(const hsv_nominal *nominal, const double *x_n, double *u_n, double *index);
+int hsv_nominal_advance(const hsv_polytope *polytope, double altitude, double velocity, double *x_n, const double *u_n,
+                        const double *d_r);
+int64_t hsv_tube_step(const hsv_tube *tube, hsv_tube_memory *memory, int64_t k, int monitored, int64_t filter_states,
+                      const double *x, double q_f, const double *x_r, const double *u_r, const double *x_n,
+                      const double *u_n, const double *s, double *u_feedback, double *u_unsaturated, double *u);
+double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_memory *memory, int64_t k,
+                              const double *x);
+double hsv_level(const double *P, int64_t size, const double *x);
+
+/* Flights: as many at a time as an instance has lanes, in pieces. */
+int hsv_lanes(void);
+int64_t hsv_memory_size(int lanes);
+int64_t hsv_fly(int lanes, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
+
+/* Many steps at once: design, governor and metrics. */
+int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, double *weights);
+int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S);
+int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
+             const double *start, double *plan, double *deviation);
+void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, double *filtered, double *states);
+void hsv_respond(int64_t steps, int64_t states, const double *A, const double *B, const double *C, const double *D,
+                 const double *commands, double *before, double *means);
+void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch, int64_t steps,
+                      int64_t states, const double *A, const double *B, const double *C, const double *D,
+                      const double *scheduled, const double *lag, double *errors, double *feedback);
+void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
+                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed,
+                          double *worst);
+double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
+                       const double *reference);
+void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
+                double *curves, uint8_t *saturated);
+void hsv_envelope(int64_t signals, int64_t steps, int64_t stride, const double *curves, int64_t windows,
+                  const int64_t *starts, double *low, double *high, double *total, double *count);
+/* end */
+/* Of any argument, for lanes. */
+void hsv_any_sine_cosine(double x, double *sine, double *cosine);
+#endif

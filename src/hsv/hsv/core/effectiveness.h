@@ -1,0 +1,140 @@
+/* Estimator of the elevator's effectiveness P in flight, by set membership on the pitch channel.
+ *
+ * In every step the pitch rate over the last period is predicted with the equations of motion of the nominal vehicle,
+ * with the elevator commanded and without any. The difference is the effect e of a healthy elevator; what the pitch
+ * rate has done beyond the prediction without elevator is y. A vehicle of the declared uncertainty satisfies
+ *
+ *   (1 + i) D + b = P (1 + g) e + d + v,   y = D + b,
+ *
+ * with D the measured change of the pitch rate, b that of the nominal vehicle without elevator and opposite sign, i the
+ * relative error of the moment of inertia, g that of the elevator's effect, d a slowly changing disturbance, and v the
+ * rest, at most a declared share of e. Every step thus bounds P by an interval; the disturbance is learned while one of
+ * these intervals contains P = 1, which is when the elevator is healthy. An interval without 1 is a fault. A loss of
+ * effectiveness, y - d proportional to e, and an offset, y - d - e constant, are then followed, each as the intersection
+ * of what the steps leave of it. The command is divided by the middle of the interval of P while a loss explains all
+ * steps. Source: docs/active_fault_tolerance.md.
+ */
+#ifndef EFFECTIVENESS_H
+#define EFFECTIVENESS_H
+#include "vehicle.h"
+
+/* What is known: P by which the command is divided, its interval, the interval of an offset (rad/s), the disturbance
+ * learned with g = 0 and the effect in that step (rad/s), mode, steps that the explanations have explained. */
+enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
+/* Modes, as numbers. */
+#define HEALTHY 0.0
+#define LOST 1.0    /* a loss of effectiveness explains all steps since the fault */
+#define OTHER 2.0   /* an offset explains them, a loss does not */
+#define PENDING 3.0 /* an explanation has yet to explain more steps before it replaces another */
+#define CONFIRMED 5.0 /* steps */
+
+typedef struct {
+    real low, high;
+} Interval;
+
+static inline real within(real value, real greatest) { return minimum(maximum(value, -greatest), greatest); }
+
+/* The interval where it holds, elsewhere an empty one, which no widening brings back. */
+static inline Interval kept_where(mask holds, real low, real high)
+{
+    return (Interval){choose(holds, low, all(2.0)), choose(holds, high, all(-1.0))};
+}
+
+/* The interval of P that a step leaves (cut to the range of P), and that of an offset. */
+static inline void step_intervals(const hsv_effectiveness *data, real y, real e, real turn, real disturbance,
+                                  real effect, Interval *loss, Interval *offset)
+{
+    const double g = data->effect;
+    const real known = y - disturbance;
+    const real margin = data->bound * magnitude(e) + data->inertia * magnitude(turn) + data->noise;
+    const real strong = (known + g * effect) / ((1.0 + g) * e), weak = (known - g * effect) / ((1.0 - g) * e);
+    const real reach = margin / ((1.0 - g) * magnitude(e));
+    const real middle = known - e, wide = margin + g * magnitude(e - effect);
+    const real low = minimum(strong, weak) - reach, high = maximum(strong, weak) + reach;
+    /* Below the range of P there is no loss that a division could make up for. */
+    *loss = kept_where(high >= data->least, minimum(maximum(low, all(data->least)), all(1.0)), minimum(high, all(1.0)));
+    *offset = (Interval){middle - wide, middle + wide};
+}
+
+/* Update what is known by a step, where the step is usable. */
+static inline void judge(const hsv_effectiveness *data, real *known, mask usable, int first, real y, real e, real turn)
+{
+    const real mode = known[MODE];
+    const mask healthy = mode == HEALTHY;
+    /* A flight begins healthy: what is off then is a disturbance, as far as one is admitted. */
+    const real greatest = data->offset * magnitude(e);
+    real disturbance = first ? choose(healthy, within(y - e, greatest), known[DISTURBANCE]) : known[DISTURBANCE];
+    const real effect = choose(healthy, e, known[EFFECT]);
+
+    /* The step alone, and its intersection with those before, widened by the drift. */
+    Interval loss, offset;
+    step_intervals(data, y, e, turn, disturbance, effect, &loss, &offset);
+    const real widened = data->drift * magnitude(e);
+    real low = maximum(maximum(known[LOW] - data->drift, all(data->least)), loss.low);
+    real high = minimum(minimum(known[HIGH] + data->drift, all(1.0)), loss.high);
+    real offset_low = maximum(known[OFFSET_LOW] - widened, offset.low);
+    real offset_high = minimum(known[OFFSET_HIGH] + widened, offset.high);
+
+    /* While healthy, and where nothing explains the steps, everything begins with this one. A first fault is confirmed
+     * sooner than one that replaces another. */
+    const mask begun = healthy | ((low > high) & (offset_low > offset_high));
+    low = choose(begun, loss.low, low), high = choose(begun, loss.high, high);
+    offset_low = choose(begun, offset.low, offset_low), offset_high = choose(begun, offset.high, offset_high);
+    const real begin = choose(healthy, all(CONFIRMED + 1.0 - data->steps), all(1.0));
+    const real count = choose(begun, begin, known[COUNT] + 1.0);
+
+    const mask explained = low <= high, waiting = (begun | (mode == PENDING)) & (count < CONFIRMED);
+    const real faulty = choose(explained, choose(high >= 1.0, all(HEALTHY), all(LOST)), all(OTHER));
+    const real new = choose(healthy & (loss.high >= 1.0), all(HEALTHY), choose(waiting, all(PENDING), faulty));
+    const real middle = 0.5 * (low + high);
+    const real estimate = choose(new == PENDING, known[EFFECTIVENESS], choose(new == LOST, middle, all(1.0)));
+
+    /* What is farther off than the bound is no disturbance. */
+    const real learned = disturbance + data->learning * within(y - e - disturbance, data->bound * magnitude(e));
+    disturbance = choose(healthy & (new == HEALTHY), within(learned, greatest), disturbance);
+    const Interval kept = kept_where(explained, low, high);
+    const Interval kept_offset = kept_where(offset_low <= offset_high, offset_low, offset_high);
+    const real update[KNOWN] = {estimate,         kept.low,    kept.high, kept_offset.low,
+                                kept_offset.high, disturbance, choose(new == HEALTHY, e, known[EFFECT]),
+                                new,              count};
+    for (int i = 0; i < KNOWN; i++)
+        known[i] = choose(usable, update[i], known[i]);
+}
+
+/* Return the effectiveness by which the elevator command of step k is divided. A step whose measurement is not finite,
+ * or in which the elevator has no effect, changes nothing.
+ *
+ * predicted: state of the step before, measured where rigid and predicted where elastic; held: the input since. */
+static inline real effectiveness_step(const hsv_effectiveness *data, const Vehicle *vehicle, real *predicted,
+                                      const real *held, real *known, int64_t k, const real *x)
+{
+    if (k == 0) {
+        for (int i = 0; i < STATES; i++)
+            predicted[i] = all(data->start[i]);
+        for (int i = 0; i < KNOWN; i++)
+            known[i] = all(i <= HIGH ? 1.0 : 0.0);
+    } else {
+        real with[STATES], without[STATES];
+        const real idle[INPUTS] = {held[FUEL], all(0.0)};
+        memcpy(with, predicted, sizeof with);
+        memcpy(without, predicted, sizeof without);
+        advance(with, held, vehicle, NULL, all(data->period), 1);
+        advance(without, idle, vehicle, NULL, all(data->period), 1);
+        const real y = x[PITCH_RATE] - without[PITCH_RATE], e = with[PITCH_RATE] - without[PITCH_RATE];
+        const real turn = x[PITCH_RATE] - predicted[PITCH_RATE];
+        const mask usable = is_finite(y) & is_finite(e) & (magnitude(e) > 1e-9);
+        judge(data, known, usable, k == 1, choose(usable, y, all(1.0)), choose(usable, e, all(1.0)),
+              choose(usable, turn, all(0.0)));
+        /* The elastic modes have felt the loss before it is confirmed. */
+        const mask unsure = (known[MODE] == PENDING) & (known[LOW] <= known[HIGH]);
+        const real felt = choose(unsure, 0.5 * (known[LOW] + known[HIGH]), known[EFFECTIVENESS]);
+        for (int i = RIGID; i < STATES; i++) {
+            const real now = without[i] + felt * (with[i] - without[i]);
+            predicted[i] = choose(is_finite(now), now, predicted[i]);
+        }
+    }
+    for (int i = 0; i < RIGID; i++)
+        predicted[i] = x[i];
+    return known[EFFECTIVENESS];
+}
+#endif

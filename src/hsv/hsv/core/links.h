@@ -1,0 +1,78 @@
+/* Links of the loop: payloads that come late, are lost, or are corrupted.
+ *
+ * The receiver keeps the last payload that arrived. Losses form a two-state Gilbert channel (Gilbert 1960). A corrupted
+ * payload has one bit of one of its numbers flipped; with a checksum, or where the number is then not finite or beyond
+ * LARGEST, the receiver notices, and the payload is lost.
+ */
+#ifndef LINKS_H
+#define LINKS_H
+#include "noise.h"
+
+#define LARGEST 1e6 /* SI */
+
+/* The memory: step of the payload accepted last, whether the one before was lost, whether there was a payload yet, the
+ * payload accepted last, and then those that may still arrive. */
+enum { NEWEST, LOSING, BEGUN, ACCEPTED };
+
+/* Fill a link with one payload, as if it had been sent until now. */
+void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n)
+{
+    for (int64_t i = 0; i < size - ACCEPTED; i++)
+        memory[ACCEPTED + i] = payload[i % n];
+    memory[NEWEST] = -(double)size;
+    memory[BEGUN] = 1.0;
+}
+
+/* Corrupt the payload that arrives, if that is drawn; return whether the receiver accepts it. */
+static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, int64_t seed)
+{
+    double drawn[2];
+    hsv_uniforms(seed, k, LINK_CORRUPTION + link->channel, 0, drawn);
+    if (!(drawn[0] < link->corruption))
+        return 1;
+    if (link->checksum)
+        return 0;
+    const int64_t bit = (int64_t)(drawn[1] * (double)(64 * n));
+    double *number = &payload[bit / 64];
+    const double before = *number;
+    uint64_t word;
+    memcpy(&word, number, sizeof word);
+    word ^= UINT64_C(1) << (bit % 64);
+    memcpy(number, &word, sizeof word);
+    if (magnitude(*number) <= LARGEST)
+        return 1;
+    memcpy(number, &before, sizeof before); /* it may arrive again, late */
+    return 0;
+}
+
+/* Replace the payload (n) that is sent in step k by the one that the receiver then has. */
+void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload, int64_t n)
+{
+    if (link->ideal)
+        return;
+    if (memory[BEGUN] == 0.0)
+        hsv_fill_link(memory, size, payload, n);
+    const int64_t slots = link->delay + link->jitter + 1;
+    memcpy(memory + ACCEPTED + n * (1 + k % slots), payload, (size_t)n * sizeof *payload);
+    int64_t newest = k - link->delay;
+    if (link->jitter > 0)
+        newest -= (int64_t)(first_uniform(seed, k, LINK_DELAY + link->channel, 0) * (double)(link->jitter + 1));
+    int arrives = (double)newest > memory[NEWEST];
+    if (link->loss > 0.0) {
+        const double drawn = first_uniform(seed, k, LINK_LOSS + link->channel, 0);
+        const double due = memory[LOSING] == 1.0 ? link->loss_after_loss : link->loss_after_arrival;
+        const int lost = drawn < (k == 0 ? link->loss : due);
+        memory[LOSING] = lost;
+        arrives = arrives && !lost;
+    }
+    if (arrives) {
+        const int64_t slot = (newest % slots + slots) % slots; /* before the flight, newest is below zero */
+        double *arriving = memory + ACCEPTED + n * (1 + slot);
+        if (!(link->corruption > 0.0) || passes(link, arriving, n, k, seed)) {
+            memcpy(memory + ACCEPTED, arriving, (size_t)n * sizeof *payload);
+            memory[NEWEST] = (double)newest;
+        }
+    }
+    memcpy(payload, memory + ACCEPTED, (size_t)n * sizeof *payload);
+}
+#endif

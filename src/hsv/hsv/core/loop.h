@@ -1,0 +1,235 @@
+/* The closed loop: the order of a step, which nodes, replay and flights share.
+ *
+ *   x(k)              state of the vehicle at t = k T
+ *   y(k)              measurement of x(k); the estimate, where an estimator flies, takes its place below
+ *   q_f(k), s(k)      notch filter (eq. 39), stepped with the pitch rate in y(k)
+ *   x_r, u_r, d_r     reference of the step and its defect
+ *   u_n(k) = K x_n(k)                                         nominal law (eq. 32 to eq. 35)
+ *   u(k)              tube law or another controller, limited to U (eq. 36, eq. 29)
+ *   x_n(k+1)          nominal system (eq. 20), scheduled by y(k)
+ *   actuator(k)       u(k) after the link of the command and the faults on it (eq. 14, eq. 15)
+ *   x(k+1)            the plant, with actuator(k) held over [k T, (k+1) T)
+ *
+ * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
+ */
+#ifndef LOOP_H
+#define LOOP_H
+#include "estimator.h"
+#include "metrics.h"
+#include "nominal.h"
+#include "plant.h"
+#include "tube_law.h"
+
+typedef struct {
+    Plants plants;
+    Vehicle estimator_vehicle, tube_vehicle;
+    TubeMemory tube;
+    LevelMemory levels;
+    real x[STATES], measurement[STATES], estimator[ESTIMATED], notch[2 * MAX_SECTIONS];
+    real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
+    real x_r[STATES], u_r[INPUTS], d_r[STATES];
+    int64_t row[LANES], active[LANES]; /* of reference and gain in each lane */
+} Loop;
+
+static inline void measure_lanes(Loop *f, int64_t k)
+{
+    if (!f->plants.equipped) {
+        memcpy(f->measurement, f->x, sizeof f->x);
+        return;
+    }
+    for (int i = 0; i < LANES; i++) {
+        double x[STATES], y[STATES];
+        take_lane(f->x, STATES, i, x);
+        hsv_sense(f->plants.plant[i], f->plants.memory[i], f->plants.faults[i], k, x, y);
+        give_lane(y, STATES, i, f->measurement);
+    }
+}
+
+/* Bring the rows of the reference and the gains of the tube law up to step k. */
+static inline void schedule_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
+{
+    for (int i = 0; i < LANES; i++) {
+        const hsv_reference *reference = flights[i]->reference;
+        int64_t row = k - reference->first;
+        row = row < 0 ? 0 : row < reference->rows ? row : reference->rows - 1;
+        if (row != f->row[i]) {
+            f->row[i] = row;
+            give_lane(reference->state + STATES * row, STATES, i, f->x_r);
+            give_lane(reference->input + INPUTS * row, INPUTS, i, f->u_r);
+            give_lane(reference->defect + STATES * row, STATES, i, f->d_r);
+        }
+        const int64_t active = active_gain(flights[i]->tube, k);
+        if (active != f->active[i]) {
+            f->active[i] = active;
+            give_lane(flights[i]->tube->gains + INPUTS * STATES * active, INPUTS * STATES, i, f->gain);
+        }
+    }
+}
+
+static inline void begin(hsv_flight *const *flights, Loop *f)
+{
+    const hsv_flight *first = flights[0];
+    const hsv_vehicle *vehicles[LANES];
+    memset(f, 0, sizeof *f);
+    gather_plants(flights, &f->plants);
+    for (int i = 0; i < LANES; i++)
+        vehicles[i] = first->estimator ? &first->estimator->vehicle : &first->plant->vehicle;
+    gather_vehicle(vehicles, &f->estimator_vehicle);
+    for (int i = 0; i < LANES; i++)
+        vehicles[i] = first->tube->effectiveness ? &first->tube->effectiveness->vehicle : &first->plant->vehicle;
+    gather_vehicle(vehicles, &f->tube_vehicle);
+    for (int i = 0; i < LANES; i++) {
+        f->row[i] = f->active[i] = -1;
+        give_lane(flights[i]->x, STATES, i, f->x);
+    }
+    measure_lanes(f, 0);
+    notch_rest(first->notch, f->measurement[PITCH_RATE], f->notch);
+    schedule_lanes(flights, f, 0);
+    if (first->nominal->count > 0)
+        for (int i = 0; i < STATES; i++)
+            f->x_n[i] = f->measurement[i] - f->x_r[i];
+}
+
+#if LANES == 1
+/* Have functions from outside step the nominal law and the controller, where there are any; return whether the latter
+ * has written a finite unsaturated input, -1 where one failed. */
+static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const double *estimate, double q_f,
+                              const double *s, double *u_unsaturated)
+{
+    const hsv_call *law = &flight->nominal_law, *controller = &flight->controller;
+    double found[INPUTS + 1];
+    if (law->function) {
+        if (law->function(k, f->x_n, found, law->state, law->par))
+            return -1;
+        f->u_n[0] = found[0], f->u_n[1] = found[1], f->gain_index = found[INPUTS];
+    } else if (flight->nominal->count > 0)
+        nominal_input(flight->nominal, f->x_n, f->u_n, &f->gain_index);
+    if (!controller->function)
+        return 0;
+    double in[3 * STATES + 1 + 2 * INPUTS + 2 * MAX_SECTIONS], *next = in; /* the order of hsv_block.h */
+    memcpy(next, estimate, sizeof f->x), next += STATES;
+    *next++ = q_f;
+    memcpy(next, f->x_r, sizeof f->x_r), next += STATES;
+    memcpy(next, f->u_r, sizeof f->u_r), next += INPUTS;
+    memcpy(next, f->x_n, sizeof f->x_n), next += STATES;
+    memcpy(next, f->u_n, sizeof f->u_n), next += INPUTS;
+    memcpy(next, s, 2 * (size_t)flight->notch->sections * sizeof *s);
+    u_unsaturated[0] = u_unsaturated[1] = NAN; /* an output that the controller does not set is noticed */
+    flight->returned = controller->function(k, in, u_unsaturated, controller->state, controller->par);
+    memcpy(flight->answer, u_unsaturated, sizeof flight->answer);
+    return flight->returned == 0 && is_finite(u_unsaturated[0]) && is_finite(u_unsaturated[1]) ? 1 : -1;
+}
+#endif
+
+/* Write row "line" of the histories of all lanes. */
+static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t line, const real *estimate, real q_f,
+                              const real *x_n, const real *u_unsaturated)
+{
+    for (int i = 0; i < LANES; i++) {
+        double *row = flights[i]->history + HISTORY * line, *auxiliary = flights[i]->auxiliary + AUXILIARY * line;
+        take_lane(f->x, STATES, i, row), row += STATES;
+        *row++ = lane(q_f, i);
+        take_lane(x_n, STATES, i, row), row += STATES;
+        take_lane(f->u_n, INPUTS, i, row), row += INPUTS;
+        take_lane(f->u, INPUTS, i, row), row += INPUTS;
+        take_lane(f->actuator, INPUTS, i, row);
+        auxiliary[0] = lane(f->gain_index, i);
+        take_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
+        if (flights[i]->estimated)
+            take_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
+    }
+}
+
+/* Note which flights have left the range of the model in step k; return whether all have. */
+static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t k)
+{
+    const mask inside = in_model_range(f->x, flights[0]->plant->vehicle.angle_limit);
+    if (every(inside))
+        return 0;
+    int flying = 0;
+    for (int i = 0; i < LANES; i++)
+        if (flights[i]->ended > k) {
+            if (lane(inside, i))
+                flying++;
+            else
+                flights[i]->ended = k + 1;
+        }
+    return flying == 0;
+}
+
+/* Fly the steps start ... stop - 1 of a group of flights, which share all but vehicle, seed, faults, reference, gains of
+ * the tube law and the numbers of the equipment. Return the step after the last one flown, -1 - k where a block from
+ * outside failed in step k. */
+static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop)
+{
+    const hsv_flight *first = flights[0];
+    const hsv_notch *notch = first->notch;
+    const hsv_plant *plant = first->plant;
+    if (start == 0)
+        begin(flights, f);
+    for (int64_t k = start; k < stop; k++) {
+        real estimate[STATES], s[2 * MAX_SECTIONS], x_n[STATES], u_feedback[INPUTS], u_unsaturated[INPUTS];
+        if (k > 0) {
+            if (f->plants.equipped)
+                advance_plants(&f->plants, k - 1, f->actuator, f->x);
+            else {
+                real effector[INPUTS];
+                for (int j = 0; j < INPUTS; j++)
+                    effector[j] = limited(f->actuator[j], plant->actuators.minimum[j], plant->actuators.maximum[j]);
+                advance(f->x, effector, &f->plants.vehicle, NULL, all(plant->period), plant->substeps);
+            }
+            measure_lanes(f, k);
+            schedule_lanes(flights, f, k);
+        }
+        memcpy(estimate, f->measurement, sizeof estimate);
+        if (first->estimator) {
+            estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u, estimate);
+            if (k == 0)
+                notch_rest(notch, estimate[PITCH_RATE], f->notch);
+        }
+        memcpy(s, f->notch, sizeof s);
+        const real q_f = notch_step(notch, f->notch, estimate[PITCH_RATE]);
+        int answered = 0;
+#if LANES == 1
+        flights[0]->history[HISTORY * (k - start) + STATES] = q_f; /* tells a watching process which step is under way */
+        answered = call_blocks(flights[0], f, k, estimate, q_f, s, u_unsaturated);
+        if (answered < 0)
+            return -1 - k;
+#else
+        if (first->nominal->count > 0)
+            nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
+#endif
+        if (answered)
+            for (int j = 0; j < INPUTS; j++)
+                f->u[j] = limited(u_unsaturated[j], first->tube->minimum[j], first->tube->maximum[j]);
+        else
+            tube_step(first->tube, &f->tube_vehicle, &f->tube, f->gain, k, 0, 2 * notch->sections, estimate, q_f,
+                      f->x_r, f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
+        memcpy(x_n, f->x_n, sizeof x_n);
+        if (first->set)
+            level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);
+        if (first->nominal->count > 0)
+            nominal_advance(&first->nominal->polytope, f->measurement[ALTITUDE], f->measurement[VELOCITY], f->x_n,
+                            f->u_n, f->d_r);
+        memcpy(f->actuator, f->u, sizeof f->u);
+        for (int i = 0; i < LANES; i++) {
+            hsv_flight *own = flights[i];
+            if (own->link->ideal && own->faults->count == 0)
+                continue;
+            double actuator[INPUTS];
+            take_lane(f->actuator, INPUTS, i, actuator);
+            hsv_receive(own->link, own->link_memory, own->payloads, k, own->plant->seed, actuator, INPUTS);
+            hsv_apply_command_faults(own->faults, k, own->plant->seed, actuator);
+            give_lane(actuator, INPUTS, i, f->actuator);
+        }
+        write_rows(flights, f, k - start, estimate, q_f, x_n, u_unsaturated);
+        if (first->set)
+            for (int i = 0; i < LANES; i++)
+                if (flights[i]->ended > k)
+                    flights[i]->worst = lane(f->levels.worst, i);
+        if (end_flights(flights, f, k))
+            return k + 1;
+    }
+    return stop;
+}
+#endif

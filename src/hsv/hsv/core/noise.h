@@ -1,0 +1,70 @@
+/* Random numbers that are functions of seed, step, stream and draw.
+ *
+ * The generator is Philox4x64-10 (Salmon, Moraes, Dror and Shaw 2011): a block of four words is a function of the
+ * counter (step, stream, draw, 0) and the key (seed, 0), without a state. The numbers of any step are known without
+ * those before it, in whatever order steps, blocks and flights are computed. numpy's Philox(counter=c, key=k) begins
+ * with the block of c + 1. Normal numbers are those of Box and Muller (1958).
+ *
+ * A stream belongs to one channel of one named block: what is added to a flight leaves the noise of the rest as it was.
+ */
+#ifndef NOISE_H
+#define NOISE_H
+#include "elementary.h"
+
+/* Return the high word of the product of two words of 64 bits. */
+static inline uint64_t high_product(uint64_t a, uint64_t b)
+{
+    const uint64_t half = 0xFFFFFFFF, a_low = a & half, a_high = a >> 32, b_low = b & half, b_high = b >> 32;
+    const uint64_t middle = a_high * b_low + (a_low * b_low >> 32), other = a_low * b_high + (middle & half);
+    return a_high * b_high + (middle >> 32) + (other >> 32);
+}
+
+void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words)
+{
+    uint64_t a = counter[0], b = counter[1], c = counter[2], d = counter[3], key_0 = key[0], key_1 = key[1];
+    for (int round = 0; round < 10; round++) {
+        const uint64_t first = UINT64_C(0xD2E7470EE14C6C93), second = UINT64_C(0xCA5A826395121157);
+        const uint64_t high_0 = high_product(first, a), low_0 = first * a;
+        const uint64_t high_1 = high_product(second, c), low_1 = second * c;
+        a = high_1 ^ b ^ key_0, b = low_1, c = high_0 ^ d ^ key_1, d = low_0;
+        key_0 += UINT64_C(0x9E3779B97F4A7C15), key_1 += UINT64_C(0xBB67AE8584CAA73B);
+    }
+    words[0] = a, words[1] = b, words[2] = c, words[3] = d;
+}
+
+/* Two independent numbers, each uniform on the multiples of 2^-53 in [0, 1). */
+void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
+{
+    const uint64_t counter[4] = {(uint64_t)step, (uint64_t)stream, (uint64_t)draw, 0}, key[2] = {(uint64_t)seed, 0};
+    uint64_t words[4];
+    hsv_philox(counter, key, words);
+    pair[0] = (double)(words[0] >> 11) * 0x1p-53;
+    pair[1] = (double)(words[1] >> 11) * 0x1p-53;
+}
+
+/* Two independent standard normal numbers, at most 8.6 in magnitude. */
+void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair)
+{
+    double uniform[2], sine, cosine;
+    hsv_uniforms(seed, step, stream, draw, uniform);
+    /* The logarithm of a number in (0, 1]. */
+    const double radius = __builtin_sqrt(-2.0 * hsv_logarithm(uniform[0] + 0x1p-53));
+    sine_cosine(6.283185307179586 * uniform[1], &sine, &cosine);
+    pair[0] = radius * cosine;
+    pair[1] = radius * sine;
+}
+
+static inline double first_uniform(int64_t seed, int64_t step, int64_t stream, int64_t draw)
+{
+    double pair[2];
+    hsv_uniforms(seed, step, stream, draw, pair);
+    return pair[0];
+}
+
+static inline double first_normal(int64_t seed, int64_t step, int64_t stream, int64_t draw)
+{
+    double pair[2];
+    hsv_normals(seed, step, stream, draw, pair);
+    return pair[0];
+}
+#endif

@@ -1,0 +1,161 @@
+/* The vehicle with its actuators, sensors and air over one control period.
+ *
+ * Equipment works with plain doubles, lane after lane; the equations of motion advance all lanes at once. While
+ * actuators are ideal, the command is there in time and no fault of theirs acts, the vehicle takes the command within
+ * the stops; otherwise actuators and vehicle move on the substeps of the actuators.
+ */
+#ifndef PLANT_H
+#define PLANT_H
+#include "vehicle.h"
+
+enum { ACTUATOR_SUBSTEPS = 4 };
+
+#if LANES == 1
+#include "actuators.h"
+#include "atmosphere.h"
+#include "links.h"
+#include "sensors.h"
+
+void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k, const double *x,
+               double *measurement)
+{
+    if (plant->sensors.ideal && faults->sensor.count == 0)
+        memcpy(measurement, x, STATES * sizeof *x);
+    else
+        hsv_measure(&plant->sensors, memory->sensors, &faults->sensor, k, plant->seed, x, measurement);
+    hsv_receive(&plant->link, memory->link, memory->payloads, k, plant->seed, measurement, STATES);
+}
+
+/* Update the conditions of air and engine for the period after step k. */
+void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
+                          const double *x, double fuel)
+{
+    double *conditions = memory->conditions;
+    if (!plant->atmosphere.still)
+        hsv_atmosphere_step(&plant->atmosphere, memory->atmosphere, k, plant->seed, x[ALTITUDE], x[VELOCITY], conditions);
+    const AirRelative air =
+        air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
+    const double mach = air.speed / hsv_speed_of_sound(x[ALTITUDE]);
+    hsv_apply_engine_faults(&faults->engine, k, plant->seed, x[ALPHA] - air.turn, mach, fuel,
+                            conditions + THRUST_FACTOR);
+}
+#endif
+
+/* Whether the air is still and the engine has no faults: then no conditions change. */
+static inline int is_calm(const hsv_plant *plant, const hsv_plant_faults *faults)
+{
+    return plant->atmosphere.still && faults->engine.count == 0;
+}
+
+/* The plants of a group of flights, one in each lane. */
+typedef struct {
+    Vehicle vehicle;
+    const hsv_plant *plant[LANES];
+    hsv_plant_memory *memory[LANES];
+    hsv_plant_faults *faults[LANES];
+    int equipped; /* whether anything is there that is stepped lane by lane */
+} Plants;
+
+static inline void gather_vehicle(const hsv_vehicle *const *p, Vehicle *vehicle)
+{
+    for (int i = 0; i < LANES; i++)
+        for (size_t j = 0; j < sizeof *vehicle / sizeof(plain); j++)
+            lane(((plain *)vehicle)[j], i) = ((const double *)p[i])[j];
+}
+
+static inline void gather_plants(hsv_flight *const *flights, Plants *plants)
+{
+    const hsv_vehicle *vehicles[LANES];
+    plants->equipped = 0;
+    for (int i = 0; i < LANES; i++) {
+        const hsv_plant *plant = plants->plant[i] = flights[i]->plant;
+        const hsv_plant_faults *faults = plants->faults[i] = flights[i]->plant_faults;
+        plants->memory[i] = flights[i]->plant_memory;
+        vehicles[i] = &plant->vehicle;
+        plants->equipped |= !(plant->actuators.ideal && plant->sensors.ideal && plant->link.ideal &&
+                              plant->late == 0.0 && is_calm(plant, faults) && faults->effector.count == 0 &&
+                              faults->sensor.count == 0);
+    }
+    gather_vehicle(vehicles, &plants->vehicle);
+}
+
+static inline void take_lane(const real *from, int count, int i, double *to)
+{
+    for (int j = 0; j < count; j++)
+        to[j] = lane(from[j], i);
+}
+
+static inline void give_lane(const double *from, int count, int i, real *to)
+{
+    for (int j = 0; j < count; j++)
+        lane(to[j], i) = from[j];
+}
+
+/* Move the effectors in the lanes that are "moving" over a length of substeps, and then the vehicle. */
+static inline void advance_moving(Plants *plants, const int *moving, int64_t k, double substep, double length,
+                                  const real *command, const real *conditions, real *x)
+{
+    real effector[INPUTS] = {all(0.0), all(0.0)};
+    for (int i = 0; i < LANES; i++)
+        if (moving[i]) {
+            hsv_plant_memory *memory = plants->memory[i];
+            double own[INPUTS];
+            take_lane(command, INPUTS, i, own);
+            hsv_move_effectors(&plants->plant[i]->actuators, memory->actuators, &plants->faults[i]->effector, k, substep,
+                               length, own, lane(x[ALPHA], i), memory->effector);
+            give_lane(memory->effector, INPUTS, i, effector);
+        }
+    advance(x, effector, &plants->vehicle, conditions, all(length * plants->plant[0]->actuators.substep), 1);
+}
+
+/* Replace the states x by those one period after step k; "actuator" is what reaches the actuators, from then on held. */
+static inline void advance_plants(Plants *plants, int64_t k, const real *actuator, real *x)
+{
+    const hsv_plant *first = plants->plant[0];
+    const double late = first->late;
+    real held[CONDITIONS], before[INPUTS], effector[INPUTS], passed[STATES];
+    const int calm = is_calm(first, plants->faults[0]);
+    int moving[LANES], number = 0;
+    for (int i = 0; i < LANES; i++) {
+        hsv_plant_memory *memory = plants->memory[i];
+        if (!calm) {
+            double own[STATES];
+            take_lane(x, STATES, i, own);
+            hsv_plant_conditions(plants->plant[i], memory, plants->faults[i], k, own, lane(actuator[FUEL], i));
+            give_lane(memory->conditions, CONDITIONS, i, held);
+        }
+        const int64_t acting = hsv_begin_faults(&plants->faults[i]->effector, k, plants->plant[i]->seed);
+        number += moving[i] = acting > 0 || !first->actuators.ideal || late != 0.0;
+        give_lane(memory->command, INPUTS, i, before);
+    }
+    const real *conditions = calm ? NULL : held;
+    memcpy(passed, x, sizeof passed);
+    if (number < LANES) {
+        for (int j = 0; j < INPUTS; j++)
+            effector[j] = limited(actuator[j], first->actuators.minimum[j], first->actuators.maximum[j]);
+        for (int i = 0; i < LANES; i++)
+            if (!moving[i]) {
+                take_lane(effector, INPUTS, i, plants->memory[i]->effector);
+                for (int j = 0; j < INPUTS; j++) {
+                    plants->memory[i]->actuators[2 * j] = lane(effector[j], i);
+                    plants->memory[i]->actuators[2 * j + 1] = 0.0;
+                }
+            }
+        advance(passed, effector, &plants->vehicle, conditions, all(first->period), first->substeps);
+    }
+    if (number > 0)
+        for (int j = 0; j < ACTUATOR_SUBSTEPS; j++) {
+            const double share = late - j < 0.0 ? 0.0 : late - j > 1.0 ? 1.0 : late - j; /* of the command before */
+            if (share > 0.0)
+                advance_moving(plants, moving, k, j, share, before, conditions, x);
+            if (share < 1.0)
+                advance_moving(plants, moving, k, j + share, 1.0 - share, actuator, conditions, x);
+        }
+    for (int i = 0; i < LANES; i++) {
+        take_lane(actuator, INPUTS, i, plants->memory[i]->command);
+        if (!moving[i])
+            for (int j = 0; j < STATES; j++)
+                lane(x[j], i) = lane(passed[j], i);
+    }
+}
+#endif

@@ -1,0 +1,121 @@
+/* Sensors, one of each state:
+ *
+ *   y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n)))))
+ *
+ * with scale factor s and lag of the sensor, bias b and noise n (constant bias, Gauss-Markov drift, random walk, white
+ * noise), latency in whole samples, samples that are lost and held, quantisation, range, and what fails. An ideal sensor
+ * passes its state to the bit. In step 0 lags rest and queues are full of the first sample.
+ */
+#ifndef SENSORS_H
+#define SENSORS_H
+#include "faults.h"
+#include "vehicle.h"
+
+/* Bias and noise of a step; what is drawn once is drawn in step 0. */
+static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed)
+{
+    double drawn[2];
+    if (k == 0) {
+        hsv_normals(seed, 0, SENSOR_CONSTANTS + i, 0, drawn);
+        m->bias = s->bias[i] + s->bias_sigma[i] * drawn[0];
+        m->scale = s->scale[i] + s->scale_sigma[i] * drawn[1];
+        m->walk = 0.0;
+    }
+    double error = m->bias;
+    if (s->noise[i] > 0.0 || s->drift_sigma[i] > 0.0) {
+        hsv_normals(seed, k, SENSOR_NOISE_STREAM + i, 0, drawn);
+        error += s->noise[i] * drawn[0];
+        if (s->drift_sigma[i] > 0.0) {
+            const double decay = s->drift_decay[i], share = root(maximum(1.0 - decay * decay, 0.0));
+            m->drift = k == 0 ? s->drift_sigma[i] * drawn[1]
+                              : decay * m->drift + s->drift_sigma[i] * share * drawn[1];
+            error += m->drift;
+        }
+    }
+    if (s->walk[i] > 0.0 && k > 0)
+        m->walk += s->walk[i] * first_normal(seed, k, SENSOR_NOISE_STREAM + i, 1);
+    return error + m->walk;
+}
+
+/* The measurement of a sensor that works. */
+static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, int64_t k, int64_t seed, double x,
+                            double error)
+{
+    const double scaled = (1.0 + m->scale) * x;
+    m->lagged = k == 0 ? scaled : scaled + s->lag_decay[i] * (m->lagged - scaled);
+    double value = m->lagged + error;
+    if (s->latency[i] > 0) {
+        const int64_t size = s->latency[i] + 1;
+        if (k == 0)
+            for (int64_t j = 0; j < size; j++)
+                m->queue[j] = value;
+        m->queue[k % size] = value;
+        value = m->queue[(k + 1) % size];
+    }
+    if (s->drop_out[i] > 0.0 && k > 0 && first_uniform(seed, k, SENSOR_LOSS + i, 0) < s->drop_out[i])
+        return m->held;
+    if (s->quantum[i] > 0.0)
+        value = s->quantum[i] * __builtin_floor(value / s->quantum[i] + 0.5);
+    m->held = limited(value, s->minimum[i], s->maximum[i]);
+    return m->held;
+}
+
+/* What a fault makes of a measurement; "given" is that of the step before. */
+static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k, int64_t seed, double period,
+                            double value, double given)
+{
+    const double first = fault->parameter[0], limit = fault->parameter[1];
+    const int fresh = memory->onset == (double)k;
+    const int64_t draw = (int64_t)fault->start;
+    switch (fault->code) {
+    case SENSOR_SCALE:
+        return first * value;
+    case SENSOR_NOISE:
+        return value + first * first_normal(seed, k, SENSOR_FAULT_NOISE + fault->channel, draw);
+    case SENSOR_BIAS:
+        return value + first;
+    case SENSOR_RUNAWAY:
+        return value + limited(first * (((double)k - fault->start) * period), -limit, limit);
+    case SENSOR_DROP_OUT:
+        if (fresh)
+            memory->kept = k > 0 ? given : value;
+        if (first_uniform(seed, k, SENSOR_FAULT_LOSS + fault->channel, draw) >= first)
+            memory->kept = value;
+        return memory->kept;
+    case SENSOR_FREEZE:
+        if (fresh)
+            memory->kept = value;
+        return memory->kept;
+    }
+    return value;
+}
+
+/* Write the measurement (9) of the state x (9); steps follow one another from 0 on. */
+void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faults *faults, int64_t k, int64_t seed,
+                 const double *x, double *measurement)
+{
+    const int64_t failing = hsv_begin_faults(faults, k, seed);
+    double pitch_error = 0.0;
+    for (int i = STATES - 1; i >= 0; i--) { /* the error of the pitch angle is known before that of the angle of attack */
+        measurement[i] = x[i];
+        if (!sensors->on[i])
+            continue;
+        double error = sensor_error(sensors, &memory[i], i, k, seed);
+        if (i == PITCH)
+            pitch_error = error;
+        else if (i == ALPHA && sensors->inertial_angle_of_attack)
+            error += pitch_error;
+        measurement[i] = sensor_sample(sensors, &memory[i], i, k, seed, x[i], error);
+    }
+    if (failing > 0)
+        for (int64_t j = 0; j < faults->count; j++)
+            if (faults->memory[j].acting) {
+                const hsv_fault *fault = &faults->rows[j];
+                double *value = &measurement[fault->channel];
+                *value = sensor_failed(fault, &faults->memory[j], k, seed, faults->period, *value,
+                                       memory[fault->channel].given);
+            }
+    for (int i = 0; i < STATES; i++)
+        memory[i].given = measurement[i];
+}
+#endif

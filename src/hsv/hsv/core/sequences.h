@@ -1,0 +1,233 @@
+/* Many steps at once: the plan of a governor, and what the design measures along flights and random sequences. */
+#ifndef SEQUENCES_H
+#define SEQUENCES_H
+#include "nominal.h"
+#include "noise.h"
+#include "notch_filter.h"
+#include "vehicle.h"
+
+/* Write [A(p), B(p)] (eq. 11), flattened (9, 11); return whether p is inside the envelope. */
+int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S)
+{
+    double weights[MAX_VERTICES], entries[MAX_SIZE];
+    const int inside = vertex_weights(polytope, altitude, velocity, weights);
+    weighted_entries(polytope, weights, entries);
+    memset(S, 0, ENTRIES * sizeof *S);
+    for (int64_t e = 0; e < polytope->used; e++)
+        S[polytope->entries[e]] = entries[e];
+    return inside;
+}
+
+/* Write u_r + u_n (steps, 2) and x_n (steps, 9) from the step "first" on, where x_n is "start"; the model is scheduled by
+ * x_r + x_n. Return whether x_n stays in the family. */
+int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
+             const double *start, double *plan, double *deviation)
+{
+    double x_n[STATES], u_n[INPUTS], index;
+    int held = 1;
+    memcpy(x_n, start, sizeof x_n);
+    for (int64_t k = 0; k < steps; k++) {
+        int64_t row = first + k - reference->first;
+        row = row < 0 ? 0 : row < reference->rows ? row : reference->rows - 1;
+        const double *x_r = reference->state + STATES * row, *u_r = reference->input + INPUTS * row;
+        memcpy(deviation + STATES * k, x_n, sizeof x_n);
+        held &= nominal_input(nominal, x_n, u_n, &index);
+        for (int i = 0; i < INPUTS; i++)
+            plan[INPUTS * k + i] = u_r[i] + u_n[i];
+        nominal_advance(&nominal->polytope, x_r[ALTITUDE] + x_n[ALTITUDE], x_r[VELOCITY] + x_n[VELOCITY], x_n, u_n,
+                        reference->defect + STATES * row);
+    }
+    return held;
+}
+
+/* Filter rates (steps), from rest for the first; write the states (steps, 2 sections) before each step, too. */
+void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, double *filtered, double *states)
+{
+    double s[2 * MAX_SECTIONS] = {0};
+    const size_t count = 2 * (size_t)notch->sections;
+    if (steps > 0)
+        notch_rest(notch, rate[0], s);
+    for (int64_t k = 0; k < steps; k++) {
+        memcpy(states + (size_t)k * count, s, count * sizeof *s);
+        filtered[k] = notch_step(notch, s, rate[k]);
+    }
+}
+
+/* Write C a + D c (rows, 2), and A a + B c into "new". */
+static void respond_once(int64_t states, const double *A, const double *B, const double *C, const double *D,
+                         const double *a, const double *c, double *output, double *new)
+{
+    for (int i = 0; i < INPUTS; i++) {
+        for (int64_t j = 0; j < states; j++)
+            output[i] += C[states * i + j] * a[j];
+        for (int j = 0; j < INPUTS; j++)
+            output[i] += D[INPUTS * i + j] * c[j];
+    }
+    for (int64_t i = 0; i < states; i++) {
+        new[i] = 0.0;
+        for (int64_t j = 0; j < states; j++)
+            new[i] += A[states * i + j] * a[j];
+        for (int j = 0; j < INPUTS; j++)
+            new[i] += B[INPUTS * i + j] * c[j];
+    }
+}
+
+/* Write the states (steps, states) of sampled actuators before each step, and their mean positions (steps, 2), for
+ * commands (steps, 2), from zero. At most 4 states. */
+void hsv_respond(int64_t steps, int64_t states, const double *A, const double *B, const double *C, const double *D,
+                 const double *commands, double *before, double *means)
+{
+    double a[4] = {0}, new[4];
+    for (int64_t k = 0; k < steps; k++) {
+        means[INPUTS * k] = means[INPUTS * k + 1] = 0.0;
+        memcpy(before + states * k, a, (size_t)states * sizeof *a);
+        respond_once(states, A, B, C, D, a, commands + INPUTS * k, means + INPUTS * k, new);
+        memcpy(a, new, (size_t)states * sizeof *a);
+    }
+}
+
+/* Write the effect of the plan's lag on the error (steps, 5 + filter + actuator states) and on the feedback (steps, 2) in
+ * closed loop, from zero; see hsv.design.error_system. gain (2, 5): F; scheduled, lag (steps, 2). */
+void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch, int64_t steps,
+                      int64_t states, const double *A, const double *B, const double *C, const double *D,
+                      const double *scheduled, const double *lag, double *errors, double *feedback)
+{
+    double x[RIGID] = {0}, new[RIGID], s[2 * MAX_SECTIONS] = {0}, a[4] = {0}, turned[4], S[ENTRIES];
+    const int64_t filter = 2 * notch->sections, width = RIGID + filter + states;
+    for (int64_t k = 0; k < steps; k++) {
+        double *error = errors + width * k, *own = feedback + INPUTS * k;
+        memcpy(error, x, sizeof x);
+        memcpy(error + RIGID, s, (size_t)filter * sizeof *s);
+        memcpy(error + RIGID + filter, a, (size_t)states * sizeof *a);
+        hsv_schedule(polytope, scheduled[2 * k], scheduled[2 * k + 1], S);
+        const double filtered = notch_step(notch, s, x[PITCH_RATE]);
+        double held[INPUTS] = {lag[INPUTS * k], lag[INPUTS * k + 1]};
+        for (int i = 0; i < INPUTS; i++) {
+            own[i] = gain[RIGID * i + PITCH_RATE] * filtered;
+            for (int j = 0; j < RIGID; j++)
+                if (j != PITCH_RATE)
+                    own[i] += gain[RIGID * i + j] * x[j];
+        }
+        respond_once(states, A, B, C, D, a, own, held, turned);
+        memcpy(a, turned, (size_t)states * sizeof *a);
+        for (int i = 0; i < RIGID; i++) {
+            const double *row = S + (STATES + INPUTS) * i;
+            new[i] = 0.0;
+            for (int j = 0; j < RIGID; j++)
+                new[i] += row[j] * x[j];
+            for (int j = 0; j < INPUTS; j++)
+                new[i] += row[STATES + j] * held[j];
+        }
+        memcpy(x, new, sizeof x);
+    }
+}
+
+/* Random sequences of vertices and disturbances against an ellipsoid, see hsv.design.sets.sampling. */
+enum { MAX_WIDTH = 32 };
+#define GOLDEN UINT64_C(0x9E3779B97F4A7C15)
+
+/* splitmix64: a counter in, 64 good bits out. */
+static uint64_t mix(uint64_t state)
+{
+    uint64_t z = (state ^ (state >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+    return z ^ (z >> 31);
+}
+
+static double square(const double *v, int64_t width)
+{
+    double total = 0.0;
+    for (int64_t i = 0; i < width; i++)
+        total += v[i] * v[i];
+    return total;
+}
+
+static void add_column(const double *column, double value, int64_t width, double *sum)
+{
+    for (int64_t i = 0; i < width; i++)
+        sum[i] += column[i] * value;
+}
+
+/* Write the next v of a vertex, whose rows are the columns of states, of disturbances, and a constant one. */
+static void advance_sequence(const double *vertex, int64_t rows, int64_t width, int64_t n, uint64_t signs,
+                             const double *v, double *new)
+{
+    memset(new, 0, (size_t)width * sizeof *new);
+    for (int64_t j = 0; j < rows; j++)
+        add_column(vertex + width * j, j < n ? v[j] : j == rows - 1 || (signs >> j & 1) ? 1.0 : -1.0, width, new);
+}
+
+/* Return the signs that push outwards, one channel after the other: the greatest effect of a greedy choice. */
+static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64_t n, const double *v, double *new)
+{
+    uint64_t signs = 0;
+    memcpy(new, vertex + width * (rows - 1), (size_t)width * sizeof *new);
+    for (int64_t j = 0; j < n; j++)
+        add_column(vertex + width * j, v[j], width, new);
+    for (int64_t j = n; j < rows - 1; j++) {
+        double along = 0.0;
+        for (int64_t i = 0; i < width; i++)
+            along += new[i] * vertex[width * j + i];
+        if (along >= 0.0)
+            signs |= UINT64_C(1) << j;
+        add_column(vertex + width * j, along >= 0.0 ? 1.0 : -1.0, width, new);
+    }
+    return signs;
+}
+
+/* Fly the sequences first ... end - 1, each of a kind (number mod 4: iid, held, switching, adversarial) from zero or from
+ * the boundary; take the greatest levels into "worst" (4, 2). columns (vertices, rows, width), begin (width). */
+void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
+                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed,
+                          double *worst)
+{
+    double v[MAX_WIDTH], new[MAX_WIDTH];
+    for (int64_t sequence = first; sequence < end; sequence++) {
+        uint64_t state = mix(seed * GOLDEN + (uint64_t)(sequence + 1) * UINT64_C(0xD1342543DE82EF95)), signs = 0;
+        const int64_t kind = sequence % 4, boundary = sequence / 4 % 2;
+        const int greedy = kind == 3 && sequence % 100 == 3;
+        int64_t vertex = 0, left = 0;
+        if (boundary) {
+            memset(v, 0, sizeof v);
+            for (int64_t i = 0; i < n; i++)
+                for (int j = 0; j < 4; j++) { /* four uniform numbers: near enough to a normal one for a direction */
+                    state += GOLDEN;
+                    v[i] += (double)(mix(state) >> 11) * 0x1p-53 - 0.5;
+                }
+            const double norm = root(square(v, width));
+            for (int64_t i = 0; i < width; i++)
+                v[i] /= norm;
+        } else
+            memcpy(v, begin, (size_t)width * sizeof *v);
+        double reached = boundary ? 0.0 : square(v, width);
+        for (int64_t k = 0; k < steps; k++) {
+            if (left == 0) {
+                state += GOLDEN;
+                const uint64_t bits = mix(state);
+                vertex = (int64_t)((bits >> 40) % (uint64_t)vertices);
+                signs = bits << n;
+                left = kind == 0 ? 1 : steps;
+                if (kind > 1) {
+                    state += GOLDEN;
+                    left = (int64_t)(1 + mix(state) % 200);
+                }
+            }
+            left--;
+            if (greedy) {
+                double top = -1.0;
+                for (int64_t i = 0; i < vertices; i++) {
+                    const uint64_t choice = outward(columns + rows * width * i, rows, width, n, v, new);
+                    const double level = square(new, width);
+                    if (level > top)
+                        top = level, vertex = i, signs = choice;
+                }
+            } else if (kind == 3)
+                signs = outward(columns + rows * width * vertex, rows, width, n, v, new);
+            advance_sequence(columns + rows * width * vertex, rows, width, n, signs, v, new);
+            memcpy(v, new, sizeof v);
+            reached = maximum(reached, square(v, width));
+        }
+        worst[2 * kind + boundary] = maximum(worst[2 * kind + boundary], reached);
+    }
+}
+#endif

@@ -1,0 +1,87 @@
+/* Tube-MPC law (paper eq. 21, eq. 36, eq. 48, eq. 54):
+ *
+ *   u = F diag(tau) (x - x_r - x_n) + u_n + u_r,   limited to U (eq. 29)
+ *
+ * The pitch rate in x is the filtered one, q_f; that of x_r + x_n is filtered as well where the design says so (eq. 48).
+ * Integral action on the altitude and velocity errors, k F diag(tau) integral of e, is an extension of the paper's law,
+ * off by default; so is the division of the elevator command by its estimated effectiveness (effectiveness.h).
+ *
+ * Robust MPC, the paper's comparison (section 5.2), is the same with a nominal gain K in place of F and without x_n and
+ * u_n ("planned" is 0).
+ */
+#ifndef TUBE_LAW_H
+#define TUBE_LAW_H
+#include "effectiveness.h"
+#include "notch_filter.h"
+
+typedef struct {
+    real planned[2 * MAX_SECTIONS]; /* s_n of the filter of the plan */
+    real integral[INTEGRATED];
+    real predicted[STATES], held[INPUTS], known[KNOWN];
+} TubeMemory;
+
+static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
+{
+    int64_t index = 0;
+    while (index + 1 < tube->count && tube->starts[index + 1] <= k)
+        index++;
+    return index;
+}
+
+/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step.
+ *
+ * The filter of the plan starts from the state s of the filter in the loop, which is exact where x = x_r + x_n; it is
+ * stepped where the law needs it or is monitored, and where there is a filter in the loop. The integral stands still
+ * while an input is limited. Where the sum is not finite, the input is that of the reference: an actuator gets a number
+ * whatever happens.
+ */
+static inline void tube_step(const hsv_tube *tube, const Vehicle *vehicle, TubeMemory *memory, const real *gain,
+                             int64_t k, int monitored, int64_t filter_states, const real *x, real q_f,
+                             const real *x_r, const real *u_r, const real *x_n, const real *u_n, const real *s,
+                             real *u_feedback, real *u_unsaturated, real *u)
+{
+    const int64_t own_states = 2 * tube->notch.sections;
+    if (k == 0) {
+        for (int64_t i = 0; i < own_states && i < filter_states; i++)
+            memory->planned[i] = s[i];
+        for (int j = 0; j < INTEGRATED; j++)
+            memory->integral[j] = all(0.0);
+    }
+    real rate_error = tube->planned ? q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE] : q_f - x_r[PITCH_RATE];
+    if ((tube->filtered || monitored) && own_states > 0 && own_states == filter_states) {
+        const real planned_rate = notch_step(&tube->notch, memory->planned, x_r[PITCH_RATE] + x_n[PITCH_RATE]);
+        if (tube->filtered)
+            rate_error = q_f - planned_rate;
+    }
+    real effectiveness = all(1.0);
+    if (tube->effectiveness)
+        effectiveness = effectiveness_step(tube->effectiveness, vehicle, memory->predicted, memory->held, memory->known,
+                                           k, x);
+    mask limit = never();
+    for (int i = 0; i < INPUTS; i++) {
+        const real *row = gain + STATES * i;
+        real feedback = all(0.0), integral = all(0.0), plan = tube->planned ? u_n[i] : all(0.0);
+        for (int j = 0; j < STATES; j++) {
+            const real error = tube->planned ? x[j] - x_n[j] - x_r[j] : x[j] - x_r[j];
+            feedback += row[j] * (j == PITCH_RATE ? rate_error : error);
+        }
+        if (tube->integral_rate > 0.0) {
+            for (int j = 0; j < INTEGRATED; j++)
+                integral += tube->integral_rate * row[j] * memory->integral[j];
+            plan += integral;
+        }
+        const real arriving = feedback + plan + u_r[i];
+        u_unsaturated[i] = i == ELEVATOR ? arriving / effectiveness : arriving;
+        u_feedback[i] = feedback + integral;
+        u[i] = limited(choose(is_finite(u_unsaturated[i]), u_unsaturated[i], u_r[i]), tube->minimum[i], tube->maximum[i]);
+        limit |= u[i] != u_unsaturated[i];
+    }
+    for (int i = 0; i < INPUTS; i++)
+        memory->held[i] = u[i];
+    if (tube->integral_rate > 0.0)
+        for (int j = 0; j < INTEGRATED; j++) {
+            const real more = memory->integral[j] + tube->period * (x[j] - x_r[j] - x_n[j]);
+            memory->integral[j] = choose(limit, memory->integral[j], more);
+        }
+}
+#endif

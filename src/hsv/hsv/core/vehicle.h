@@ -1,0 +1,181 @@
+/* Equations of motion of the vehicle (paper eq. 1 to eq. 4) and their integration over a control period.
+ *
+ *   dh/dt     = V sin(theta - alpha)
+ *   dV/dt     = (T cos alpha - D) / m - g sin(theta - alpha)
+ *   dalpha/dt = (-T sin alpha - L) / (m V) + q + g / V cos(theta - alpha)
+ *   dtheta/dt = q
+ *   dq/dt     = (M + psi_1 eta_1'' + psi_2 eta_2'') / I_yy
+ *   k_i eta_i'' = -2 zeta_i omega_i eta_i' - omega_i^2 eta_i + N_i - psi_i M / I_yy - psi_1 psi_2 eta_j'' / I_yy
+ *
+ * with k_i = 1 + psi_i^2 / I_yy (eq. 1); without inertial coupling, psi_1 = psi_2 = 0, it is the decoupled model
+ * (eq. 4). Forces and moment are the curve fits of Parker et al. (2007) (eq. 2, eq. 3):
+ *
+ *   L = q S C_L(alpha, delta_e), D = q S C_D(alpha, delta_e), M = z_T T + q S c C_M(alpha, delta_e),
+ *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each coefficient affine in the equivalence ratio phi,
+ *   N_i(alpha, delta_e), dynamic pressure q = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
+ *
+ * The paper prints the thrust term of the moment and the density's exponent otherwise; see docs/errata.md.
+ *
+ * State x: altitude h (m), velocity V (m/s), angle of attack alpha (rad), pitch angle theta (rad), pitch rate q
+ * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
+ * (rad). V and alpha are inertial; air that moves acts through "conditions", see forces_in.
+ */
+#ifndef VEHICLE_H
+#define VEHICLE_H
+#include "elementary.h"
+
+enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
+enum { FUEL, ELEVATOR };
+/* Conditions of air and engine: wind forward and up (m/s), density relative to the model's, factors of thrust, lift and
+ * drag, increment of the pitching moment coefficient. */
+enum { WIND_FORWARD, WIND_UP, DENSITY, THRUST_FACTOR, LIFT_FACTOR, DRAG_FACTOR, MOMENT_INCREMENT };
+
+typedef struct {
+#define number plain
+#include "vehicle_fields.h"
+#undef number
+} Vehicle;
+
+typedef struct {
+    real lift, drag, thrust, moment, pressure; /* N, N, N, N m, Pa */
+} Forces;
+
+static inline Forces forces(real altitude, real velocity, real alpha, const real *u, const Vehicle *p)
+{
+    const real fuel = u[FUEL], elevator = u[ELEVATOR];
+    const real density = p->reference_density * exponential(-(altitude - p->reference_altitude) / p->density_scale_height);
+    const real pressure = 0.5 * density * velocity * velocity;
+    const real alpha2 = alpha * alpha;
+    Forces f;
+    f.pressure = pressure;
+    f.lift = pressure * p->reference_area * (p->lift_alpha * alpha + p->lift_elevator * elevator + p->lift_zero);
+    f.drag = pressure * p->reference_area *
+             (p->drag_alpha_squared * alpha2 + p->drag_alpha * alpha + p->drag_elevator_squared * elevator * elevator +
+              p->drag_elevator * elevator + p->drag_zero);
+    f.thrust = (p->thrust_beta_1 * fuel + p->thrust_beta_2) * alpha2 * alpha +
+               (p->thrust_beta_3 * fuel + p->thrust_beta_4) * alpha2 +
+               (p->thrust_beta_5 * fuel + p->thrust_beta_6) * alpha + (p->thrust_beta_7 * fuel + p->thrust_beta_8);
+    f.moment = p->thrust_moment_arm * f.thrust +
+               pressure * p->reference_area * p->mean_aerodynamic_chord *
+                   (p->moment_alpha_squared * alpha2 + p->moment_alpha * alpha + p->moment_zero +
+                    p->moment_elevator * elevator);
+    return f;
+}
+
+#ifndef COMPLEX
+typedef struct {
+    real speed, turn, sine, cosine; /* V_a (m/s); e = gamma_a - gamma (rad), its sine and cosine */
+} AirRelative;
+
+/* The velocity relative to air that moves, for the inertial path angle gamma = theta - alpha. */
+static inline AirRelative air_relative(real velocity, real path_angle, real forward, real up)
+{
+    real sine, cosine;
+    sine_cosine(path_angle, &sine, &cosine);
+    const real along = velocity - (forward * cosine + up * sine), across = forward * sine - up * cosine;
+    AirRelative air;
+    air.speed = root(along * along + across * across);
+    air.turn = arctangent2(across, along);
+    air.sine = across / air.speed;
+    air.cosine = along / air.speed;
+    return air;
+}
+
+/* Forces in given conditions of air and engine, and the angle of attack of the air (rad). Lift and drag of the air are
+ * turned by the angle between the two paths: lift is across the inertial path, drag along it. */
+static inline Forces forces_in(const real *conditions, const real *x, const real *u, const Vehicle *p, real *alpha)
+{
+    const AirRelative air = air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
+    *alpha = x[ALPHA] - air.turn;
+    Forces f = forces(x[ALTITUDE], air.speed, *alpha, u, p);
+    const real moment = conditions[DENSITY] * (f.moment - p->thrust_moment_arm * f.thrust +
+                                               f.pressure * p->reference_area * p->mean_aerodynamic_chord *
+                                                   conditions[MOMENT_INCREMENT]);
+    f.thrust *= conditions[THRUST_FACTOR]; /* which does not depend on the density */
+    const real lift = f.lift * (conditions[DENSITY] * conditions[LIFT_FACTOR]);
+    const real drag = f.drag * (conditions[DENSITY] * conditions[DRAG_FACTOR]);
+    f.lift = lift * air.cosine - drag * air.sine;
+    f.drag = drag * air.cosine + lift * air.sine;
+    f.moment = moment + p->thrust_moment_arm * f.thrust;
+    f.pressure = conditions[DENSITY] * f.pressure;
+    return f;
+}
+#endif
+
+/* Write dx/dt; conditions: of air and engine, or NULL for still air and an engine that works. */
+static inline void derivative(const real *x, const real *u, const Vehicle *p, const real *conditions, real *out)
+{
+    const real velocity = x[VELOCITY], elevator = u[ELEVATOR];
+    real alpha = x[ALPHA];
+#ifdef COMPLEX
+    (void)conditions;
+    const Forces f = forces(x[ALTITUDE], velocity, alpha, u, p);
+#else
+    const Forces f = conditions ? forces_in(conditions, x, u, p, &alpha) : forces(x[ALTITUDE], velocity, alpha, u, p);
+#endif
+    const real alpha2 = alpha * alpha;
+    const real force_1 =
+        p->elastic_force_1_alpha_squared * alpha2 + p->elastic_force_1_alpha * alpha + p->elastic_force_1_zero;
+    const real force_2 = p->elastic_force_2_alpha_squared * alpha2 + p->elastic_force_2_alpha * alpha +
+                         p->elastic_force_2_elevator * elevator + p->elastic_force_2_zero;
+    const plain psi_1 = p->inertial_coupling_1, psi_2 = p->inertial_coupling_2;
+    const plain omega_1 = p->natural_frequency_1, omega_2 = p->natural_frequency_2;
+    /* Couplings and moment, divided by the moment of inertia; the 2x2 system of the two accelerations is solved. */
+    const plain c_1 = psi_1 / p->moment_of_inertia, c_2 = psi_2 / p->moment_of_inertia;
+    const real angular = f.moment / p->moment_of_inertia;
+    const plain k_1 = 1.0 + psi_1 * c_1, k_2 = 1.0 + psi_2 * c_2, k_12 = psi_1 * c_2;
+    const real right_1 = -2.0 * p->damping_ratio_1 * omega_1 * x[ETA_1_RATE] - omega_1 * omega_1 * x[ETA_1] + force_1 -
+                         psi_1 * angular;
+    const real right_2 = -2.0 * p->damping_ratio_2 * omega_2 * x[ETA_2_RATE] - omega_2 * omega_2 * x[ETA_2] + force_2 -
+                         psi_2 * angular;
+    const plain determinant = k_1 * k_2 - k_12 * k_12;
+    const real acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant;
+    const real acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant;
+
+    real sin_alpha, cos_alpha, sin_path, cos_path;
+    sine_cosine(x[ALPHA], &sin_alpha, &cos_alpha);
+    sine_cosine(x[PITCH] - x[ALPHA], &sin_path, &cos_path);
+    out[ALTITUDE] = velocity * sin_path;
+    out[VELOCITY] = (f.thrust * cos_alpha - f.drag) / p->mass - p->gravity * sin_path;
+    out[ALPHA] = (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + p->gravity / velocity * cos_path;
+    out[PITCH] = x[PITCH_RATE];
+    out[PITCH_RATE] = angular + c_1 * acceleration_1 + c_2 * acceleration_2;
+    out[ETA_1] = x[ETA_1_RATE];
+    out[ETA_1_RATE] = acceleration_1;
+    out[ETA_2] = x[ETA_2_RATE];
+    out[ETA_2_RATE] = acceleration_2;
+}
+
+/* Replace x by the state one period (s) later, u and the conditions held: classical Runge-Kutta steps. */
+static inline void advance(real *x, const real *u, const Vehicle *p, const real *conditions, real period,
+                           int64_t substeps)
+{
+    const real h = period / (double)substeps;
+    real slope[STATES], point[STATES], total[STATES];
+    for (int64_t step = 0; step < substeps; step++) {
+        for (int i = 0; i < STATES; i++)
+            point[i] = total[i] = x[i];
+        for (int stage = 0; stage < 4; stage++) {
+            const real reach = stage == 2 ? h : 0.5 * h;
+            derivative(point, u, p, conditions, slope);
+            for (int i = 0; i < STATES; i++) {
+                total[i] = stage == 0 ? slope[i] : total[i] + (stage < 3 ? 2.0 * slope[i] : slope[i]);
+                point[i] = x[i] + reach * slope[i];
+            }
+        }
+        for (int i = 0; i < STATES; i++)
+            x[i] += h / 6.0 * total[i];
+    }
+}
+
+#ifndef COMPLEX
+/* Whether the state is finite and its angles are within the range of the curve fits. */
+static inline mask in_model_range(const real *x, double angle_limit)
+{
+    mask inside = (magnitude(x[ALPHA]) <= angle_limit) & (magnitude(x[PITCH]) <= angle_limit) & (x[VELOCITY] > 0.0);
+    for (int i = 0; i < STATES; i++)
+        inside &= is_finite(x[i]);
+    return inside;
+}
+#endif
+#endif

@@ -1,0 +1,12 @@
+/* The constants of the equations of motion in SI, in the order of hsv.vehicle.parameters.VehicleParameters. */
+number mass, moment_of_inertia, gravity, reference_area, mean_aerodynamic_chord, thrust_moment_arm;
+number reference_density, reference_altitude, density_scale_height;
+number lift_alpha, lift_elevator, lift_zero;
+number drag_alpha_squared, drag_alpha, drag_elevator_squared, drag_elevator, drag_zero;
+number moment_alpha_squared, moment_alpha, moment_zero, moment_elevator;
+number thrust_beta_1, thrust_beta_2, thrust_beta_3, thrust_beta_4;
+number thrust_beta_5, thrust_beta_6, thrust_beta_7, thrust_beta_8;
+number elastic_force_1_alpha_squared, elastic_force_1_alpha, elastic_force_1_zero;
+number elastic_force_2_alpha_squared, elastic_force_2_alpha, elastic_force_2_elevator, elastic_force_2_zero;
+number damping_ratio_1, damping_ratio_2, natural_frequency_1, natural_frequency_2;
+number inertial_coupling_1, inertial_coupling_2;
