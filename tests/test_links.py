@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import receive
 from numpy.testing import assert_array_equal
 
+from hsv.core import lib
 from hsv.errors import ParameterError
-from hsv.links import LARGEST, command_link, computation, link_state, measurement_link, receive
-from hsv.noise import STREAMS
+from hsv.links import LARGEST, command_link, computation, link_state, measurement_link
 
 T = 0.02
 STEPS = 4000
@@ -20,21 +21,19 @@ MEASUREMENT, COMMAND = 0, 1
 
 def passed(link, sent=SENT, seed=0, before=None):
     """Return what a receiver has in every step of what is sent."""
-    state, taken = link_state(link, sent.shape[1], before), sent.copy()
-    for k, payload in enumerate(taken):
-        receive(link, state, k, seed, payload)
-    return taken
+    state = link_state(link, sent.shape[1], before)
+    return np.array([receive(link, state, k, seed, payload) for k, payload in enumerate(sent)])
 
 
 def measured(sent=SENT, seed=0, **fields):
     return passed(measurement_link({f"link.measurement.{name}": value for name, value in fields.items()}), sent, seed)
 
 
-def drawn(block, channel, seed=0, steps=STEPS):
+def drawn(stream, channel, seed=0, steps=STEPS):
     """Return the two uniform numbers of every step; numpy has the words of a counter after those of the one before."""
     rows = []
     for step in range(steps):
-        counter = (STREAMS[block] + channel) * 2**64 + step - 1
+        counter = (stream + channel) * 2**64 + step - 1
         words = np.random.Philox(counter=counter, key=seed).random_raw(2)
         rows.append((words >> np.uint64(11)).astype(float) / 2.0**53)
     return np.array(rows).T
@@ -72,14 +71,14 @@ def test_time_of_computation_is_whole_periods_and_the_rest():
 
 
 def test_of_payloads_that_are_late_at_random_the_newest_counts():
-    late = np.floor(3.0 * drawn("link_delay", MEASUREMENT, seed=5)[0])
+    late = np.floor(3.0 * drawn(lib.LINK_DELAY, MEASUREMENT, seed=5)[0])
     assert set(late) == {0.0, 1.0, 2.0}
     newest = np.maximum.accumulate(np.arange(STEPS) - 1 - late)
     assert_array_equal(measured(seed=5, delay=1.0, jitter=2.0), SENT[np.maximum(newest, 0).astype(int)])
 
 
 def test_lost_payloads_are_those_that_were_drawn_and_the_last_one_is_held():
-    lost = drawn("link_loss", MEASUREMENT, seed=3)[0] < 0.2
+    lost = drawn(lib.LINK_LOSS, MEASUREMENT, seed=3)[0] < 0.2
     assert abs(lost.sum() - 0.2 * STEPS) < 4.0 * math.sqrt(0.2 * 0.8 * STEPS)
     last = np.maximum.accumulate(np.where(lost, 0, np.arange(STEPS)))
     assert_array_equal(measured(seed=3, loss=0.2), SENT[last])
@@ -100,7 +99,7 @@ def test_losses_in_bursts_have_their_share_and_their_mean_length():
 
 def test_a_corrupted_payload_differs_in_one_bit_of_one_number_or_is_held():
     taken = measured(seed=2, corruption=0.3)
-    draw, place = drawn("link_corruption", MEASUREMENT, seed=2)
+    draw, place = drawn(lib.LINK_CORRUPTION, MEASUREMENT, seed=2)
     corrupted = draw < 0.3
     assert_array_equal(taken[~corrupted], SENT[~corrupted])
     expected = SENT.copy()
@@ -118,7 +117,7 @@ def test_a_corrupted_payload_differs_in_one_bit_of_one_number_or_is_held():
 
 
 def test_with_a_checksum_what_is_corrupted_is_lost():
-    corrupted = drawn("link_corruption", MEASUREMENT)[0] < 0.1
+    corrupted = drawn(lib.LINK_CORRUPTION, MEASUREMENT)[0] < 0.1
     last = np.maximum.accumulate(np.where(corrupted, 0, np.arange(STEPS)))
     assert_array_equal(measured(corruption=0.1, checksum=True), SENT[last])
 
@@ -136,12 +135,12 @@ def test_a_refused_payload_that_comes_once_more_is_whole():
 
 def test_each_link_has_draws_of_its_own():
     link = command_link({"link.command.loss": 0.2}, T)
-    lost = drawn("link_loss", COMMAND)[0] < 0.2
+    lost = drawn(lib.LINK_LOSS, COMMAND)[0] < 0.2
     last = np.maximum.accumulate(np.where(lost, -1, np.arange(STEPS)))
     before = np.array([0.25, 0.21])
     sent = np.vstack([SENT[:, :2], before])
     assert_array_equal(passed(link, SENT[:, :2], before=before), sent[last])
-    assert np.any(lost != (drawn("link_loss", MEASUREMENT)[0] < 0.2))
+    assert np.any(lost != (drawn(lib.LINK_LOSS, MEASUREMENT)[0] < 0.2))
 
 
 @pytest.mark.parametrize(

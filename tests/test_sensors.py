@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import measure
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.errors import ParameterError
-from hsv.faults.laws import fault_memory, fault_rows
+from hsv.faults.laws import fault_rows
 from hsv.faults.table import SENSOR, Fault
-from hsv.sensors import SENSOR_PARAMETERS, SENSOR_SETS, measure, sensor_data, sensor_state
+from hsv.sensors import SENSOR_PARAMETERS, SENSOR_SETS, sensor_data, sensor_state
 from hsv.vehicle.dynamics import STATE_NAMES
 from hsv.vehicle.envelope import FOOT
 
@@ -26,11 +27,7 @@ ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_an
 def measured(values, states=STATES, faults=(), seed=0):
     data, state = sensor_data(values, T), sensor_state()
     rows = fault_rows([SENSOR], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
-    memory, out, result = fault_memory(rows), np.empty(9), np.empty((len(states), 9))
-    for k, x in enumerate(states):
-        measure(data, state, rows, memory, k, seed, x, out)
-        result[k] = out
-    return result
+    return np.array([measure(data, state, rows, k, seed, x) for k, x in enumerate(states)])
 
 
 def of_pitch_rate(states=STATES, faults=(), seed=0, **fields):

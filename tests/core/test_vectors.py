@@ -23,7 +23,7 @@ from core_calls import (
 )
 
 from hsv.control.design_file import find_design, read_design
-from hsv.control.effectiveness import effectiveness_along, effectiveness_data
+from hsv.control.effectiveness import EffectivenessData, effectiveness_along, effectiveness_data
 from hsv.control.estimator import EstimatorData, steady_gain
 from hsv.control.nominal_law import NominalData, level
 from hsv.control.notch_filter import NotchSection, discretise
@@ -42,7 +42,7 @@ from hsv.sensors import sensor_data, sensor_state
 from hsv.simulation.scenario import load_scenario
 from hsv.vehicle.actuators import actuator_data, actuator_map, actuators_at_rest
 from hsv.vehicle.atmosphere import atmosphere_data, atmosphere_state
-from hsv.vehicle.dynamics import advance, air_relative, derivative, forces, jacobian
+from hsv.vehicle.dynamics import advance, air_relative, derivative, forces, jacobian, vehicle_struct
 from hsv.vehicle.extended import Filter, extended_derivative, extended_jacobian
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.trim import trim
@@ -172,8 +172,12 @@ def vehicle(z: Golden) -> None:
         z.check(f"dynamics.jacobian.{name}", found)
     z.check("dynamics.derivative", [derivative(*point) for point in points])
     z.check("dynamics.derivative_in", [derivative(*point, now) for point, now in zip(points, c, strict=True)])
-    z.check("dynamics.forces", [forces(*point)[:5] for point in points])
-    z.check("dynamics.forces_in", [forces(*point, now) for point, now in zip(points, c, strict=True)])
+    z.check("dynamics.forces", [forces(*point) for point in points])
+    windy = [
+        written(lib.hsv_forces, 6, a, b, vehicle_struct(p).pointer, now)
+        for a, b, p, now in zip(x, u, own, c, strict=True)
+    ]
+    z.check("dynamics.forces_in", windy)
     z.check("dynamics.air_relative", [air_relative(a[1], a[3] - a[2], *b[:2]) for a, b in zip(x, c, strict=True)])
     lengths = [*zip(z["integration.period"], z["integration.substeps"].tolist(), strict=True)]
     calm = [advance(*point, *length) for point, length in zip(points, lengths, strict=True)]
@@ -252,6 +256,7 @@ def faults(z: Golden) -> None:
         "faults.command.apply_command_faults",
         [np.ravel([command_faults(rows, k, 17, u) for k, u in enumerate(commands)]) for rows in tables(z, "command")],
     )
+    sensors(z)
     points = [*enumerate(zip(alpha, mach, fuel, strict=True))]
     z.check(
         "faults.engine.apply_engine_faults",
@@ -259,7 +264,7 @@ def faults(z: Golden) -> None:
     )
 
 
-def equipment(z: Golden) -> None:
+def sensors(z: Golden) -> None:
     found, none = [], fault_rows((), (), PERIOD)
     for i, (values, rows) in enumerate(zip(z["sensors.values"], tables(z, "sensor"), strict=True)):
         data, memory = sensor_data(values, PERIOD), sensor_state()
@@ -271,6 +276,8 @@ def equipment(z: Golden) -> None:
             z.check(f"sensors.data.{i}", [np.asarray(getattr(data, name), float) for name in names])
     z.check("sensors.measure", found)
 
+
+def equipment(z: Golden) -> None:
     payloads, found = z["links.payload"], []
     for i, row in enumerate(z["links.data"].tolist()):
         link = LinkData(*map(int, row[:3]), *row[3:7], *map(bool, row[7:]))
@@ -323,7 +330,7 @@ def filters(z: Golden) -> None:
 
 def effectiveness(z: Golden) -> None:
     flown = load_scenario("case1_active_deep", {"duration": "6 s", "fault[0].start": "0.6 s"}).parameters()
-    names = "period inertia effect least bound offset learning drift noise steps".split()
+    names = [field for field in EffectivenessData.__dataclass_fields__ if field not in ("vehicle", "start")]
     z.check("effectiveness.data.0", [getattr(effectiveness_data(flown, PERIOD), name) for name in names])
     for i, changes in enumerate(z["effectiveness.changes"]):
         data = effectiveness_data({**flown, **changes}, PERIOD)
@@ -372,8 +379,8 @@ PARTS = {
     vehicle: ("vehicles", "dynamics", "integration", "trim", "extended"),
     references: ("reference",),
     actuators: ("actuator",),
-    faults: ("faults",),
-    equipment: ("sensors", "links", "air"),
+    faults: ("faults", "sensors"),
+    equipment: ("links", "air"),
     filters: ("notch", "estimator"),
     effectiveness: ("effectiveness",),
     elimination: ("elimination",),

@@ -2,16 +2,18 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from core_calls import begin_faults, move_effectors
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.faults.effectors import advance_equipped, move_effectors
-from hsv.faults.laws import begin_faults, fault_memory, fault_rows
+from hsv.faults.laws import fault_rows
 from hsv.faults.table import DYNAMICS, EFFECTOR, Fault
 from hsv.vehicle.actuators import SUBSTEPS, actuator_data, actuators_at_rest
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import advance
+from hsv.vehicle.plant import Plant
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -35,12 +37,11 @@ def flown(faults, commands=WAVE, actuator=None, seed=0):
     """Return what the elevator does on every substep, and its actuator's states."""
     data = actuator_data(actuator or {}, VEHICLE, T)
     rows = fault_rows([DYNAMICS, EFFECTOR], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
-    memory, effector, state = fault_memory(rows), TRIM.copy(), actuators_at_rest(TRIM)
-    deflections, states = [], []
+    effector, state, deflections, states = TRIM.copy(), actuators_at_rest(TRIM), [], []
     for k, command in enumerate(commands):
-        begin_faults(rows, memory, k, seed)
+        begin_faults(rows, k, seed)
         for j in range(SUBSTEPS):
-            move_effectors(data, state, rows, memory, k, j, np.array([0.4, command]), ALPHA, effector)
+            move_effectors(data, state, rows, k, j, np.array([0.4, command]), ALPHA, effector)
             deflections.append(effector[1])
             states.append(state[1].copy())
     return np.array(deflections), np.array(states)
@@ -78,10 +79,10 @@ def test_amplitude_of_an_oscillation_stays_over_a_long_flight():
     # Turns are counted modulo one: sine is taken of small arguments, whenever.
     fault = elevator("oscillation", amplitude=0.03, frequency=1.4)
     data, rows = actuator_data({}, VEHICLE, T), fault_rows([EFFECTOR], [(fault, 0, NEVER)], T)
-    memory, effector, state, found = fault_memory(rows), TRIM.copy(), actuators_at_rest(TRIM), []
+    effector, state, found = TRIM.copy(), actuators_at_rest(TRIM), []
     for k in range(4_900_000, 4_900_100):
-        begin_faults(rows, memory, k, 0)
-        move_effectors(data, state, rows, memory, k, 0, TRIM, ALPHA, effector)
+        begin_faults(rows, k, 0)
+        move_effectors(data, state, rows, k, 0, TRIM, ALPHA, effector)
         found.append(effector[1] - TRIM[1])
     time = (np.arange(4_900_000, 4_900_100) * T + 0.5 * H) % (1.0 / 1.4)
     assert_allclose(found, 0.03 * np.sin(2.0 * np.pi * 1.4 * time), atol=1e-8)
@@ -183,40 +184,41 @@ def test_stops_of_the_actuator_hold_whatever_fails():
     assert flown([(elevator("effector_scale", factor=-1.0), 0), (elevator("bias", offset=-0.5), 0)])[0].min() == -STOP
 
 
+START = trim(VEHICLE, 26060.4, 2407.92)
+
+
+def plant(actuator=None, late=0.0):
+    """Return the plant whose actuators have the command ``late`` substeps after a period begins."""
+    made = Plant(VEHICLE, START, T, 1000, 2, actuator)
+    made.data = replace(made.data, late=late)
+    return made
+
+
 def equipped(commands, actuator=None, faults=(), late=0.0):
-    start = trim(VEHICLE, 26060.4, 2407.92)
-    data = actuator_data(actuator or {}, VEHICLE, T)
-    rows = fault_rows([DYNAMICS, EFFECTOR], faults, T)
-    memory, effector, state = fault_memory(rows), start.input.copy(), actuators_at_rest(start.input)
-    x, work = start.state.copy(), workspace()
-    before = start.input
-    for k, command in enumerate(commands):
-        driven = (data, state, rows, memory, k, 0, effector, work, None, before, late)
-        advance_equipped(x, start.input + command, VEHICLE, T, 2, *driven)
-        before = start.input + command
-    return x, effector
+    """Return the last state and effector of a flight with commands beyond those of the trim."""
+    flown = plant(actuator, late)
+    for command in START.input + commands:
+        result = flown.step(command, faults)
+    return result.state, result.effector
 
 
 COMMANDS = 0.01 * np.sin(np.arange(50)[:, None] * np.array([0.2, 0.3]))
 
 
 def test_vehicle_with_ideal_actuators_is_the_bare_one_to_the_bit():
-    start = trim(VEHICLE, 26060.4, 2407.92)
-    x, work = start.state.copy(), workspace()
-    for command in COMMANDS:
-        advance(x, start.input + command, VEHICLE, T, 2, work)
+    x = START.state
+    for command in START.input + COMMANDS:
+        x = advance(x, command, VEHICLE, T, 2)
     assert_array_equal(equipped(COMMANDS)[0], x)
     later = elevator("bias", offset=0.1)
-    assert_array_equal(equipped(COMMANDS, faults=[(later, 50, NEVER)])[0], x)
+    assert_array_equal(equipped(COMMANDS, faults=((later, 50),))[0], x)
 
 
 @pytest.mark.parametrize("late", [0.4, 1.0, 2.7, 4.0 - 1e-9])
 def test_a_late_command_switches_within_the_period(late):
-    start, tau = trim(VEHICLE, 26060.4, 2407.92), late * H
-    x, work, before = start.state.copy(), workspace(), start.input
-    for command in start.input + COMMANDS:
-        advance(x, before, VEHICLE, tau, 40, work)
-        advance(x, command, VEHICLE, T - tau, 40, work)
+    x, tau, before = START.state, late * H, START.input
+    for command in START.input + COMMANDS:
+        x = advance(advance(x, before, VEHICLE, tau, 40), command, VEHICLE, T - tau, 40)
         before = command
     # Both are accurate to far more than what a tenth of a substep would change.
     found = equipped(COMMANDS, late=late)[0]
@@ -226,19 +228,14 @@ def test_a_late_command_switches_within_the_period(late):
 
 @pytest.mark.parametrize("late", [0.4, 2.7])
 def test_an_actuator_follows_a_late_command_from_when_it_is_there(late):
-    lag = {"actuator.elevator_deflection.set": "elevator_first_order_20"}
-    states = []
-    rows, data = fault_rows([DYNAMICS, EFFECTOR], (), T), actuator_data(lag, VEHICLE, T)
-    start = trim(VEHICLE, 26060.4, 2407.92)
-    memory, effector, state = fault_memory(rows), start.input.copy(), actuators_at_rest(start.input)
-    x, work, before, expected = start.state.copy(), workspace(), start.input, start.input[1]
-    for k, command in enumerate(start.input + COMMANDS):
-        advance_equipped(x, command, VEHICLE, T, 2, data, state, rows, memory, k, 0, effector, work, None, before, late)
+    flown = plant({"actuator.elevator_deflection.set": "elevator_first_order_20"}, late)
+    before, expected = START.input, START.input[1]
+    for command in START.input + COMMANDS:
+        flown.step(command)
         expected = before[1] + (expected - before[1]) * math.exp(-20.0 * late * H)
         expected = command[1] + (expected - command[1]) * math.exp(-20.0 * (T - late * H))
-        states.append(state[1, 0] - expected)
+        assert flown._memory.actuators[1, 0] == pytest.approx(expected, abs=1e-14)
         before = command
-    assert np.abs(states).max() < 1e-14
 
 
 def test_vehicle_with_very_fast_actuators_is_nearly_the_bare_one():
@@ -252,7 +249,6 @@ def test_vehicle_with_very_fast_actuators_is_nearly_the_bare_one():
 
 def test_vehicle_in_trim_stays_there_with_actuators():
     actuators = {**SECOND_ORDER, "actuator.fuel_equivalence_ratio.set": "fuel_10"}
-    start = trim(VEHICLE, 26060.4, 2407.92)
     x, effector = equipped(np.zeros((50, 2)), actuators)
-    assert_array_equal(effector, start.input)
-    assert_allclose(x, start.state, rtol=1e-9, atol=1e-9)
+    assert_array_equal(effector, START.input)
+    assert_allclose(x, START.state, rtol=1e-9, atol=1e-9)

@@ -5,10 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import begin_faults, command_faults, engine_faults
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.errors import ParameterError
-from hsv.faults.laws import apply_command_faults, apply_engine_faults, begin_faults, fault_memory, fault_rows
+from hsv.faults.laws import fault_rows
 from hsv.faults.table import (
     CHANNELS,
     COMMAND,
@@ -33,13 +34,9 @@ def elevator(kind, **parameters):
 def flown(faults, commands, seed=0):
     """Return what becomes of the elevator's commands, of faults with their first step and the one without."""
     rows = fault_rows([COMMAND], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
-    memory, result = fault_memory(rows), []
-    for k, command in enumerate(commands):
-        out = np.array([0.4, command])
-        apply_command_faults(rows, memory, k, seed, out, 0)
-        assert out[0] == 0.4
-        result.append(out[1])
-    return np.array(result)
+    actuator = np.array([command_faults(rows, k, seed, [0.4, command]) for k, command in enumerate(commands)])
+    assert (actuator[:, 0] == 0.4).all()
+    return actuator[:, 1]
 
 
 WAVE = 0.2 + 0.1 * np.sin(0.3 * np.arange(120))
@@ -141,36 +138,28 @@ def test_memory_begins_anew_whenever_an_intermittent_fault_does():
 def test_a_change_in_flight_leaves_the_memory_of_the_others():
     slow, lost = elevator("delay", steps=4), elevator("loss_of_effectiveness", effectiveness=0.5)
     rows = fault_rows([COMMAND], [(slow, 2, NEVER)], T)
-    memory, result = fault_memory(rows), []
+    result = []
     for k, command in enumerate(WAVE):
         if k == 30:
-            changed = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T)
-            memory, rows = fault_memory(changed, rows, memory), changed
-        out = np.array([0.4, command])
-        apply_command_faults(rows, memory, k, 0, out, 0)
-        result.append(out[1])
+            rows = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T, rows)
+        result.append(command_faults(rows, k, 0, [0.4, command])[1])
     assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
 
 
 def test_of_two_faults_alike_each_keeps_its_own_memory():
     slow = elevator("delay", steps=4)
     rows = fault_rows([COMMAND], [(slow, 2, NEVER), (slow, 10, NEVER)], T)
-    memory = fault_memory(rows)
-    memory[0], memory[1] = 1.0, 2.0
-    later = fault_rows([COMMAND], [(slow, 10, 60)], T)
-    assert_array_equal(fault_memory(later, rows, memory)[0], 2.0)
-    other = fault_rows([COMMAND], [(elevator("delay", steps=5), 10, NEVER)], T)
-    assert_array_equal(fault_memory(other, rows, memory), fault_memory(other))
+    rows.memory["kept"] = 1.0, 2.0
+    later = fault_rows([COMMAND], [(slow, 10, 60)], T, rows)
+    assert later.memory.tobytes() == rows.memory[1:].tobytes()
+    other = fault_rows([COMMAND], [(elevator("delay", steps=5), 10, NEVER)], T, rows)
+    assert other.memory.tobytes() == other.fresh().memory.tobytes()
 
 
 def engine(fault, points, start=0):
     """Return the engine's factors along (angle of attack, Mach number, fuel)."""
     rows = fault_rows([ENGINE_SIDE], [(fault, start, NEVER)], T)
-    memory, out, result = fault_memory(rows), np.empty(4), []
-    for k, (alpha, mach, fuel) in enumerate(points):
-        apply_engine_faults(rows, memory, k, 0, alpha, mach, fuel, out)
-        result.append(out.copy())
-    return np.array(result)
+    return np.array([engine_faults(rows, k, 0, *point) for k, point in enumerate(points)])
 
 
 def test_thrust_is_lost_from_the_start_of_the_fault():
@@ -226,7 +215,7 @@ def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
         assert f"{name} " in str(fault) and str(fault).endswith(f"of {channel}")
         assert Fault.of(channel, name, fault.parameters) == fault
         sides = (COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR)
-        assert sum(len(fault_rows([side], [(fault, 0, NEVER)], T).table) for side in sides) == 1
+        assert sum(len(fault_rows([side], [(fault, 0, NEVER)], T).rows) for side in sides) == 1
         for parameter in (*kind.parameters, *OCCURRENCE_PARAMETERS):
             described = parameter.of(channel)
             assert described.description and described.minimum <= described.default <= described.maximum
@@ -291,5 +280,4 @@ def test_what_is_no_fault_is_refused(channel, kind, parameters, message):
 
 def test_faults_act_from_their_first_step_to_the_one_without():
     rows = fault_rows([COMMAND], [(elevator("reversal"), 3, 6)], T)
-    memory = fault_memory(rows)
-    assert [begin_faults(rows, memory, k, 0) for k in range(8)] == [0, 0, 0, 1, 1, 1, 0, 0]
+    assert [begin_faults(rows, k, 0) for k in range(8)] == [0, 0, 0, 1, 1, 1, 0, 0]

@@ -16,7 +16,10 @@ _STRUCTS: dict[tuple[str, int], Struct] = {}
 
 def pointer(kind: str, source: Any) -> Any:
     """Return the pointer to the struct ``kind`` of ``source``, filled once."""
-    return _STRUCTS.setdefault((kind, id(source)), Struct(kind, source)).pointer
+    key = kind, id(source)
+    if key not in _STRUCTS:
+        _STRUCTS[key] = Struct(kind, source)
+    return _STRUCTS[key].pointer
 
 
 def written(function: Any, count: int, *arguments: Any) -> np.ndarray:

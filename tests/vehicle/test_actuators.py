@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import actuator_step
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
@@ -13,10 +14,8 @@ from hsv.errors import ParameterError
 from hsv.vehicle.actuators import (
     ACTUATOR_PARAMETERS,
     ACTUATOR_SETS,
-    POSITION,
     actuator_data,
     actuator_map,
-    actuator_step,
     actuators_at_rest,
 )
 from hsv.vehicle.vehicle import load_vehicle
@@ -193,4 +192,4 @@ def test_what_is_no_actuator_is_refused(values, message):
 
 def test_parameters_are_described():
     assert all(parameter.description for parameter in ACTUATOR_PARAMETERS)
-    assert actuators_at_rest(np.array([0.2, 0.1]))[:, POSITION].tolist() == [0.2, 0.1]
+    assert actuators_at_rest(np.array([0.2, 0.1])).tolist() == [[0.2, 0.0], [0.1, 0.0]]

@@ -4,25 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from core_calls import atmosphere_step, dryden_cross_map
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.signal import welch
 
+from hsv.core import lib
 from hsv.errors import ParameterError
-from hsv.noise import STREAMS, normals
-from hsv.vehicle.atmosphere import (
-    ATMOSPHERE_PARAMETERS,
-    DENSITY,
-    Z1,
-    Z2,
-    U,
-    atmosphere_data,
-    atmosphere_state,
-    atmosphere_step,
-    dryden_cross_map,
-    gust_mean,
-    speed_of_sound,
-)
+from hsv.noise import normals
+from hsv.vehicle.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data, atmosphere_state
 from hsv.vehicle.envelope import FOOT
 
 T = 0.02
@@ -30,15 +20,14 @@ SPEED = 7900.0 * FOOT
 LENGTH = 1750.0 * FOOT
 ALTITUDE = 26060.4
 SIGMA = 2.0 * FOOT
+ALONG, ACROSS, VARIATION = 0, [1, 2], 3
+"""Places in the memory of the air."""
 
 
 def flown(values, steps, seed=0, altitude=ALTITUDE, speed=SPEED):
     data = atmosphere_data(values, T)
-    state, air, result = atmosphere_state(data), np.empty(3), np.empty((steps, 3))
-    for k in range(steps):
-        atmosphere_step(data, state, k, seed, altitude, speed, air)
-        result[k] = air
-    return result
+    state = atmosphere_state(data)
+    return np.array([atmosphere_step(data, state, k, seed, altitude, speed) for k in range(steps)])
 
 
 @pytest.fixture(scope="module")
@@ -97,32 +86,32 @@ def test_turbulence_is_stationary_from_the_first_step():
 
 
 def test_over_no_distance_turbulence_stays_what_it_is():
-    assert dryden_cross_map(0.0) == (1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    assert_array_equal(dryden_cross_map(0.0), [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def states(values, steps, seed=3):
     """Return the states of the atmosphere after every step."""
     data = atmosphere_data(values, T)
-    state, air, found = atmosphere_state(data), np.empty(3), []
+    state, found = atmosphere_state(data), []
     for k in range(steps):
-        atmosphere_step(data, state, k, seed, ALTITUDE, SPEED, air)
-        found.append((state.copy(), air.copy()))
+        air = atmosphere_step(data, state, k, seed, ALTITUDE, SPEED)
+        found.append((state.copy(), air))
     return found
 
 
 @pytest.mark.parametrize(
     ("sigma", "length", "place", "stream", "factor"),
     [
-        ("turbulence.sigma_forward", "turbulence.length_forward", U, "turbulence_longitudinal", 0),
-        ("density.sigma", "density.length", DENSITY, "density", 2),
+        ("turbulence.sigma_forward", "turbulence.length_forward", ALONG, lib.TURBULENCE_FORWARD, 0),
+        ("density.sigma", "density.length", VARIATION, lib.DENSITY_VARIATION, 2),
     ],
 )
 def test_a_gauss_markov_process_forgets_as_it_is_driven(sigma, length, place, stream, factor):
     decay = math.exp(-SPEED * T / 1000.0)
-    x = normals(3, 0, STREAMS[stream])[0]
+    x = normals(3, 0, stream)[0]
     for k, (state, air) in enumerate(states({sigma: 0.2, length: 1000.0}, 5)):
         if k:
-            x = decay * x + math.sqrt(1.0 - decay**2) * normals(3, k, STREAMS[stream])[0]
+            x = decay * x + math.sqrt(1.0 - decay**2) * normals(3, k, stream)[0]
         assert state[place] == pytest.approx(x, rel=1e-12)
         assert air[factor] == pytest.approx(0.2 * x + (factor == 2), rel=1e-12)
 
@@ -130,11 +119,11 @@ def test_a_gauss_markov_process_forgets_as_it_is_driven(sigma, length, place, st
 def test_turbulence_across_the_path_is_driven_by_two_numbers_a_step():
     f = dryden_cross_map(SPEED * T / 400.0)
     F, factor = np.reshape(f[:4], (2, 2)), np.array([[f[4], 0.0], [f[5], f[6]]])
-    z = np.array(normals(3, 0, STREAMS["turbulence_vertical"]))
+    z = np.array(normals(3, 0, lib.TURBULENCE_UP))
     for k, (state, air) in enumerate(states({"turbulence.sigma_up": 2.0, "turbulence.length_up": 400.0}, 5)):
         if k:
-            z = F @ z + factor @ normals(3, k, STREAMS["turbulence_vertical"])
-        assert_allclose(state[[Z1, Z2]], z, rtol=1e-12)
+            z = F @ z + factor @ normals(3, k, lib.TURBULENCE_UP)
+        assert_allclose(state[ACROSS], z, rtol=1e-12)
         assert air[1] == pytest.approx(z[0] + math.sqrt(3.0) * z[1], rel=1e-12)
 
 
@@ -157,7 +146,7 @@ def test_gust_is_the_mean_of_one_minus_cosine(stays):
 
     for begin, end in ((0.0, 48.0), (48.0, 96.0), (90.0, 138.0), (170.0, 218.0), (250.0, 298.0), (0.0, 400.0)):
         expected, _ = quad(shape, begin, end, points=[d, 2.0 * d])
-        assert gust_mean(begin, end, d, stays) == pytest.approx(expected / (end - begin), abs=1e-9)
+        assert lib.hsv_gust_mean(begin, end, d, stays) == pytest.approx(expected / (end - begin), abs=1e-9)
 
 
 def test_gust_begins_with_its_time_and_carries_its_whole_momentum():
@@ -187,7 +176,7 @@ def test_density_is_off_by_a_constant_and_a_gauss_markov_process():
 def test_speed_of_sound_is_that_of_the_standard_atmosphere():
     # US Standard Atmosphere 1976, geometric altitude: 15, 25 and 30 km.
     for altitude, expected in ((15e3, 295.07), (25e3, 298.39), (30e3, 301.71)):
-        assert speed_of_sound(altitude) == pytest.approx(expected, abs=0.01)
+        assert lib.hsv_speed_of_sound(altitude) == pytest.approx(expected, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -22,9 +22,8 @@ def point():
 @pytest.mark.parametrize("notch", [NOTCH, TWO])
 def test_equilibrium_of_the_vehicle_is_one_of_the_ecm(point, notch):
     state = extended_state(point.state, notch)
-    rates = np.empty(len(state))
     for printed in (False, True):
-        extended_derivative(state, point.input, load_vehicle().coupled("paper_like"), notch, printed, rates)
+        rates = extended_derivative(state, point.input, load_vehicle().coupled("paper_like"), notch, printed)
         assert np.abs(rates).max() < 1e-10
 
 

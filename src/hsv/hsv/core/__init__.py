@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, cached_property
 from importlib.resources import files
 from types import SimpleNamespace
@@ -19,12 +19,26 @@ import numpy as np
 from hsv.core._core import ffi, lib
 from hsv.errors import ParameterError
 
-__all__ = ["Callback", "Data", "Struct", "doubles", "dtype", "ffi", "lanes", "lib", "records", "vector"]
+__all__ = [
+    "Callback",
+    "Data",
+    "Struct",
+    "doubles",
+    "dtype",
+    "ffi",
+    "fly",
+    "instruction_set",
+    "lanes",
+    "lib",
+    "loop_memory",
+    "records",
+    "vector",
+]
 
 _STRUCT = re.compile(r"typedef struct \{(.*?)\n\} (\w+);", re.DOTALL)
 _POINTER = re.compile(r"(const )?\w+ \*(\w+); *(?:/\* \(([^)]*)\))?")
 _DIMENSION = re.compile(r"(?:(\d+)|(\w+)(?: \+ (\d+))?(?: <= (\d+))?)$")
-_CORES = {"sse2": 1, "avx2": 4, "avx512": 8}
+_LANES = {"sse2": 1, "avx2": 4, "avx512": 8}
 _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t": np.dtype(np.uint8)}
 
 
@@ -84,18 +98,47 @@ def records(kind: str, array: np.ndarray) -> Any:
 
 
 @cache
-def lanes() -> int:
-    """Return how many flights the core flies at a time on this processor; ``HSV_CORE`` lowers it.
+def instruction_set() -> str:
+    """Return which instructions the core uses: the widest of this processor, or those that ``HSV_CORE`` names.
+
+    Elsewhere than on x86-64 there is one set, called as the first one.
 
     Raises:
-        ParameterError: ``HSV_CORE`` names another core, or one that this processor does not have.
+        ParameterError: ``HSV_CORE`` names none, or one that this processor does not have.
     """
-    widest = int(lib.hsv_lanes())
-    usable = [name for name, number in _CORES.items() if number <= widest]
+    usable = [*_LANES][: lib.hsv_widest() + 1]
     chosen = os.environ.get("HSV_CORE") or usable[-1]
     if chosen not in usable:
         raise ParameterError(f"HSV_CORE = {chosen!r}: expected one of {', '.join(usable)} on this processor")
-    return _CORES[chosen]
+    return chosen
+
+
+def lanes() -> int:
+    """Return how many flights the core flies at a time."""
+    return _LANES[instruction_set()]
+
+
+def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) -> int:
+    """Fly the steps ``start`` ... ``stop`` - 1 of one flight, or of as many as :func:`lanes`.
+
+    Args:
+        flights: Structs ``hsv_flight``.
+        memory: What the core keeps between pieces, see :func:`loop_memory`; step 0 begins it.
+        start: First step.
+        stop: Step after the last one.
+
+    Returns:
+        The step after the last one flown; -1 - k where a block from outside failed in step k.
+    """
+    instructions = [*_LANES].index(instruction_set())
+    pointers = ffi.new("hsv_flight *[]", [flight.pointer for flight in flights])
+    return int(lib.hsv_fly(instructions, len(flights), pointers, ffi.from_buffer(memory), start, stop))
+
+
+def loop_memory(flights: int) -> np.ndarray:
+    """Return room for what the core keeps of so many flights from step to step, aligned for its registers."""
+    room = np.zeros(lib.hsv_memory_size(flights) + 64, np.uint8)
+    return room[-room.ctypes.data % 64 :]
 
 
 class Struct:

@@ -18,6 +18,8 @@ enum {
     AUXILIARY = 3,   /* index of the nominal gain, input before the limits */
     SUMS = 12        /* entries of the scheduled model that are summed at a time */
 };
+enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
+enum { FUEL, ELEVATOR };
 
 /* Kinds of faults, in the order in which those that act at once are composed, and ways in which they occur. */
 enum {
@@ -28,6 +30,7 @@ enum {
     SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
 };
 enum { ALWAYS, PERIODIC, RANDOM };
+enum { SSE2, AVX2, AVX512 }; /* instructions; elsewhere than on x86-64, the first stands for any */
 
 /* First stream of random numbers of each block, which has 256 of them. A number that was assigned once stays: flights
  * are repeated by it. */
@@ -332,10 +335,10 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
                               const double *x);
 double hsv_level(const double *P, int64_t size, const double *x);
 
-/* Flights: as many at a time as an instance has lanes, in pieces. */
-int hsv_lanes(void);
-int64_t hsv_memory_size(int lanes);
-int64_t hsv_fly(int lanes, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
+/* Flights: one, or as many as a register has lanes, in pieces. */
+int hsv_widest(void);
+int64_t hsv_memory_size(int64_t flights);
+int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
 
 /* Many steps at once: design, governor and metrics. */
 int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, double *weights);

@@ -1,44 +1,45 @@
-/* Which instance of the loop flies: as many flights at a time as the widest registers of this processor hold. */
+/* The instances of the loop that this processor can run. */
 #include "core.h"
 
 typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
 extern Fly hsv_fly_1;
 extern const int64_t hsv_memory_1;
 #ifdef __x86_64__
-extern Fly hsv_fly_4, hsv_fly_8;
+extern Fly hsv_fly_1_avx2, hsv_fly_4, hsv_fly_8;
 extern const int64_t hsv_memory_4, hsv_memory_8;
 #endif
 
-int hsv_lanes(void)
+int hsv_widest(void)
 {
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
-        return 8;
-    return __builtin_cpu_supports("avx2") ? 4 : 1;
-#else
-    return 1;
+        return AVX512;
+    if (__builtin_cpu_supports("avx2"))
+        return AVX2;
 #endif
+    return SSE2;
 }
 
 /* Bytes that hsv_fly needs between the pieces of a group of flights. */
-int64_t hsv_memory_size(int lanes)
+int64_t hsv_memory_size(int64_t flights)
 {
 #ifdef __x86_64__
-    if (lanes == 8)
-        return hsv_memory_8;
-    if (lanes == 4)
-        return hsv_memory_4;
+    if (flights > 1)
+        return flights == 8 ? hsv_memory_8 : hsv_memory_4;
 #endif
-    return lanes == 1 ? hsv_memory_1 : -1;
+    (void)flights;
+    return hsv_memory_1;
 }
 
-int64_t hsv_fly(int lanes, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
+int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
 {
+    Fly *fly = hsv_fly_1;
 #ifdef __x86_64__
-    if (lanes == 8)
-        return hsv_fly_8(flights, memory, start, stop);
-    if (lanes == 4)
-        return hsv_fly_4(flights, memory, start, stop);
+    if (count > 1)
+        fly = count == 8 ? hsv_fly_8 : hsv_fly_4;
+    else if (instructions != SSE2)
+        fly = hsv_fly_1_avx2;
 #endif
-    return hsv_fly_1(flights, memory, start, stop);
+    (void)instructions, (void)count;
+    return fly(flights, memory, start, stop);
 }

@@ -92,7 +92,7 @@ static inline plain arctangent_rest(plain high, plain low)
     return high * z * series + low / (1.0 + z);
 }
 
-#if LANES == 1 && !defined(COMPLEX)
+#ifdef BASE
 /* Split sin x and cos x, |x| <= 1e5, into two numbers each. */
 static inline void turned_terms(double x, double *s, double *s_low, double *c, double *c_low)
 {

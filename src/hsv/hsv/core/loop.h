@@ -14,6 +14,7 @@
  */
 #ifndef LOOP_H
 #define LOOP_H
+#include "effectiveness.h"
 #include "estimator.h"
 #include "metrics.h"
 #include "nominal.h"
@@ -24,6 +25,7 @@ typedef struct {
     Plants plants;
     Vehicle estimator_vehicle, tube_vehicle;
     TubeMemory tube;
+    real predicted[STATES], known[KNOWN]; /* of the effectiveness estimator */
     LevelMemory levels;
     real x[STATES], measurement[STATES], estimator[ESTIMATED], notch[2 * MAX_SECTIONS];
     real x_n[STATES], u_n[INPUTS], gain_index, gain[INPUTS * STATES], u[INPUTS], actuator[INPUTS];
@@ -202,9 +204,14 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
         if (answered)
             for (int j = 0; j < INPUTS; j++)
                 f->u[j] = limited(u_unsaturated[j], first->tube->minimum[j], first->tube->maximum[j]);
-        else
-            tube_step(first->tube, &f->tube_vehicle, &f->tube, f->gain, k, 0, 2 * notch->sections, estimate, q_f,
-                      f->x_r, f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
+        else {
+            real effectiveness = all(1.0);
+            if (first->tube->effectiveness)
+                effectiveness = effectiveness_step(first->tube->effectiveness, &f->tube_vehicle, f->predicted, f->u,
+                                                   f->known, k, estimate);
+            tube_step(first->tube, &f->tube, f->gain, effectiveness, k, 0, 2 * notch->sections, estimate, q_f, f->x_r,
+                      f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
+        }
         memcpy(x_n, f->x_n, sizeof x_n);
         if (first->set)
             level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);

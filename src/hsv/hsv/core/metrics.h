@@ -32,7 +32,7 @@ static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int6
     notch_step(&set->notch, memory->planned, x_r[PITCH_RATE] + x_n[PITCH_RATE]);
 }
 
-#if LANES == 1 && !defined(COMPLEX)
+#ifdef BASE
 double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
                        const double *reference)
 {

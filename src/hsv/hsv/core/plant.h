@@ -10,7 +10,7 @@
 
 enum { ACTUATOR_SUBSTEPS = 4 };
 
-#if LANES == 1
+#ifdef BASE
 #include "actuators.h"
 #include "atmosphere.h"
 #include "links.h"

@@ -43,8 +43,8 @@ static inline int every(mask m) { return m; }
 static inline int any(mask m) { return m; }
 static inline double least_lane(plain x) { return x; }
 static inline double greatest_lane(plain x) { return x; }
-static inline plain magnitude(plain x) { return __builtin_fabs(x); }
-static inline plain root(plain x) { return __builtin_sqrt(x); }
+static inline plain magnitude(plain x) { return fabs(x); }
+static inline plain root(plain x) { return sqrt(x); }
 #define lane(x, i) (*((void)(i), &(x)))
 
 /* Return 2^n for an integer-valued n from -1022 to 1023: added to 1.5 2^52, n stands in the last bits. */
@@ -102,7 +102,7 @@ static inline double greatest_lane(real x)
 #endif
 
 static inline mask is_finite(plain x) { return x - x == 0.0; }
-static inline mask never(void) { return all(0.0) != 0.0; }
+static inline mask never(void) { return (mask){0}; }
 /* A NaN in the first argument stays: the second one is taken only where it is beyond the first. */
 static inline plain minimum(plain a, plain b) { return choose(b < a, b, a); }
 static inline plain maximum(plain a, plain b) { return choose(b > a, b, a); }

@@ -1,9 +1,12 @@
 /* The core for one flight: the loop, its blocks one step at a time, and everything that is computed with doubles. */
+#define BASE
 #include "loop.h"
 #include "sequences.h"
 #include "trim.h"
 
-_Static_assert(sizeof(TubeMemory) == sizeof(hsv_tube_memory), "one layout of the tube law's memory");
+#include <stddef.h>
+
+_Static_assert(offsetof(hsv_tube_memory, predicted) == sizeof(TubeMemory), "one layout of the tube law's memory");
 
 static const Vehicle *vehicle_of(const hsv_vehicle *p) { return (const Vehicle *)p; }
 
@@ -71,10 +74,12 @@ int64_t hsv_tube_step(const hsv_tube *tube, hsv_tube_memory *memory, int64_t k, 
                       const double *x, double q_f, const double *x_r, const double *u_r, const double *x_n,
                       const double *u_n, const double *s, double *u_feedback, double *u_unsaturated, double *u)
 {
-    const Vehicle *vehicle = tube->effectiveness ? vehicle_of(&tube->effectiveness->vehicle) : NULL;
+    const double effectiveness =
+        tube->effectiveness ? hsv_effectiveness_step(tube->effectiveness, memory, k, x) : 1.0;
     const int64_t active = active_gain(tube, k);
-    tube_step(tube, vehicle, (TubeMemory *)memory, tube->gains + INPUTS * STATES * active, k, monitored, filter_states, x,
-              q_f, x_r, u_r, x_n, u_n, s, u_feedback, u_unsaturated, u);
+    tube_step(tube, (TubeMemory *)memory, tube->gains + INPUTS * STATES * active, effectiveness, k, monitored,
+              filter_states, x, q_f, x_r, u_r, x_n, u_n, s, u_feedback, u_unsaturated, u);
+    memcpy(memory->held, u, sizeof memory->held);
     return active;
 }
 

@@ -11,13 +11,11 @@
  */
 #ifndef TUBE_LAW_H
 #define TUBE_LAW_H
-#include "effectiveness.h"
 #include "notch_filter.h"
 
 typedef struct {
     real planned[2 * MAX_SECTIONS]; /* s_n of the filter of the plan */
     real integral[INTEGRATED];
-    real predicted[STATES], held[INPUTS], known[KNOWN];
 } TubeMemory;
 
 static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
@@ -28,17 +26,18 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
     return index;
 }
 
-/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step.
+/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step, "effectiveness" that of
+ * the elevator, 1 where it is not estimated.
  *
  * The filter of the plan starts from the state s of the filter in the loop, which is exact where x = x_r + x_n; it is
  * stepped where the law needs it or is monitored, and where there is a filter in the loop. The integral stands still
  * while an input is limited. Where the sum is not finite, the input is that of the reference: an actuator gets a number
  * whatever happens.
  */
-static inline void tube_step(const hsv_tube *tube, const Vehicle *vehicle, TubeMemory *memory, const real *gain,
-                             int64_t k, int monitored, int64_t filter_states, const real *x, real q_f,
-                             const real *x_r, const real *u_r, const real *x_n, const real *u_n, const real *s,
-                             real *u_feedback, real *u_unsaturated, real *u)
+static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const real *gain, real effectiveness, int64_t k,
+                             int monitored, int64_t filter_states, const real *x, real q_f, const real *x_r,
+                             const real *u_r, const real *x_n, const real *u_n, const real *s, real *u_feedback,
+                             real *u_unsaturated, real *u)
 {
     const int64_t own_states = 2 * tube->notch.sections;
     if (k == 0) {
@@ -53,10 +52,6 @@ static inline void tube_step(const hsv_tube *tube, const Vehicle *vehicle, TubeM
         if (tube->filtered)
             rate_error = q_f - planned_rate;
     }
-    real effectiveness = all(1.0);
-    if (tube->effectiveness)
-        effectiveness = effectiveness_step(tube->effectiveness, vehicle, memory->predicted, memory->held, memory->known,
-                                           k, x);
     mask limit = never();
     for (int i = 0; i < INPUTS; i++) {
         const real *row = gain + STATES * i;
@@ -76,8 +71,6 @@ static inline void tube_step(const hsv_tube *tube, const Vehicle *vehicle, TubeM
         u[i] = limited(choose(is_finite(u_unsaturated[i]), u_unsaturated[i], u_r[i]), tube->minimum[i], tube->maximum[i]);
         limit |= u[i] != u_unsaturated[i];
     }
-    for (int i = 0; i < INPUTS; i++)
-        memory->held[i] = u[i];
     if (tube->integral_rate > 0.0)
         for (int j = 0; j < INTEGRATED; j++) {
             const real more = memory->integral[j] + tube->period * (x[j] - x_r[j] - x_n[j]);

@@ -24,8 +24,6 @@
 #define VEHICLE_H
 #include "elementary.h"
 
-enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
-enum { FUEL, ELEVATOR };
 /* Conditions of air and engine: wind forward and up (m/s), density relative to the model's, factors of thrust, lift and
  * drag, increment of the pitching moment coefficient. */
 enum { WIND_FORWARD, WIND_UP, DENSITY, THRUST_FACTOR, LIFT_FACTOR, DRAG_FACTOR, MOMENT_INCREMENT };

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from hsv import core
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput
 from hsv.control.nominal_law import NominalLaw
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import no_tube
-from hsv.core import Callback, Struct, ffi, lib
+from hsv.core import Callback, Struct, ffi
 from hsv.errors import ControllerError, ProcessError
 from hsv.faults.injector import FaultInjector
 from hsv.faults.table import COMMAND
@@ -119,7 +120,7 @@ def fly_into(history: History, components: Components) -> int:
         if callbacks:
             law.reset()
             controller.reset()
-        rows = fly_together([flight], loop_memory(1), 0, len(history.flown))
+        rows = core.fly([flight], core.loop_memory(1), 0, len(history.flown))
     for callback in callbacks:
         if callback.error is not None:
             raise callback.error
@@ -170,22 +171,6 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
         "worst": -np.inf,
     }
     return Struct("hsv_flight", SimpleNamespace(**fields | others))
-
-
-def loop_memory(lanes: int) -> np.ndarray:
-    """Return what the core keeps of so many flights from step to step, aligned for its registers."""
-    room = np.zeros(lib.hsv_memory_size(lanes) + 64, np.uint8)
-    return room[-room.ctypes.data % 64 :]
-
-
-def fly_together(flights: list[Struct], memory: np.ndarray, start: int, stop: int) -> int:
-    """Fly the steps ``start`` ... ``stop`` - 1 of as many flights as the core has lanes, or of one.
-
-    Returns:
-        The step after the last one flown; -1 - k where a block from outside failed in step k.
-    """
-    pointers = ffi.new("hsv_flight *[]", [flight.pointer for flight in flights])
-    return int(lib.hsv_fly(len(flights), pointers, ffi.from_buffer(memory), start, stop))
 
 
 def _solving(law: NominalLaw) -> Callback:

@@ -8,8 +8,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from hsv import core
 from hsv.core import Struct, lanes
-from hsv.simulation.closed_loop import Components, flight_struct, fly, fly_together, is_ideal, loop_memory
+from hsv.simulation.closed_loop import Components, flight_struct, fly, is_ideal
 from hsv.simulation.flight import Flight, flight_of
 from hsv.simulation.history import History
 from hsv.threads import over_threads
@@ -25,7 +26,7 @@ class FlightGroup:
         """Make room for pieces of so many ``rows``."""
         self.lanes = lanes()
         self.history = History.over(np.empty((self.lanes, rows * History.numbers())), rows)
-        self._memory = loop_memory(self.lanes)
+        self._memory = core.loop_memory(self.lanes)
         self._flights: list[Struct] = []
 
     @staticmethod
@@ -55,7 +56,7 @@ class FlightGroup:
 
     def fly(self, start: int, stop: int) -> int:
         """Fly the steps ``start`` ... ``stop`` - 1; return the one after the last that any flight has flown."""
-        return fly_together(self._flights, self._memory, start, stop)
+        return core.fly(self._flights, self._memory, start, stop)
 
     def ended(self, i: int) -> int:
         """Return the steps that the flight in a lane has flown, or is to fly."""

@@ -285,7 +285,7 @@ class Plant:
             status = FlightStatus.RUNNING
         effector, conditions = self._memory.effector.copy(), self._memory.conditions.copy()
         calm = conditions.tolist() == _CALM
-        *felt, _ = forces(self._state, effector, self.vehicle, None if calm else conditions)
+        felt = forces(self._state, effector, self.vehicle, None if calm else conditions)
         measurement = np.empty(N_STATES)
         lib.hsv_sense(
             self.data.pointer,
@@ -295,4 +295,4 @@ class Plant:
             doubles(self._state),
             doubles(measurement),
         )
-        return PlantResult(self._step, self._state.copy(), measurement, tuple(felt), effector, conditions[:3], status)
+        return PlantResult(self._step, self._state.copy(), measurement, felt, effector, conditions[:3], status)
