@@ -47,7 +47,7 @@ setup(
             "control/include/*.h",
             "core/*.[ch]",
             "designs/*",
-            "export/*.j2",
+            "export/*.c",
             "live/template/*",
             "recording/layouts/*",
             "recording/report/plotly/*",

@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 import pytest
+from hsv.bench.roofline import against_roofline, multiply_and_add
 
 from hsv.bench.operations import Counted, counting
-from hsv.bench.roofline import against_roofline, multiply_and_add
 from hsv.simulation.history import History
 
 

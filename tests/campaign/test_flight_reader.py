@@ -1,22 +1,24 @@
 """What is read of flights in pieces, side by side, is what each is alone, in every bit."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from flights import components
 
-from hsv.campaign import flight_reader
 from hsv.campaign.flight_reader import PIECE, FlightReader
 from hsv.campaign.tube_levels import TubeLevels
-from hsv.lane_types import WIDTH
+from hsv.core import lanes
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.metrics import flight_metrics
+from hsv.simulation.side_by_side import FlightGroup
+
+WIDTH = lanes()
+
+pytestmark = pytest.mark.skipif(WIDTH == 1, reason="this processor flies one at a time")
 
 
 def check(reader, flights):
     """Check what ``reader`` tells of these flights; return in which steps they end."""
-    assert FlightReader.takes(flights)
+    assert FlightGroup.takes(flights)
     levels, ends = TubeLevels(flights[0]), []
     for read, own in zip(reader.read(flights), map(fly, flights), strict=True):
         data = own.data()
@@ -43,10 +45,7 @@ def test_flights_of_any_length(rows):
     check(reader_of(parts), [parts.perturbed({"mass": 0.01 * i}) for i in range(WIDTH)])
 
 
-@pytest.mark.parametrize("instructions", [True, False])
-def test_each_that_diverges_ends_on_its_own(instructions, monkeypatch):
-    if not instructions:  # of SHA: Python's digest is used
-        monkeypatch.setattr(flight_reader, "AVAILABLE", False)
+def test_each_that_diverges_ends_on_its_own():
     parts = components("case1", duration=20.0)
     reader = reader_of(parts)
     some = [parts.perturbed({"moment_elevator": -0.85 + 0.01 * i} if i % 3 else {}) for i in range(WIDTH)]
@@ -60,13 +59,6 @@ def test_each_that_diverges_ends_on_its_own(instructions, monkeypatch):
 def test_without_a_set_there_is_no_level():
     parts = components("case1_no_notch", duration=2.0)
     assert all(read.level is None for read in reader_of(parts).read([parts, parts.perturbed({"mass": 0.05})]))
-
-
-def test_flights_along_different_references_or_with_different_gains_are_not_taken():
-    first, second = components("case1", duration=1.0), components("case1", duration=1.0)
-    assert FlightReader.takes([first, first]) and not FlightReader.takes([])
-    assert not FlightReader.takes([first, replace(first, nominal_trajectory=second.nominal_trajectory)])
-    assert not FlightReader.takes([first, replace(first, controller=second.controller)])
 
 
 @pytest.mark.parametrize("lane", [0, WIDTH // 2 + 1])

@@ -18,7 +18,7 @@ from hsv.campaign.sample_runner import SampleRunner
 from hsv.campaign.store import ResultStore, read_result
 from hsv.campaign.summary import Results
 from hsv.campaign.table import CAMPAIGN, DIGEST, fly_batch
-from hsv.errors import CampaignError, RunError
+from hsv.errors import CampaignError
 
 
 class Counting(SerialExecutor):
@@ -52,14 +52,6 @@ def test_interrupted_twice_and_resumed_gives_the_same_file_and_flies_nothing_twi
     assert executor.flown == list(range(campaign.batches))
     assert out.read_bytes() == results.path.read_bytes()
     assert sorted(path.name for path in out.parent.iterdir()) == [out.name]
-
-
-def test_without_compiled_code_nothing_is_begun(planned, out, monkeypatch):
-    monkeypatch.setattr(run, "ENABLED", False)
-    campaign, executor = planned(), Counting()
-    with pytest.raises(RunError, match="NUMBA_DISABLE_JIT: expected 0, or not set"):
-        run_campaign(campaign, ResultStore(out, campaign), executor)
-    assert not executor.flown and not list(out.parent.iterdir())
 
 
 DRIVER = """

@@ -1,15 +1,20 @@
 """Components of a flight that share what its change leaves as it was are those that its scenario describes."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 from hsv.campaign.campaign import plan
 from hsv.campaign.sample_runner import SampleRunner
+from hsv.core import Data
 from hsv.errors import ScenarioError
 from hsv.simulation.assembly import assemble, scenario_parameters
 
 
 def same(a, b):
+    if isinstance(a, Data):
+        a, b = (tuple(getattr(each, field.name) for field in fields(each)) for each in (a, b))
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(same, a, b))
     return np.array_equal(a, b)

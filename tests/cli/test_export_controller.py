@@ -2,22 +2,20 @@ import dataclasses
 
 import pytest
 
-from hsv.control.c_block import include_folder
 from hsv.control.design_file import find_design, read_design, write_design
-from hsv.export.controller import HEADER, SOURCE, controller_source, step_bounds
+from hsv.export.controller import NUMBERS, controller_files, step_bounds
 
 BASELINE = read_design(find_design("baseline"))
 
 
-def test_it_writes_the_source_and_its_header_and_says_what_a_step_takes(hsv, tmp_path):
+def test_it_writes_source_numbers_and_headers_and_prints_the_cost_of_a_step(hsv, tmp_path):
     ran = hsv("export-controller", "baseline", "--out", "new/controller", "--json")
     assert ran.code == 0
     folder = tmp_path / "new" / "controller"
-    assert {path.name for path in folder.iterdir()} == {SOURCE, HEADER}
-    assert (folder / SOURCE).read_text() == controller_source(BASELINE)
-    assert (folder / HEADER).read_bytes() == (include_folder() / HEADER).read_bytes()
+    texts = controller_files(BASELINE)
+    assert {path.name: path.read_text() for path in folder.iterdir()} == texts
     assert {row["path"]: row["size_bytes"] for row in ran.json["written"]} == {
-        f"new/controller/{name}": (folder / name).stat().st_size for name in (SOURCE, HEADER)
+        f"new/controller/{name}": (folder / name).stat().st_size for name in texts
     }
     bounds = {name: dataclasses.asdict(bound) for name, bound in step_bounds(BASELINE).items()}
     assert ran.json["most_in_a_step"] == bounds
@@ -29,7 +27,7 @@ def test_a_design_by_its_path_takes_the_place_of_one_written_before(hsv, tmp_pat
     ran = hsv("export-controller", str(find_design("adjustable")), "--out", "controller")
     assert ran.code == 0
     assert "nominal_trajectory" in ran.out
-    assert 'design "adjustable"' in (tmp_path / "controller" / SOURCE).read_text()
+    assert 'design "adjustable"' in (tmp_path / "controller" / NUMBERS).read_text()
 
 
 @pytest.mark.parametrize(

@@ -7,21 +7,18 @@ from flights import components, step_by_step
 from hsv.control.effectiveness import (
     EffectivenessMode,
     effectiveness_along,
-    effectiveness_bounds,
     effectiveness_data,
-    effectiveness_hold,
     effectiveness_in,
-    effectiveness_shape,
-    effectiveness_step,
 )
+from hsv.control.tube_law import tube_memory
+from hsv.core import doubles, lib, records, vector
 from hsv.design.region import corners
 from hsv.errors import ParameterError, ScenarioError
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
 from hsv.simulation.side_by_side import fly_perturbed
-from hsv.vehicle.dynamics import PITCH_RATE
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import PITCH_RATE, advance
 from hsv.vehicle.plant import FlightStatus
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -40,6 +37,18 @@ def known_along(parts, flight):
     return effectiveness_along(data, flight.history.estimate, flight.history.command)
 
 
+def effectiveness_step(data, memory, step, x):
+    """Return the effectiveness by which the command of a step is divided."""
+    return lib.hsv_effectiveness_step(data.pointer, records("hsv_tube_memory", memory), step, doubles(vector(x)))
+
+
+def effectiveness_bounds(data, *step):
+    """Return the intervals of the effectiveness and of an offset that a step leaves."""
+    bounds = np.empty(4)
+    lib.hsv_effectiveness_bounds(data.pointer, step, doubles(bounds))
+    return bounds
+
+
 def watched(effectiveness, disturbance=lambda k: 0.0, until=500, **parameters):
     """Return what an estimator with these parameters knows after each step of constant input and state.
 
@@ -47,17 +56,16 @@ def watched(effectiveness, disturbance=lambda k: 0.0, until=500, **parameters):
     """
     values = {f"effectiveness.{name}": value for name, value in parameters.items()}
     data = components("case1_active", **values).controller.kernel.effectiveness
-    memory = np.zeros(effectiveness_shape(data))
+    memory = tube_memory()
     x, u = data.start.copy(), np.array([0.27, 0.21])
     known = []
     for k in range(until):
         effectiveness_step(data, memory, k, x)
-        effectiveness_hold(data, memory, u)
+        memory["held"] = u
         known.append(effectiveness_in(memory))
         rates = []
         for elevator in (u[1], 0.0):
-            predicted = memory[5].copy()
-            advance(predicted, np.array([u[0], elevator]), data.vehicle, data.period, 1, workspace())
+            predicted = advance(memory["predicted"], np.array([u[0], elevator]), data.vehicle, data.period, 1)
             rates.append(predicted[PITCH_RATE])
         x = data.start.copy()
         x[PITCH_RATE] = rates[1] + (effectiveness(k + 1) + disturbance(k + 1)) * (rates[0] - rates[1])
@@ -184,26 +192,26 @@ def test_an_offset_is_not_taken_for_a_loss():
 def test_a_step_that_is_no_number_changes_nothing(value):
     parts = active()
     data = parts.controller.kernel.effectiveness
-    memory = np.zeros(effectiveness_shape(data))
+    memory = tube_memory()
     x, u = data.start.copy(), np.array([0.27, 0.21])
     for step in range(5):
         effectiveness_step(data, memory, step, x)
-        effectiveness_hold(data, memory, u)
+        memory["held"] = u
     before = effectiveness_in(memory)
     bad = np.full(9, value)
     assert effectiveness_step(data, memory, 5, bad) == before.estimate
-    effectiveness_hold(data, memory, u)
+    memory["held"] = u
     assert effectiveness_step(data, memory, 6, x) == before.estimate
-    assert np.isfinite(memory[7]).all()
+    assert np.isfinite(memory["known"]).all()
 
 
 def test_an_elevator_that_has_no_effect_is_not_divided_by():
     data = active().controller.kernel.effectiveness
-    memory = np.zeros(effectiveness_shape(data))
+    memory = tube_memory()
     for step in range(4):
         assert effectiveness_step(data, memory, step, data.start) == 1.0
-        effectiveness_hold(data, memory, np.array([0.27, 0.0]))
-    assert np.isfinite(memory[7]).all()
+        memory["held"] = 0.27, 0.0
+    assert np.isfinite(memory["known"]).all()
 
 
 @pytest.mark.parametrize("effectiveness", np.linspace(0.0, 1.0, 6))

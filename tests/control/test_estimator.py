@@ -2,17 +2,18 @@
 
 import numpy as np
 import pytest
+from core_calls import measure
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_are
 
-from hsv.control.estimator import EstimatorData, estimate_step, estimator_data, scratch, steady_gain, transition
+from hsv.control.estimator import Estimator, EstimatorData, estimator_data
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
+from hsv.core import doubles, lib
 from hsv.errors import ParameterError
-from hsv.faults.laws import fault_memory, fault_rows
+from hsv.faults.laws import fault_rows
 from hsv.faults.table import SENSOR
-from hsv.sensors import measure, sensor_data, sensor_state
-from hsv.vehicle.dynamics import jacobian
-from hsv.vehicle.integration import advance, workspace
+from hsv.sensors import sensor_data, sensor_state
+from hsv.vehicle.dynamics import advance, jacobian
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -32,7 +33,9 @@ def estimator():
 def test_transition_is_the_matrix_exponential():
     whole = np.zeros((11, 11))
     whole[:9, :9], whole[:9, 9:] = A, B
-    assert_allclose(transition(A, B, T), expm(whole * T), rtol=1e-9, atol=1e-12)
+    F = np.empty((11, 11))
+    lib.hsv_transition(doubles(A), doubles(B), T, doubles(F))
+    assert_allclose(F, expm(whole * T), rtol=1e-9, atol=1e-12)
 
 
 def test_gain_solves_the_riccati_equation(estimator):
@@ -48,60 +51,34 @@ def test_gain_solves_the_riccati_equation(estimator):
     assert np.abs(np.linalg.eigvals((np.eye(11) - estimator.gain @ H) @ F)).max() < 0.9999
 
 
-def test_scalar_gain_is_the_textbooks():
-    # A random walk measured in noise: p+ = p + q, k = p+ / (p+ + r), whose steady p+ is q / 2 + sqrt(q^2 / 4 + q r).
-    q, r = 0.3, 2.0
-    gain, _ = steady_gain(np.zeros((1, 1)), np.zeros((1, 0)), 1.0, np.sqrt(np.array([q])), np.sqrt(np.array([r])))
-    p = 0.5 * q + np.sqrt(0.25 * q * q + q * r)
-    assert gain[0, 0] == pytest.approx(p / (p + r), rel=1e-9)
-
-
-@pytest.mark.parametrize("noise", [[0.5], [0.5, 0.7]])
-def test_gain_of_a_small_system_solves_the_riccati_equation(noise):
-    A, B, period = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.2], [1.0]]), 0.1
-    process = np.array([0.1, 0.2, 0.3])
-    gain, iterations = steady_gain(A, B, period, process, np.array(noise))
-    assert 10 < iterations < 1000
-    whole = np.zeros((3, 3))
-    whole[:2, :2], whole[:2, 2:] = A, B
-    F, H, R = expm(whole * period), np.eye(3)[: len(noise)], np.diag(np.square(noise))
-    M = solve_discrete_are(F.T, H.T, np.diag(process**2), R)
-    assert_allclose(gain, M @ H.T @ np.linalg.inv(H @ M @ H.T + R), rtol=1e-6)
-
-
 def test_a_step_is_a_prediction_corrected_by_the_gain():
     rng = np.random.default_rng(1)
     gain, command = 0.1 * rng.normal(size=(11, 5)), START.input + np.array([0.01, -0.02])
-    data = EstimatorData(gain, START.state, VEHICLE, T, 2)
-    state, estimate = np.full(11, np.nan), np.empty(9)
+    estimator = Estimator(EstimatorData(gain, START.state, VEHICLE, T, 2))
     predicted, offsets = START.state, np.zeros(2)
     for k in range(4):
         measurement = predicted + 0.01 * rng.normal(size=9)
-        estimate_step(data, state, k, measurement, command, scratch(), estimate)
+        estimate = estimator.step(k, measurement, command)
         correction = gain @ (measurement - predicted)[:5]
         offsets = offsets + correction[9:]
         assert_allclose(estimate, predicted + correction[:9], rtol=1e-12)
-        assert_allclose(state[9:], offsets, rtol=1e-12)
-        predicted = estimate.copy()
-        advance(predicted, command + offsets, VEHICLE, T, 2, workspace())
+        assert_allclose(estimator._state[9:], offsets, rtol=1e-12)
+        predicted = advance(estimate, command + offsets, VEHICLE, T, 2)
 
 
 def flown(estimator, measured, seconds=20.0, offset=0.0):
     """Return truth and estimate of a flight about the trim, its elevator off by a constant that no one knows."""
     rows = fault_rows([SENSOR], [], T)
-    memory, sensors, work = fault_memory(rows), sensor_state(), scratch()
-    x, y, state, estimate = START.state.copy(), np.empty(9), np.zeros(11), np.empty(9)
-    command, truth, found = START.input.copy(), [], []
+    sensors, stepped = sensor_state(), Estimator(estimator)
+    x, command, truth, found = START.state.copy(), START.input.copy(), [], []
     for k in range(round(seconds / T)):
-        measure(measured, sensors, rows, memory, k, 3, x, y)
-        estimate_step(estimator, state, k, y, command, work, estimate)
-        truth.append(x.copy())
-        found.append(estimate.copy())
+        truth.append(x)
+        found.append(stepped.step(k, measure(measured, sensors, rows, k, 3, x), command))
         # A feedback that holds the unstable vehicle, on the truth.
         turn = -1.0 * (x[2] - START.state[2]) + 1.5 * (x[3] - START.state[3]) + 0.8 * x[4]
         command = START.input + np.array([0.0, turn])
-        advance(x, command + np.array([0.0, offset]), VEHICLE, T, 2, workspace())
-    return np.array(truth), np.array(found), state
+        x = advance(x, command + np.array([0.0, offset]), VEHICLE, T, 2)
+    return np.array(truth), np.array(found), stepped._state
 
 
 def test_of_a_perfect_measurement_the_estimate_is_the_truth(estimator):

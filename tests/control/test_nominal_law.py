@@ -1,6 +1,7 @@
 """The nested family, switched and interpolated between its ellipsoids."""
 
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ def step(design, x):
 
 
 def test_without_gains_nothing_is_planned():
-    none = nominal_data(SMOOTH)._replace(gains=np.zeros((0, 2, 9)), ellipsoids=np.zeros((0, 5, 5)))
+    none = replace(nominal_data(SMOOTH), gains=np.zeros((0, 2, 9)), ellipsoids=np.zeros((0, 5, 5)))
     result = FamilyLaw(none).step(np.ones(9))
     assert_array_equal(result.input, [0.0, 0.0])
     assert result.status is NominalStatus.OK

@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.errors import ParameterError, TrimError
-from hsv.vehicle.dynamics import derivative
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import advance, derivative
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -21,7 +20,8 @@ RAMP = ((1.0, 3.0), (LOW[0], NEAR[0]), (LOW[1], NEAR[1]), PERIOD, VEHICLE)
 def along(trajectory, steps):
     """States, inputs and defects of every step."""
     rows = trajectory.rows(steps)
-    return tuple(column[rows] for column in trajectory.data[1:])
+    data = trajectory.data.rows(rows)
+    return data.state, data.input, data.defect
 
 
 def test_a_step_at_the_start_is_one_equilibrium_without_defect():
@@ -37,9 +37,8 @@ def test_a_step_at_the_start_is_one_equilibrium_without_defect():
 def test_a_ramp_is_flown_in_the_trim_of_its_climb():
     state, inputs, _ = along(ReferenceTrajectory(*RAMP), 200)
     climb, acceleration = (NEAR[0] - LOW[0]) / 2.0, (NEAR[1] - LOW[1]) / 2.0
-    rates = np.empty(9)
     for k in range(50, 150, 7):
-        derivative(state[k], inputs[k], VEHICLE, rates)
+        rates = derivative(state[k], inputs[k], VEHICLE)
         assert_allclose(rates, [climb, acceleration, 0, 0, 0, 0, 0, 0, 0], atol=1e-12)
         assert_allclose(state[k, 0], LOW[0] + climb * (k * PERIOD - 1.0), rtol=1e-14)
         assert_allclose(state[k, 1], LOW[1] + acceleration * (k * PERIOD - 1.0), rtol=1e-14)
@@ -52,7 +51,7 @@ def test_the_defect_is_what_the_nominal_vehicle_does_not_fly_by_itself(kind):
     state, inputs, defect = along(ReferenceTrajectory(*RAMP, kind), 210)
     flown = state.copy()
     for k in range(len(state) - 1):
-        advance(flown[k], inputs[k], VEHICLE, PERIOD, 2, workspace())
+        flown[k] = advance(flown[k], inputs[k], VEHICLE, PERIOD, 2)
     moves = np.any(state[1:] != state[:-1], axis=1)
     assert_array_equal(defect[:-1][moves], (flown[:-1] - state[1:])[moves])
     assert_array_equal(defect[:-1][~moves], 0.0)
@@ -183,12 +182,11 @@ def test_corners_may_have_blends_of_their_own():
 
 def test_a_blended_corner_is_a_steady_pull_up():
     state, inputs, _ = along(ReferenceTrajectory((1.5, 3.5), *RAMP[1:], blend=1.0), 260)
-    rates = np.empty(9)
     path = np.arcsin(np.gradient(state[:, 0], PERIOD) / state[:, 1])
     turn = np.gradient(path, PERIOD)
     assert turn.max() > 1.2e-3
     for k in range(30, 121, 7):
-        derivative(state[k], inputs[k], VEHICLE, rates)
+        rates = derivative(state[k], inputs[k], VEHICLE)
         # The velocity grows, too, which turns the path a little less; and differences round the peak.
         assert_allclose(state[k, 4], turn[k], atol=0.02 * turn.max())
         assert rates[3] == state[k, 4]

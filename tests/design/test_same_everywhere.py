@@ -18,7 +18,6 @@ PROCESSORS = {
     "Nehalem, one thread, libm without FMA": {
         "OPENBLAS_CORETYPE": "Nehalem",
         "OPENBLAS_NUM_THREADS": "1",
-        "NUMBA_CPU_NAME": "generic",
         **WITHOUT_FMA,
     },
 }

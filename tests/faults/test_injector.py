@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
+from core_calls import command_faults
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from hsv.errors import ParameterError
 from hsv.faults.injector import FAULT_PARAMETERS, FaultInjector
-from hsv.faults.laws import apply_command_faults, fault_memory
 from hsv.faults.schedule import ActiveFault, ScheduledFault
 from hsv.faults.table import COMMAND as COMMAND_SIDE
 from hsv.faults.table import FAULT_KINDS, Fault
@@ -165,14 +165,11 @@ def test_reset_returns_to_the_schedule():
     assert_array_equal(actuator(injector, 2), [0.4, 0.9 * 0.2])
 
 
-def test_compiled_schedule_does_the_same_as_the_object():
+def test_the_core_does_the_same_as_the_object():
     injector = injector_of((loss(0.9), 2), (loss(0.5), 4), (loss(0.8, FUEL), 1))
     rows = injector.rows((COMMAND_SIDE,))
-    memory = fault_memory(rows)
     for step in range(6):
-        out = COMMAND.copy()
-        apply_command_faults(rows, memory, step, 0, out, 0)
-        assert_array_equal(out, actuator(injector, step))
+        assert_array_equal(command_faults(rows, step, 0, COMMAND), actuator(injector, step))
 
 
 def test_schedule_from_parameters():

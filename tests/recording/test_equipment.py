@@ -7,7 +7,8 @@ import pytest
 from recorded_flight import record_flight
 
 from hsv.cli.info import info
-from hsv.noise import STREAMS, uniforms
+from hsv.core import lib
+from hsv.noise import uniforms
 from hsv.recording.info import describe, parameters_in_words
 from hsv.recording.report.events import flight_events
 from hsv.recording.report.page import render
@@ -64,7 +65,7 @@ def test_steps_in_which_a_link_held_are_counted(tmp_path, capsys):
     )
     bag = record_flight(tmp_path / "bag", str(tmp_path / "linked.toml"), duration=4.0, fault=1.0)
     lost = {
-        name: sum(uniforms(0, step, STREAMS["link_loss"] + channel)[0] < share for step in range(1, 201))
+        name: sum(uniforms(0, step, lib.LINK_LOSS + channel)[0] < share for step in range(1, 201))
         for channel, (name, share) in enumerate([("measurement", 0.2), ("command", 0.1)])
     }
     # In step 1 the command of step 0 is due; all others differ from those before.

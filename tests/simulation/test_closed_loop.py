@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flights import components, step_by_step
@@ -116,5 +118,5 @@ def test_unstable_loop_ends_diverged_with_everything_finite_and_limited():
 def test_a_plant_whose_arithmetic_overflows_still_ends_diverged():
     # Ten times the natural period a step: the integration itself is unstable.
     parts = components(duration=200.0, substeps=1)
-    parts.plant.data = parts.plant.data._replace(period=1.0)
+    parts.plant.data = replace(parts.plant.data, period=1.0)
     assert fly(parts).status is FlightStatus.DIVERGED

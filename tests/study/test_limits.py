@@ -44,7 +44,7 @@ from hsv.study.limits.study import (
 from hsv.study.limits.transfer import straight, time_bound, transfer
 from hsv.study.linear_loop import START, TARGET
 from hsv.study.sensitivity.catalogue import STUDIES, page
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import advance
 from hsv.vehicle.trim import trim
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -67,8 +67,7 @@ def test_transitions_are_those_of_the_flights_integrator_with_its_derivatives():
     state, inputs, period, substeps = disturbed(4)
     end, slope = transitions(state, inputs, period, substeps, VEHICLE)
     for k in range(4):
-        x = state[k].copy()
-        advance(x, inputs[k], VEHICLE, period[k], substeps[k], workspace())
+        x = advance(state[k], inputs[k], VEHICLE, period[k], int(substeps[k]))
         assert end[k] == pytest.approx(x, rel=1e-14, abs=1e-14)
     for j, size in enumerate((*STATE_SCALE, *INPUT_SCALE, 0.02)):
         reach = 1e-4 * size

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <initializer_list>
 
 struct Count {
@@ -16,6 +17,7 @@ struct Counted {
     double value;
     Counted() = default;
     constexpr Counted(double number) : value(number) {}
+    explicit operator int() const { return (int)value; }
     Counted &operator+=(Counted other)
     {
         count.additions++;
@@ -31,11 +33,18 @@ struct Counted {
     friend bool operator<=(Counted a, Counted b) { return count.comparisons++, a.value <= b.value; }
     friend bool operator>=(Counted a, Counted b) { return count.comparisons++, a.value >= b.value; }
     friend bool operator==(Counted a, Counted b) { return count.comparisons++, a.value == b.value; }
+    friend bool operator!=(Counted a, Counted b) { return count.comparisons++, a.value != b.value; }
 };
 
+// Of the headers; no exported block calls them.
+Counted fabs(Counted);
+Counted sqrt(Counted);
+
 #define double Counted
+#define new new_ // a variable in C
 #include "controller.c"
 #undef double
+#undef new
 
 static void most_of(const hsv_block &block, const Counted *in, Counted *state, Count &most)
 {
@@ -63,8 +72,9 @@ int main()
             for (int i = 0; i < 100; i++)
                 in[i] = value, state[i] = value;
             most_of(*block, in, state, most);
-            in[HSV_ALTITUDE] = altitude_breakpoints[ALTITUDE_PIECES];
-            in[HSV_VELOCITY] = velocity_breakpoints[VELOCITY_PIECES];
+            const hsv_axis &h = nominal_data.polytope.altitude, &v = nominal_data.polytope.velocity;
+            in[HSV_ALTITUDE] = h.breakpoints[h.pieces];
+            in[HSV_VELOCITY] = v.breakpoints[v.pieces];
             most_of(*block, in, state, most);
         }
         // Of the nominal trajectory: x_n in the outermost ellipsoid, along one of its axes in no other.
@@ -72,7 +82,7 @@ int main()
             Counted in[100], state[100];
             for (int i = 0; i < 100; i++)
                 in[i] = state[i] = 0.0;
-            in[axis] = 0.999 / std::sqrt(nominal_ellipsoids[0][axis][axis].value);
+            in[axis] = 0.999 / std::sqrt(nominal_data.ellipsoids[(RIGID + 1) * axis].value);
             most_of(*block, in, state, most);
         }
         std::printf("%s %ld %ld %ld\n", block->name, most.multiplications, most.additions, most.comparisons);

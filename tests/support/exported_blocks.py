@@ -21,16 +21,16 @@ FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=
 
 
 def write_source(design: ControlDesign, folder: Path) -> Path:
-    """Write the source and its header into ``folder``; return the path of the source."""
+    """Write the exported files into ``folder``; return the path of the source."""
     for name, text in controller_files(design).items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder / SOURCE
 
 
-def compile_library(design: ControlDesign, folder: Path) -> Path:
-    """Return the shared library of what is exported of ``design``, in ``folder``."""
+def compile_library(design: ControlDesign, folder: Path, compiler: str = "cc") -> Path:
+    """Return the shared library of the exported ``design``, in ``folder``."""
     source, library = write_source(design, folder), folder / "controller.so"
-    command = ["cc", *FLAGS, "-O2", "-shared", "-fPIC", "-o", str(library), str(source)]
+    command = [compiler, *FLAGS, "-O3", "-shared", "-fPIC", "-o", str(library), str(source)]
     subprocess.run(command, check=True, capture_output=True)
     return library
 
@@ -77,7 +77,8 @@ class ExportedNominalTrajectory(ExportedBlock):
         self.reference = reference
 
     def step(self, state: np.ndarray) -> NominalResult:
-        x_r, u_r, d_r = (rows[self.reference.row(self._next)] for rows in self.reference.data[1:])
+        data, row = self.reference.data, self.reference.row(self._next)
+        x_r, u_r, d_r = data.state[row], data.input[row], data.defect[row]
         out = self.call(np.concatenate((state, x_r, d_r)), np.empty(0))
         return NominalResult(x_r, u_r, out[:9], out[9:11], np.empty(0), int(out[11]), int(out[12]))
 

@@ -13,7 +13,15 @@ def write(path, text=""):
 
 @pytest.fixture
 def python_package(tmp_path):
-    for name in ("package.xml", "setup.py", "setup.cfg", "flyer/__init__.py", "flyer/node.py", "flyer/core/loop.h", "launch/a.launch.py"):
+    for name in (
+        "package.xml",
+        "setup.py",
+        "setup.cfg",
+        "flyer/__init__.py",
+        "flyer/node.py",
+        "flyer/core/loop.h",
+        "launch/a.launch.py",
+    ):
         write(tmp_path / name)
     return Package("flyer", tmp_path, is_python=True)
 
@@ -32,7 +40,9 @@ def test_linked_files_need_no_build(python_package, name):
     assert python_package.key(WHEELS) == before
 
 
-@pytest.mark.parametrize("name", ["package.xml", "setup.py", "setup.cfg", "flyer/core/loop.h", "flyer/core/new.c", "launch/new.launch.py"])
+@pytest.mark.parametrize(
+    "name", ["package.xml", "setup.py", "setup.cfg", "flyer/core/loop.h", "flyer/core/new.c", "launch/new.launch.py"]
+)
 def test_what_is_read_or_newly_linked_needs_a_build(python_package, name):
     before = python_package.key(WHEELS)
     write(python_package.path / name, "changed")

@@ -123,6 +123,7 @@ SENSOR_PARAMETERS = (
 )
 """Empty: as the set has it."""
 
+
 class SensorData(NamedTuple):
     """Sensors as the core takes them, an entry a state (9); ``on`` where a sensor is not ideal.
 

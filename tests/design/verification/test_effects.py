@@ -8,13 +8,11 @@ from hsv.design.region import record
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.declared import declared
 from hsv.design.verification.effects import Measured, air, delayed, with_models
-from hsv.lpv.polytope import schedule
 from hsv.noise import LARGEST
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE
-from hsv.vehicle.integration import advance, workspace
+from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE, advance
 from hsv.vehicle.trim import trim
 
 
@@ -42,9 +40,7 @@ def test_air_moves_the_vehicle_as_its_equations_say(problem, subject, column, si
     for acting in (size, 0.0):
         conditions = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
         conditions[column] += acting
-        x = point.state.copy()
-        advance(x, point.input, vehicle.decoupled, period, 4, workspace(), conditions)
-        ends.append(x[:N_RIGID])
+        ends.append(advance(point.state, point.input, vehicle.decoupled, period, 4, conditions)[:N_RIGID])
     found = effect.columns[0, :N_RIGID, column] * size
     assert_allclose(found, ends[0] - ends[1], rtol=0.01, atol=1e-9 * np.abs(found).max())
     assert not effect.feedthrough.any()
@@ -135,7 +131,5 @@ def pad(rigid):
 
 
 def problem_at(design, model, altitude, velocity):
-    S = np.empty(N_STATES * (N_STATES + 2))
-    schedule(design.polytope.data(), altitude, velocity, np.empty(len(design.polytope.A)), S)
-    A, B = np.split(S.reshape(N_STATES, -1), [N_STATES], axis=1)
+    A, B = design.polytope.at(altitude, velocity)
     return error_system(A[None], B[None], design.feedback_gain, model.notch, model.columns)

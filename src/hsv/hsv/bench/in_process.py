@@ -13,7 +13,7 @@ from hsv.bench.figure import Figure, interleaved
 from hsv.simulation.assembly import assemble, flight_parameters
 from hsv.simulation.closed_loop import fly
 from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.dynamics import N_STATES, derivative
+from hsv.vehicle.dynamics import derivative
 from hsv.vehicle.plant import Plant
 
 _STEPS = 200
@@ -59,11 +59,10 @@ def against_scipy(repeats: int) -> list[Figure]:
             ends["ours"] = plant.step(u).state
 
     def theirs() -> None:
-        x, rates = x_0.copy(), np.empty(N_STATES)
+        x = x_0
 
         def slope(t: float, state: np.ndarray) -> np.ndarray:
-            derivative(state, u, plant.vehicle, rates)
-            return rates.copy()
+            return derivative(state, u, plant.vehicle)
 
         for _ in range(_STEPS):
             x = solve_ivp(slope, (0.0, plant.period), x, "DOP853", rtol=1e-8, atol=1e-10).y[:, -1]

@@ -14,10 +14,10 @@ from hsv.cli.targets import check_folder, writing
 
 def export_controller(
     design: Annotated[str, typer.Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
-    out: Annotated[Path, typer.Option(help="Folder for controller.c and hsv_block.h; new, or with these files only.")],
+    out: Annotated[Path, typer.Option(help="Folder for the C files; new, or with such files only.")],
     json: JsonOption = False,
 ) -> None:
-    """Write the notch filter, nominal trajectory and tube law of a design as a C99 file; print the cost of a step.
+    """Write the notch filter, nominal trajectory and tube law of a design as C99; print the cost of a step.
 
     Example: hsv export-controller baseline --out controller
     """
@@ -30,7 +30,9 @@ def export_controller(
     check_folder(out, "out")
     others = sorted({path.name for path in out.iterdir()} - texts.keys()) if out.exists() else []
     if others:
-        raise ParameterError(f"out = {str(out)!r}: holds {others[0]}, expected a new folder, or {' and '.join(texts)}")
+        raise ParameterError(
+            f"out = {str(out)!r}: holds {others[0]}, expected a new folder, or {', '.join(texts)} only"
+        )
     out.mkdir(parents=True, exist_ok=True)
     paths = [out / name for name in texts]
     for path, text in zip(paths, texts.values(), strict=True):

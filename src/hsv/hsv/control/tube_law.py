@@ -67,6 +67,7 @@ TUBE_PARAMETERS = (
 )
 """Parameters of the tube law in addition to those of the design; declared hardware affects the status only."""
 
+
 @dataclass(frozen=True, eq=False)
 class TubeData(Data):
     """The law as the core takes it.

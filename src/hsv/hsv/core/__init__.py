@@ -208,7 +208,8 @@ class Struct:
         element = declared.item.cname
         kind_of = _ELEMENTS[element] if element in _ELEMENTS else dtype(element)
         array = np.ascontiguousarray(value, kind_of)
-        if not constant and array is not value:
+        # numpy returns a view of an array that was unpickled: its type is equal, but another object.
+        if not (constant or (isinstance(value, np.ndarray) and array.ctypes.data == value.ctypes.data)):
             raise TypeError("expected an array that the core can write to")
         if dimensions:
             _measure(array.shape, dimensions, counts)

@@ -333,6 +333,7 @@ int64_t hsv_tube_step(const hsv_tube *tube, hsv_tube_memory *memory, int64_t k, 
                       const double *u_n, const double *s, double *u_feedback, double *u_unsaturated, double *u);
 double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_memory *memory, int64_t k,
                               const double *x);
+void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds);
 double hsv_level(const double *P, int64_t size, const double *x);
 
 /* Flights: one, or as many as a register has lanes, in pieces. */

@@ -81,7 +81,7 @@ static inline int piece_of(const hsv_axis *axis, double value)
     return i;
 }
 
-/* Write the weights of the vertices along an axis; return where p is between its ends. A NaN counts as the lower end. */
+/* Write the weights of the vertices along an axis; return where p is between its ends, a NaN counting as the lower. */
 static inline mask axis_weights(const hsv_axis *axis, real p, real *weights)
 {
     const double low = axis->breakpoints[0], high = axis->breakpoints[axis->pieces];

@@ -90,6 +90,13 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
                               memory->known, k, x);
 }
 
+void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds)
+{
+    Interval loss, offset;
+    step_intervals(effectiveness, step[0], step[1], step[2], step[3], step[4], &loss, &offset);
+    bounds[0] = loss.low, bounds[1] = loss.high, bounds[2] = offset.low, bounds[3] = offset.high;
+}
+
 double hsv_level(const double *P, int64_t size, const double *x) { return level(P, size, x); }
 
 int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, double *weights)

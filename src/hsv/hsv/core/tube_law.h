@@ -2,9 +2,10 @@
  *
  *   u = F diag(tau) (x - x_r - x_n) + u_n + u_r,   limited to U (eq. 29)
  *
- * The pitch rate in x is the filtered one, q_f; that of x_r + x_n is filtered as well where the design says so (eq. 48).
- * Integral action on the altitude and velocity errors, k F diag(tau) integral of e, is an extension of the paper's law,
- * off by default; so is the division of the elevator command by its estimated effectiveness (effectiveness.h).
+ * The pitch rate in x is the filtered one, q_f; that of x_r + x_n is filtered as well where the design says so
+ * (eq. 48). Integral action on the altitude and velocity errors, k F diag(tau) integral of e, is an extension of the
+ * paper's law, off by default; so is the division of the elevator command by its estimated effectiveness
+ * (effectiveness.h).
  *
  * Robust MPC, the paper's comparison (section 5.2), is the same with a nominal gain K in place of F and without x_n and
  * u_n ("planned" is 0).
@@ -26,8 +27,8 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
     return index;
 }
 
-/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step, "effectiveness" that of
- * the elevator, 1 where it is not estimated.
+/* Write feedback, sum of all parts and limited input; "gain" is F diag(tau) (2, 9) in this step, "effectiveness" that
+ * of the elevator, 1 where it is not estimated.
  *
  * The filter of the plan starts from the state s of the filter in the loop, which is exact where x = x_r + x_n; it is
  * stepped where the law needs it or is monitored, and where there is a filter in the loop. The integral stands still
@@ -68,7 +69,8 @@ static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const rea
         const real arriving = feedback + plan + u_r[i];
         u_unsaturated[i] = i == ELEVATOR ? arriving / effectiveness : arriving;
         u_feedback[i] = feedback + integral;
-        u[i] = limited(choose(is_finite(u_unsaturated[i]), u_unsaturated[i], u_r[i]), tube->minimum[i], tube->maximum[i]);
+        const real flown = choose(is_finite(u_unsaturated[i]), u_unsaturated[i], u_r[i]);
+        u[i] = limited(flown, tube->minimum[i], tube->maximum[i]);
         limit |= u[i] != u_unsaturated[i];
     }
     if (tube->integral_rate > 0.0)

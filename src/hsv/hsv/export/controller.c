@@ -8,15 +8,15 @@
  *   tube_law            x, q_f, x_r, u_r, x_n, u_n, and s where the plan is filtered -> u (eq. 36, eq. 48, eq. 54)
  *
  * The equations are those of X. Yang, W. Lv, H. Mi, C. Hu, Y. Hu, "Tube-MPC Control via Notch Filter for Flexible
- * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022; the headers, which the bench flies itself, have them. x is
- * the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k) and
- * u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. u is not limited yet: whoever moves
- * the actuators limits it to U (eq. 29), tube_data.minimum to tube_data.maximum.
+ * Air-Breathing Hypersonic Vehicle with Actuator Fault", 2022. They are in the headers, which are those of the bench. x
+ * is the measured state; x_r and u_r are the reference of the step, and d_r is its defect: the state to which x_r(k)
+ * and u_r(k) lead in a period, less x_r(k + 1), zero where the reference stands still. The caller limits u to U
+ * (eq. 29), tube_data.minimum to tube_data.maximum.
  *
  *   cc -std=c99 -O3 -ffp-contract=off -shared -fPIC -o controller.so controller.c
  *
- * No library function is called and no memory allocated; a step takes less than 4 KiB of stack. Every compiler gives the
- * same bits as long as it does not contract a product and a sum into one operation.
+ * No library function is called and no memory allocated; a step takes less than 4 KiB of stack. Every compiler gives
+ * the same bits as long as it does not contract a product and a sum into one operation.
  */
 #include "design.h"
 #include "hsv_block.h"
@@ -76,7 +76,7 @@ static const hsv_signal nominal_outputs[] = {
     {"deviation", HSV_STATE_UNITS, HSV_STATES},
     {"nominal_input", HSV_INPUT_UNITS, HSV_INPUTS},
     {"gain_index", "1", 1},      /* of the nested family, 0 the outermost */
-    {"nominal_status", "1", 1}}; /* a sum of OUTSIDE_FAMILY, for x_n, and OUTSIDE_ENVELOPE, for altitude and velocity */
+    {"nominal_status", "1", 1}}; /* OUTSIDE_FAMILY for x_n plus OUTSIDE_ENVELOPE for altitude and velocity */
 
 const hsv_block nominal_trajectory = {
     .abi_version = HSV_BLOCK_ABI_VERSION, .name = "nominal_trajectory", .source = "design.h",
@@ -109,7 +109,7 @@ static int32_t step_tube_law(int64_t k, const double *in, double *out, double *s
     for (int j = 0; j < PLANNED_STATES; j++)
         state[INTEGRATED + j] = memory.planned[j];
     for (int i = 0; i < HSV_INPUTS; i++)
-        out[i] = is_finite(total[i]) ? total[i] : u_r[i]; /* an actuator gets a number whatever happens */
+        out[i] = is_finite(total[i]) ? total[i] : u_r[i];
     return 0;
 }
 

@@ -1,29 +1,32 @@
-"""Notch filter, nominal trajectory and tube law of a design as one C99 file for ``hsv_block.h``."""
+"""Notch filter, nominal trajectory and tube law of a design as C99 for ``hsv_block.h``: the core's headers and numbers."""
 
 from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from hsv.control.c_block import include_folder
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_law import MEMBERSHIP_TOLERANCE, NominalStatus
-from hsv.control.notch_filter import NotchSection, discretise
+from hsv.control.nominal_trajectory import nominal_data
+from hsv.control.tube_law import TubeLaw
+from hsv.core import Struct, ffi
 from hsv.errors import DesignError
 from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
 
 SOURCE = "controller.c"
+NUMBERS = "design.h"
 HEADER = "hsv_block.h"
+CORE_HEADERS = ("core.h", "vehicle_fields.h", "real.h", "notch_filter.h", "nominal.h", "tube_law.h")
 
 
 @dataclass(frozen=True)
 class StepBound:
-    """The most that a step of a block computes, step 0 included, and the numbers that it keeps in its state."""
+    """Maximum number of operations in a step of a block, step 0 included, and the size of its state."""
 
     multiplications: int
     """And divisions."""
@@ -34,96 +37,128 @@ class StepBound:
 
 
 def controller_files(design: ControlDesign) -> dict[str, str]:
-    """Return the texts of the files, by name, that fly ``design`` without this library: the source and its header.
+    """Return the texts of the files, by name, that fly ``design`` without this library.
 
     Raises:
         DesignError: The design carries no tube.
     """
     if design.tube is None:
         raise DesignError(f"design {design.name!r}: parameter tube.shape: empty, expected a design with a tube")
-    header = (include_folder() / HEADER).read_text(encoding="utf-8")
-    return {SOURCE: controller_source(design), HEADER: header}
-
-
-def controller_source(design: ControlDesign, notch: Sequence[NotchSection] = ()) -> str:
-    """Return the C source of the three blocks, with these sections of the notch filter in place of the design's."""
-    data, polytope = discretise(notch or design.notch, design.period), design.polytope.data()
-    constants = {
-        "notch_A": data.A,
-        "notch_B": data.B,
-        "notch_C": data.C,
-        "notch_D": data.D,
-        "notch_rest": data.G,
-        "altitude_breakpoints": polytope.altitude.breakpoints,
-        "altitude_weights": polytope.altitude.coefficients,
-        "velocity_breakpoints": polytope.velocity.breakpoints,
-        "velocity_weights": polytope.velocity.coefficients,
-        "vertices": np.concatenate((design.polytope.A, design.polytope.B), axis=2),
-        "nominal_gains": design.nominal_gains,
-        "nominal_ellipsoids": design.nominal_ellipsoids,
-        "feedback_gain": design.feedback_gain,
-        "input_minimum": design.input_minimum,
-        "input_maximum": design.input_maximum,
-        "designed_tau": design.tau,
+    core = files("hsv.core")
+    return {
+        SOURCE: files("hsv.export").joinpath(SOURCE).read_text(encoding="utf-8"),
+        NUMBERS: design_header(design),
+        HEADER: (include_folder() / HEADER).read_text(encoding="utf-8"),
+        **{name: core.joinpath(name).read_text(encoding="utf-8") for name in CORE_HEADERS},
     }
-    environment = Environment(
-        loader=PackageLoader("hsv", "export"),
-        autoescape=False,  # it is no HTML
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"initialiser": _initialiser, "plain": _plain}
-    return environment.get_template(f"{SOURCE}.j2").render(
-        design=design,
-        digest=design.to_parameters()["design.hash"],
-        file=SOURCE,
-        constants=constants,
-        constant_bytes=sum(array.nbytes for array in constants.values()),
-        bounds=step_bounds(design, notch),
-        boundary=1.0 + MEMBERSHIP_TOLERANCE,
-        outside_family=NominalStatus.OUTSIDE_FAMILY.value,
-        outside_envelope=NominalStatus.OUTSIDE_ENVELOPE.value,
-    )
 
 
-def step_bounds(design: ControlDesign, notch: Sequence[NotchSection] = ()) -> dict[str, StepBound]:
-    """Return the bounds of a step of each block, by its name, counted from the loops of its C source."""
+def design_header(design: ControlDesign) -> str:
+    """Return the header with the numbers of ``design``, as structs of core.h."""
+    rows = [
+        f"{name:18} {'  '.join(f'{n:15}' for n in vars(most).values())}" for name, most in step_bounds(design).items()
+    ]
+    # The factors tau are a parameter of the block, so that the gain is F alone.
+    tube = replace(TubeLaw(design).kernel, gains=design.feedback_gain[None])
+    lines = [
+        f'/* Numbers of the design "{_plain(design.name)}", whose digest is',
+        f" * {design.to_parameters()['design.hash']}:",
+        ' * written by "hsv export-controller"; write them anew instead of changing them.',
+        " *",
+        f' * The tube is certified for the inertial coupling "{_plain(design.coupling)}" and the factors tau that tube_law',
+        f" * admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h describes the",
+        " * arrays. Maximum number of operations in a step, step 0 included; a division counts as a multiplication, a",
+        " * subtraction as an addition:",
+        " *",
+        " *   block              multiplications        additions      comparisons  numbers of state",
+        *(f" *   {row}" for row in rows),
+        " */",
+        "#ifndef DESIGN_H",
+        "#define DESIGN_H",
+        '#include "core.h"',
+        "",
+        f"enum {{ SECTIONS = {len(design.notch)}, FILTERED = {int(design.filtered)} }};",
+        f"#define TAU_MINIMUM {_number(design.tau_minimum.min())}",
+        _array("designed_tau", "double", design.tau),
+        *_constant("hsv_nominal", "nominal_data", nominal_data(design)),
+        *_constant("hsv_tube", "tube_data", tube),
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
+    """Return the bounds of a step of each block, by its name, counted from the loops of the headers."""
     n, m, rigid, integrated = N_STATES, N_INPUTS, N_RIGID, 2
-    sections, gains = len(notch or design.notch), len(design.nominal_gains)
-    axes = [axis.coefficients.shape[1:] for axis in (design.polytope.altitude, design.polytope.velocity)]
-    vertices, width = len(design.polytope.A), n * (n + m)
-    membership, weights = rigid * rigid + rigid, 3 * sum(count for _, count in axes)
-    filtered = sections if design.filtered else 0
-    # Between two gains: the input of the inner one, the share of the outer one, and their sum.
-    products, sums = (m * n + 1 + m, m * n + 2 + 2 * m) if design.interpolated and gains > 1 else (0, 0)
+    sections, gains, polytope = len(design.notch), len(design.nominal_gains), design.polytope.data()
+    axes = [axis.coefficients.shape[1:] for axis in (polytope.altitude, polytope.velocity)]
+    vertices, size = polytope.S.shape
+    used, weights = len(polytope.entries), 3 * sum(count for _, count in axes)
+    membership, filtered = rigid * rigid + rigid, int(design.filtered)
+    between = int(design.interpolated and gains > 1)
     return {
         "notch_filter": StepBound((9 + 2) * sections, 6 * sections, 0, 2 * sections),
         "nominal_trajectory": StepBound(
-            multiplications=gains * membership + m * n + products + weights + vertices * (1 + width) + width,
-            additions=n + gains * membership + m * n + sums + weights + len(axes) + vertices * width + width + n,
-            comparisons=gains + sum(3 + pieces - 1 for pieces, _ in axes),
+            multiplications=gains * membership + m * n + between * m * (n + 2) + weights + vertices * (1 + size) + used,
+            additions=n
+            + gains * membership
+            + m * n
+            + between * m * (n + 4)
+            + weights
+            + len(axes)
+            + vertices * size
+            + used
+            + n,
+            comparisons=gains + m + sum(4 + pieces - 1 for pieces, _ in axes),
             state_size=n,
         ),
         "tube_law": StepBound(
-            multiplications=9 * filtered + m * (n + rigid + 3 * integrated) + integrated,
-            additions=2 * n + 2 + 6 * filtered + m * (n + integrated + 4) + 3 * integrated,
-            comparisons=4 * m + 1,
-            state_size=integrated + 2 * filtered,
+            multiplications=9 * sections * filtered + m * (n + rigid + 2 * integrated) + 1 + integrated,
+            additions=2 + (2 + 6 * sections) * filtered + m * (3 * n + integrated + 6) + 3 * integrated,
+            comparisons=6 * m + 1,
+            state_size=integrated + 2 * sections * filtered,
         ),
     }
+
+
+def _constant(kind: str, name: str, source: Any) -> list[str]:
+    """Return a struct of core.h with the numbers of ``source``, after the arrays that it points to."""
+    arrays: list[str] = []
+
+    def fields(struct: Any, name: str, source: Any, indent: str) -> str:
+        lines = []
+        for field, declared in ffi.typeof(struct).fields:
+            value, own = getattr(struct, field), f"{name}_{field}"
+            if declared.type.kind == "struct":
+                text = fields(value, own, getattr(source, field), indent + "    ")
+            elif declared.type.kind == "pointer":
+                text = own if value else "0"
+                if value:
+                    arrays.append(_array(own, declared.type.item.cname, getattr(source, field)))
+            elif declared.type.kind == "array":
+                text = f"{{{', '.join(map(_number, value))}}}"
+            else:
+                text = _number(value)
+            lines.append(f"\n{indent}.{field} = {text}")
+        return f"{{{','.join(lines)}}}"
+
+    text = fields(Struct(kind, source).pointer[0], name, source, "    ")
+    return [*arrays, f"static const {kind} {name} = {text};"]
+
+
+def _array(name: str, element: str, numbers: np.ndarray) -> str:
+    shape = ", ".join(map(str, numbers.shape))
+    values = textwrap.fill(
+        ", ".join(map(_number, numbers.ravel())), 120, initial_indent="    ", subsequent_indent="    "
+    )
+    return f"static const {element} {name}[] = {{ /* ({shape}) */\n{values}}};"
+
+
+def _number(value: Any) -> str:
+    """Return a number in C; hexadecimal ones are exact."""
+    return str(int(value)) if isinstance(value, int | np.integer) else float(value).hex()
 
 
 def _plain(text: str) -> str:
     """Return a name as it can stand in a comment of C: it must not end it."""
     return re.sub(r"[^A-Za-z0-9_. -]", "_", text)
-
-
-def _initialiser(array: np.ndarray, column: int = 4) -> str:
-    """Return the initialiser of a C array whose first brace stands in ``column``; hexadecimal numbers are exact."""
-    if array.ndim > 1:
-        parts, separator = [_initialiser(row, column + 1) for row in array], ","
-    else:
-        parts, separator = textwrap.wrap(", ".join(map(float.hex, array.tolist())), 114 - column), ""
-    return "{" + f"{separator}\n{' ' * (column + 1)}".join(parts) + "}"

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.core import Data, doubles, lib
+from hsv.core import Data, lib
 from hsv.elimination import solve
 from hsv.errors import DesignError
 
@@ -145,8 +145,9 @@ class Polytope:
 
     def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
-        n, m = self.B.shape[1:]
-        S = np.empty(n * (n + m))
-        lib.hsv_schedule(self.data().pointer, altitude, velocity, doubles(S))
-        S = S.reshape(n, n + m)
-        return S[:, :n], S[:, n:]
+        h, v = evaluate(self.altitude, np.array([altitude])), evaluate(self.velocity, np.array([velocity]))
+        A, B = np.zeros(self.A.shape[1:]), np.zeros(self.B.shape[1:])
+        for weight, A_i, B_i in zip(np.outer(h, v).flat, self.A, self.B, strict=True):
+            A += weight * A_i
+            B += weight * B_i
+        return A, B

@@ -46,7 +46,8 @@ class FlightGroup:
         full = [*components, *[components[-1]] * (self.lanes - len(components))]
         estimated = not is_ideal(full[0])
         self._flights = [
-            flight_struct(own, self.lane(i, estimated=estimated), ended=rows, set=tube_set) for i, own in enumerate(full)
+            flight_struct(own, self.lane(i, estimated=estimated), ended=rows, set=tube_set)
+            for i, own in enumerate(full)
         ]
 
     def lane(self, i: int, *, estimated: bool = True) -> History:
@@ -73,9 +74,7 @@ def fly_group(group: FlightGroup, components: Sequence[Components]) -> list[Flig
     group.begin(components, rows)
     group.fly(0, rows)
     ideal = is_ideal(components[0])
-    return [
-        flight_of(own, group.lane(i, estimated=not ideal).cut(group.ended(i))) for i, own in enumerate(components)
-    ]
+    return [flight_of(own, group.lane(i, estimated=not ideal).cut(group.ended(i))) for i, own in enumerate(components)]
 
 
 def fly_perturbed(

@@ -36,7 +36,6 @@ N_RIGID = 5
 PITCH_RATE = STATE_NAMES.index("pitch_rate")
 
 
-
 @lru_cache(maxsize=64)
 def vehicle_struct(vehicle: VehicleParameters) -> Struct:
     """Return the parameters as the core takes them."""
