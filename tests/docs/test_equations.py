@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import hsv
+from hsv.core import lib
 
 SOURCES = Path(hsv.__file__).parent
 TEXT = (Path(__file__).parents[2] / "docs" / "equations.md").read_text()
@@ -30,6 +31,10 @@ def test_every_name_on_the_page_exists():
     assert len(names) > 30
     for name in names:
         assert found(name) is not None
+    for name in re.findall(r"`(hsv_\w+)`", TEXT):
+        assert hasattr(lib, name)
+    for name, header in re.findall(r"`(\w+)` of `(core/\w+\.h)`", TEXT):
+        assert f"{name}(" in (SOURCES / header).read_text(encoding="utf-8")
 
 
 def test_every_numbered_equation_of_the_paper_is_on_the_page():
@@ -46,11 +51,17 @@ def test_one_search_finds_every_equation_where_it_is_computed(number):
         name if Path(SOURCES, *name.split(".")[1:]).with_suffix(".py").is_file() else name.rpartition(".")[0]
         for name in named
     }
-    texts = [Path(SOURCES, *name.split(".")[1:]).with_suffix(".py").read_text(encoding="utf-8") for name in modules]
+    headers = [SOURCES / header for row in rows for header in re.findall(r"`(core/\w+\.h)`", row)]
+    paths = [*headers, *(Path(SOURCES, *name.split(".")[1:]).with_suffix(".py") for name in modules)]
+    texts = [path.read_text(encoding="utf-8") for path in paths]
     assert any(re.search(rf"eq\. {number}\b", text) for text in texts), sorted(modules)
 
 
 def test_no_equation_hides_in_a_range():
     ranges = re.compile(r"eq\. \d+(-\d+|, \d)")
-    found = [str(path) for path in SOURCES.rglob("*.py") if ranges.search(path.read_text(encoding="utf-8"))]
+    found = [
+        str(path)
+        for path in SOURCES.rglob("*.[pch]*")
+        if path.suffix in (".py", ".h", ".c") and ranges.search(path.read_text(encoding="utf-8"))
+    ]
     assert found == []

@@ -195,7 +195,7 @@ def test_lines_are_no_longer_than_a_page_is_wide(design):
 
 def test_a_name_does_not_end_the_comment_that_it_stands_in():
     text = design_header(dataclasses.replace(DESIGNS["baseline"], name="a */ int b;\n/*", coupling='"*/'))
-    assert text.splitlines()[0].endswith('of the design "a __ int b____", whose digest is')
+    assert text.splitlines()[0].endswith('of the design "a __ int b____".')
     assert "*/ int" not in text
     assert '"___"' in text
 

@@ -1,10 +1,10 @@
-"""Controllers of one's own in the loop: Python classes and compiled step functions."""
+"""Custom controllers in the loop: Python classes and functions in C."""
 
 import threading
 
 import numpy as np
 import pytest
-from numba import carray, cfunc
+from c_libraries import step_function
 
 from hsv.control.controller import ControllerInput, StepKernel
 from hsv.errors import RunError, ScenarioError
@@ -72,27 +72,8 @@ class Leaky:
         return wanted
 
 
-@cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
-def leaky_step(k, given, wanted, state, parameters):
-    x, x_r, u_r = carray(given, 9), carray(given, 19)[10:], carray(given, 21)[19:]
-    gain, time = parameters[0], parameters[1]
-    if k == int(parameters[2]):
-        return 7
-    if k == int(parameters[3]):
-        return 0
-    for i in range(2):
-        total = 0.0
-        for j in range(5):
-            error = (given[9] if j == 4 else x[j]) - x_r[j]
-            total += FEEDBACK[i, j] * error
-        wanted[i] = u_r[i] + gain * total
-    wanted[1] += RATE * state[0]
-    state[0] += 0.02 * (x[3] - x_r[3] - state[0] / time)
-    return 0
-
-
 class CompiledLeaky(Leaky):
-    """The same, compiled."""
+    """The same as a function in C, given by its address."""
 
     fails_at = silent_at = -1
 
@@ -100,7 +81,7 @@ class CompiledLeaky(Leaky):
     def kernel(self):
         own = self.own
         settings = [own["leaky.gain"], own["leaky.time"], self.fails_at, self.silent_at]
-        return StepKernel(leaky_step.address, np.zeros(1), np.array(settings))
+        return StepKernel(step_function("leaky"), np.zeros(1), np.array(settings))
 
 
 class Late(Leaky):

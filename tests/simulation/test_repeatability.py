@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numba import carray, cfunc
+from c_libraries import step_function
 
 from hsv.control.controller import StepKernel
 from hsv.errors import RunError, ScenarioError
@@ -118,22 +118,13 @@ class Failing(Steady):
         return np.nan if inputs.step == 12 and self.flights > 1 else 0.0
 
 
-@cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
-def counting_step(k, given, wanted, state, parameters):
-    # Parameters are of all copies together: what a static variable is to a C library.
-    kept = carray(parameters, 1) if parameters[1] else carray(state, 1)
-    kept[0] += 1.0
-    wanted[0], wanted[1] = given[19], given[20] + 1e-9 * kept[0]
-    return 0
-
-
 class Compiled(Steady):
     """Counts steps in its state."""
 
     outside = 0.0
 
     def __init__(self):
-        self.kernel = StepKernel(counting_step.address, np.zeros(1), np.array([0.0, self.outside]))
+        self.kernel = StepKernel(step_function("counting"), np.zeros(1), np.array([0.0, self.outside]))
 
 
 class CompiledStatic(Compiled):

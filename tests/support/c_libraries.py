@@ -1,8 +1,11 @@
-"""Shared libraries of controllers in C, built for the tests with the header that is installed."""
+"""Controllers in C, built for the tests with the header that is installed: shared libraries, and bare functions."""
 
 from __future__ import annotations
 
+import ctypes
 import subprocess
+import tempfile
+from functools import cache
 from pathlib import Path
 
 from hsv.control.c_block import include_folder
@@ -26,3 +29,20 @@ def build_probe(folder: Path, *flags: str, name: str = "probe") -> Path:
     command = ["cc", *FLAGS, *flags, f"-I{include_folder()}", "-shared", "-fPIC", "-o", library, PROBE]
     subprocess.run(command, check=True)
     return library
+
+
+@cache
+def _step_functions() -> ctypes.CDLL:
+    source = Path(__file__).with_name("step_functions.c")
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder, "step_functions.so")
+        command = ["cc", *FLAGS, f"-I{include_folder()}", "-shared", "-fPIC", "-o", library, source]
+        subprocess.run(command, check=True)
+        return ctypes.CDLL(str(library))
+
+
+def step_function(name: str) -> int:
+    """Return the address of a function of ``step_functions.c`` in this process."""
+    address = ctypes.cast(getattr(_step_functions(), name), ctypes.c_void_p).value
+    assert address is not None
+    return address

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from statistics import median
 
-from hsv.bench.c_flight import FLAGS, CFlight
-from hsv.bench.figure import Figure, interleaved
+from hsv.bench.c_build import FLAGS, c_flight
+from hsv.bench.figure import Figure
 from hsv.campaign.campaign import plan
 from hsv.campaign.executors import make_executor
 from hsv.campaign.run import run_campaign
 from hsv.campaign.sample_runner import sample_runner
 from hsv.campaign.store import ResultStore
-from hsv.lane_types import REGISTER, WIDTH
+from hsv.core import lanes
 from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.fingerprint import fingerprint, fingerprints
+from hsv.simulation.history import History
 from hsv.simulation.scenario import load_scenario
 
 
@@ -51,17 +51,6 @@ def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure
     ]
 
 
-def digests(repeats: int) -> list[Figure]:
-    """Return the fingerprints of the flights of a campaign, two at a time, against those of one after the other."""
-    flight = fly(assemble_flight(load_scenario("case1"))).history.flown
-    flights = [flight.copy() for _ in range(16)]
-    ours, theirs = interleaved(
-        lambda: fingerprints(flights), lambda: [fingerprint(flown) for flown in flights], repeats
-    )
-    what = f"fingerprints of {len(flights)} flights of Case 1"
-    return [Figure("digests", what, "one after the other, hashlib", "s", ours, theirs, "most", 1.05)]
-
-
 def corners(repeats: int, workers: int) -> list[Figure]:
     """Return the wall time of the 1024 corners of Case 1, alone and against as many flights of the C build.
 
@@ -89,7 +78,7 @@ def corners(repeats: int, workers: int) -> list[Figure]:
                 theirs.append(time.perf_counter() - started)
     what = f"1024 corners of Case 1, {workers} workers"
     against = f"as many flights of the C build, {' '.join(FLAGS)}, alone on as many workers"
-    limit, goal = (0.4, None) if REGISTER == 8 else (0.6, 0.35)
+    limit, goal = (0.4, None) if lanes() == 8 else (0.6, 0.35)
     return [
         Figure("corners", f"{what}, their start included", "", "s", (first,), (), "most", 15.0),
         Figure(
@@ -102,24 +91,24 @@ def corners(repeats: int, workers: int) -> list[Figure]:
             "most",
             limit,
             goal,
-            f"{WIDTH} flights side by side",
+            f"{lanes()} flights side by side",
         ),
     ]
 
 
 @cache
-def _c_flight() -> CFlight:
-    return CFlight(assemble_flight(load_scenario("case1")))
+def _c_flight() -> Callable[[], History]:
+    return c_flight(assemble_flight(load_scenario("case1")))
 
 
 def _build_c(text: str, number: int) -> bytes:
-    _c_flight().fly()
+    _c_flight()()
     return b""
 
 
 def _fly_c(text: str, batch: int) -> bytes:
     for _ in sample_runner(text).campaign.flights(batch):
-        _c_flight().fly()
+        _c_flight()()
     return b""
 
 

@@ -1,26 +1,27 @@
-"""Cost of custom controllers, compared with the law that is built into the compiled loop."""
+"""Cost of custom controllers, compared with the law that the loop has in itself."""
 
 from __future__ import annotations
 
+import ctypes
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numba import cfunc
 
-from hsv.bench.c_flight import compiled
+from hsv.bench.c_build import compiled
 from hsv.bench.figure import Figure, interleaved
 from hsv.control.c_block import load_block
 from hsv.control.controller import ControllerInput, ForeignController, StepKernel
 from hsv.control.library import LibraryController
 from hsv.control.tube_law import TubeLaw
-from hsv.export.controller import controller_source
+from hsv.export.controller import SOURCE, controller_files
 from hsv.simulation.assembly import assemble_flight
 from hsv.simulation.closed_loop import Components, fly
 from hsv.simulation.scenario import load_scenario
@@ -46,19 +47,16 @@ def a_step_in_python(repeats: int) -> list[Figure]:
     """Return the cost of a step of Python classes: of one that does nothing, and of the example if it is installed."""
     flight = assemble_flight(load_scenario("case1", {"duration": f"{_DURATION} s", "fault": []}))
     held = flight.plant.initial.input
-
-    @cfunc("int32(int64, CPointer(float64), CPointer(float64), CPointer(float64), CPointer(float64))")
-    def hold(k: Any, given: Any, wanted: Any, state: Any, parameters: Any) -> Any:
-        wanted[0], wanted[1] = parameters[0], parameters[1]
-        return 0
-
-    assert hold.address is not None
-    kernel = SimpleNamespace(kernel=StepKernel(hold.address, np.zeros(0), held))
+    with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
+        source = Path(str(files("hsv.bench").joinpath("holding.c")))
+        hold = ctypes.CDLL(str(compiled(Path(folder, "holding.so"), [source]))).hold
+    address = ctypes.cast(hold, ctypes.c_void_p).value or 0
+    kernel = SimpleNamespace(kernel=StepKernel(address, np.zeros(0), held))
     figures = [
         _beside(
             "python_class",
             "a step of a class in Python that does nothing",
-            "the same, compiled",
+            "the same in C",
             _several(_flown_by(flight, _Holding(held)), _FLIGHTS),
             _several(_flown_by(flight, kernel), _FLIGHTS),
             _FLIGHTS * flight.plant.steps,
@@ -85,15 +83,17 @@ def a_step_in_python(repeats: int) -> list[Figure]:
 _LQR = {"controller": "lqr", "design": "", "notch.enabled": False}
 
 
-def compiled_laws(repeats: int) -> list[Figure]:
-    """Return Case 1 with the shipped law as a foreign compiled function, against the loop with the built-in law.
+def laws_in_c(repeats: int) -> list[Figure]:
+    """Return Case 1 with the exported law as a custom function in C, against the loop with its own law.
 
-    The function is that of the exported controller: the same work, and the same bits.
+    Both do the same work, and give the same bits.
     """
     shipped = assemble_flight(load_scenario("case1"))
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         assert isinstance(shipped.controller, TubeLaw)
-        library = compiled(Path(folder), controller_source(shipped.controller.design, shipped.notch_filter.sections))
+        for file, text in controller_files(shipped.controller.design).items():
+            Path(folder, file).write_text(text, encoding="utf-8")
+        library = compiled(Path(folder, "controller.so"), [Path(folder, SOURCE)])
         scenario = Path(folder, "own.toml")
         scenario.write_text(f'extends = "case1"\ncontroller = "{library.name}:tube_law"\n', encoding="utf-8")
         own = assemble_flight(load_scenario(str(scenario)))
@@ -102,7 +102,7 @@ def compiled_laws(repeats: int) -> list[Figure]:
         equal = {f.fingerprint for f in (fly(shipped), fly(own), fly(kernel))}
         note = "the same bits" if len(equal) == 1 else "other bits"
         jobs: dict[str, tuple[str, Components, Callable[[], float]]] = {
-            "cfunc": ("Case 1, 200 s, the tube law as a compiled function of one's own", kernel, time.thread_time),
+            "c_function": ("Case 1, 200 s, the tube law as a custom function in C", kernel, time.thread_time),
             "c_library": ("Case 1, 200 s, the tube law in a C library, in its process", own, time.perf_counter),
         }
         return [

@@ -16,7 +16,7 @@ TABLE = "<!-- table: made by hsv bench -->", "<!-- end of table -->"
 HISTORY = "<!-- history: made by hsv bench -->", "<!-- end of history -->"
 
 FOLLOWED = {
-    "in_process": "compiled loop / C",
+    "in_process": "flight from Python / loop in C",
     "graph": "lap / bare ring",
     "composed": "composed lap / bare loop",
     "montecarlo": "flights a second, all workers / as many times one",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from hsv.bench import campaigns, controllers, graph, in_process, live, offline, roofline, startup, writing
+from hsv.bench import campaigns, controllers, graph, in_process, live, offline, startup, writing
 from hsv.bench.figure import Figure
 
 
@@ -20,7 +20,7 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "in_process": lambda: in_process.against_c(times(40)),
         "scipy": lambda: in_process.against_scipy(times(10)),
         "jsbsim": lambda: in_process.against_jsbsim(times(10)),
-        "controllers": lambda: [*controllers.compiled_laws(times(40)), *controllers.a_step_in_python(times(20))],
+        "controllers": lambda: [*controllers.laws_in_c(times(40)), *controllers.a_step_in_python(times(20))],
         "startup": lambda: startup.against_imports(times(10)),
         "mcap": lambda: writing.against_mcap(times(10)),
         "graph": lambda: graph.against_rings(times(5)),
@@ -28,8 +28,6 @@ def groups(scale: float = 1.0) -> dict[str, Callable[[], list[Figure]]]:
         "montecarlo": lambda: [
             *campaigns.over_workers(times(3), max(cores, 2)),
             *campaigns.corners(times(3), max(cores, 2)),
-            *campaigns.digests(times(10)),
-            *roofline.against_roofline(times(10)),
         ],
         "offline": offline.design_and_verify,
     }

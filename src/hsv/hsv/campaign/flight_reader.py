@@ -73,7 +73,7 @@ class FlightReader:
         for i, own in enumerate(components):
             n = group.ended(i)
             time, start_of_fault = times(n, own.plant.period), fault_start(own, n)
-            curves = FlightCurves(time, self._curves[i, :, :n], self._saturated[i, :n], start_of_fault)
+            read = FlightCurves(time, self._curves[i, :, :n], self._saturated[i, :n], start_of_fault)
             level = group.worst(i) if self._levels.set else None
-            readings.append(FlightReading(curves, last[i], level, written(digests[i].digest())))
+            readings.append(FlightReading(read, last[i], level, written(digests[i].digest())))
         return readings

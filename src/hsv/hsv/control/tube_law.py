@@ -131,7 +131,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
     """
     k, estimate, q_f, *others = inputs
     given = [doubles(vector(each)) for each in others]
-    found = [np.empty(N_INPUTS) for _ in range(3)]
+    feedback, unsaturated, limited = (np.empty(N_INPUTS) for _ in range(3))
     active = lib.hsv_tube_step(
         data.pointer,
         records("hsv_tube_memory", memory),
@@ -141,9 +141,9 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         doubles(vector(estimate)),
         q_f,
         *given,
-        *map(doubles, found),
+        *map(doubles, (feedback, unsaturated, limited)),
     )
-    return TubeStep(*found, int(active))
+    return TubeStep(feedback, unsaturated, limited, int(active))
 
 
 def active_gain(data: TubeData, step: int) -> int:

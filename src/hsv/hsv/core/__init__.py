@@ -37,16 +37,32 @@ __all__ = [
 
 _STRUCT = re.compile(r"typedef struct \{(.*?)\n\} (\w+);", re.DOTALL)
 _POINTER = re.compile(r"(const )?\w+ \*(\w+); *(?:/\* \(([^)]*)\))?")
-_DIMENSION = re.compile(r"(?:(\d+)|(\w+)(?: \+ (\d+))?(?: <= (\d+))?)$")
+_DIMENSION = re.compile(r"(\d+|\w+)(?: \+ (\d+))?(?: <= (\d+))?")
 _LANES = {"sse2": 1, "avx2": 4, "avx512": 8}
 _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t": np.dtype(np.uint8)}
+
+
+class _Dimension(NamedTuple):
+    """A dimension of an array: a ``size``, or what ``counts`` names, a field of the struct, plus ``more``."""
+
+    text: str
+    size: int | None
+    counts: str
+    more: int
+    greatest: int | None
+
+    @classmethod
+    def read(cls, text: str) -> _Dimension:
+        [(name, more, greatest)] = _DIMENSION.findall(text)
+        size = int(name) if name.isdigit() else None
+        return cls(text.strip(), size, "" if size else name, int(more or 0), int(greatest) if greatest else None)
 
 
 class _Pointer(NamedTuple):
     """A pointer field as core.h declares it."""
 
     constant: bool
-    dimensions: tuple[str, ...]
+    shape: tuple[_Dimension, ...]
 
 
 @cache
@@ -54,26 +70,29 @@ def _pointers(kind: str) -> dict[str, _Pointer]:
     text = files("hsv.core").joinpath("core.h").read_text(encoding="utf-8")
     [body] = [body for body, name in _STRUCT.findall(text) if name == kind]
     return {
-        name: _Pointer(bool(constant), tuple(filter(None, map(str.strip, shape.split(",")))))
+        name: _Pointer(bool(constant), tuple(map(_Dimension.read, filter(None, shape.split(",")))))
         for constant, name, shape in _POINTER.findall(body)
     }
+
+
+def _element(declared: Any) -> tuple[str, tuple[int, ...]]:
+    """Return the type of the elements and the shape of a field."""
+    shape = []
+    while declared.kind == "array":
+        shape.append(declared.length)
+        declared = declared.item
+    return declared.cname, tuple(shape)
 
 
 @cache
 def dtype(kind: str) -> np.dtype[Any]:
     """Return the numpy type of a struct of core.h that holds no pointers."""
     fields = ffi.typeof(kind).fields
-    formats = []
-    for _, field in fields:
-        element, shape = field.type, []
-        while element.kind == "array":
-            shape.append(element.length)
-            element = element.item
-        formats.append((_ELEMENTS[element.cname], tuple(shape)))
+    elements = [_element(field.type) for _, field in fields]
     return np.dtype(
         {
             "names": [name for name, _ in fields],
-            "formats": formats,
+            "formats": [(_ELEMENTS[element], shape) for element, shape in elements],
             "offsets": [field.offset for _, field in fields],
             "itemsize": ffi.sizeof(kind),
         }
@@ -166,26 +185,35 @@ class Struct:
 
     def _fill(self, kind: str, target: Any, source: Any) -> None:
         counts: dict[str, int] = {}
-        pointers = _pointers(kind)
-        counted = {_DIMENSION.match(each)[2] for pointer in pointers.values() for each in pointer.dimensions}
+        counted = {each.counts for pointer in _pointers(kind).values() for each in pointer.shape}
         for name, field in ffi.typeof(kind).fields:
             if name not in counted:
-                self._set(kind, target, name, field.type, getattr(source, name), counts)
+                self._set(kind, target, name, field.type, source, counts)
         for name, count in counts.items():
             setattr(target, name, count)
 
-    def _set(self, kind: str, target: Any, name: str, declared: Any, value: Any, counts: dict[str, int]) -> None:
+    def _set(self, kind: str, target: Any, name: str, declared: Any, source: Any, counts: dict[str, int]) -> None:
         try:
+            value = getattr(source, name)
             if declared.kind == "primitive":
                 setattr(target, name, float(value) if declared.cname == "double" else int(value))
             elif declared.kind == "array":
-                setattr(target, name, value.tolist() if isinstance(value, np.ndarray) else value)
+                self._copy(getattr(target, name), declared, np.asarray(value))
             elif declared.kind == "struct":
                 self._nest(declared.cname, getattr(target, name), value)
             else:
                 setattr(target, name, self._address(kind, name, declared, value, counts))
-        except (TypeError, ValueError, OverflowError, IndexError) as error:
+        except ParameterError:
+            raise
+        except (AttributeError, TypeError, ValueError, OverflowError) as error:
             raise ParameterError(f"{kind}.{name}: {error}") from error
+
+    def _copy(self, target: Any, declared: Any, value: np.ndarray) -> None:
+        element, shape = _element(declared)
+        if value.shape != shape:
+            raise ValueError(f"array of shape {value.shape}, expected {shape}")
+        array = np.ascontiguousarray(value, _ELEMENTS[element])
+        ffi.memmove(target, ffi.from_buffer(array), array.nbytes)
 
     def _nest(self, kind: str, target: Any, value: Any) -> None:
         if isinstance(value, Struct):
@@ -204,15 +232,15 @@ class Struct:
         if not isinstance(value, np.ndarray | list | tuple):
             self._kept.append(value)
             return value if isinstance(value, ffi.CData) else ffi.cast(declared, value)
-        constant, dimensions = _pointers(kind)[name]
+        constant, shape = _pointers(kind)[name]
         element = declared.item.cname
-        kind_of = _ELEMENTS[element] if element in _ELEMENTS else dtype(element)
-        array = np.ascontiguousarray(value, kind_of)
+        array = np.ascontiguousarray(value, _ELEMENTS.get(element) or dtype(element))
         # numpy returns a view of an array that was unpickled: its type is equal, but another object.
-        if not (constant or (isinstance(value, np.ndarray) and array.ctypes.data == value.ctypes.data)):
+        same = isinstance(value, np.ndarray) and array.ctypes.data == value.ctypes.data
+        if not constant and not (same and array.flags.writeable):
             raise TypeError("expected an array that the core can write to")
-        if dimensions:
-            _measure(array.shape, dimensions, counts)
+        if shape:
+            _measure(array.shape, shape, counts)
         self._kept.append(array)
         return ffi.cast(declared, ffi.from_buffer(array))
 
@@ -237,29 +265,26 @@ class Data:
         return {name: value for name, value in vars(self).items() if name != "struct"}
 
 
-def _measure(shape: tuple[int, ...], dimensions: tuple[str, ...], counts: dict[str, int]) -> None:
+def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:
     """Note the counts that follow from the shape of an array.
 
     Raises:
         ValueError: It has another shape than declared.
     """
-    expected = f"array of shape {shape}, expected ({', '.join(dimensions)})"
-    if len(shape) != len(dimensions):
-        raise ValueError(expected)
-    for size, dimension in zip(shape, dimensions, strict=True):
-        found = _DIMENSION.match(dimension)
-        assert found, dimension
-        number, name, more, greatest = found.groups()
-        count = size - int(more or 0)
-        if (number and size != int(number)) or (name and counts.setdefault(name, count) != count):
-            known = ", ".join(f"{name} = {count}" for name, count in counts.items())
-            raise ValueError(f"{expected}{f' with {known}' if known else ''}")
-        if count < 0 or (greatest and count > int(greatest)):
-            raise ValueError(expected)
+    fits = len(found) == len(declared)
+    for size, dimension in zip(found, declared, strict=False):
+        count = size - dimension.more
+        fits = fits and dimension.size in (None, size) and 0 <= count <= (dimension.greatest or count)
+        if dimension.counts:
+            fits = fits and counts.setdefault(dimension.counts, count) == count
+    if not fits:
+        known = ", ".join(f"{name} = {count}" for name, count in counts.items())
+        expected = ", ".join(dimension.text for dimension in declared)
+        raise ValueError(f"array of shape {found}, expected ({expected}){f' with {known}' if known else ''}")
 
 
 class Callback:
-    """A Python function as a step function of ``hsv_block.h``, for as long as this object lives; keeps its exception."""
+    """A Python function as a step function of ``hsv_block.h`` while this object lives; keeps its exception."""
 
     def __init__(self, function: Callable[[int, Any, Any], None]) -> None:
         """Call ``function`` with k and the pointers to its inputs and outputs."""
@@ -275,7 +300,7 @@ def _keep_exception(kind: type[BaseException], error: BaseException, traceback: 
     callback.error = error
 
 
-@ffi.def_extern(name="hsv_call_python", error=1, onerror=_keep_exception)  # type: ignore[misc]
+@ffi.def_extern(name="hsv_call_python", error=1, onerror=_keep_exception)
 def _call_python(k: int, given: Any, out: Any, state: Any, par: Any) -> int:
     ffi.from_handle(ffi.cast("void *", state)).function(k, given, out)
     return 0

@@ -20,7 +20,8 @@ void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_fault
                double *measurement)
 {
     if (plant->sensors.ideal && faults->sensor.count == 0)
-        memcpy(measurement, x, STATES * sizeof *x);
+        for (int i = 0; i < STATES; i++)
+            measurement[i] = memory->sensors[i].given = x[i]; /* a sensor that drops out later holds it */
     else
         hsv_measure(&plant->sensors, memory->sensors, &faults->sensor, k, plant->seed, x, measurement);
     hsv_receive(&plant->link, memory->link, memory->payloads, k, plant->seed, measurement, STATES);

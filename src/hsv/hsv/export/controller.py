@@ -1,4 +1,4 @@
-"""Notch filter, nominal trajectory and tube law of a design as C99 for ``hsv_block.h``: the core's headers and numbers."""
+"""Notch filter, nominal trajectory and tube law of a design as blocks of ``hsv_block.h`` in C99."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ SOURCE = "controller.c"
 NUMBERS = "design.h"
 HEADER = "hsv_block.h"
 CORE_HEADERS = ("core.h", "vehicle_fields.h", "real.h", "notch_filter.h", "nominal.h", "tube_law.h")
+_COUNTS = ("multiplications", "additions", "comparisons", "numbers of state")
 
 
 @dataclass(frozen=True)
@@ -55,23 +56,23 @@ def controller_files(design: ControlDesign) -> dict[str, str]:
 
 def design_header(design: ControlDesign) -> str:
     """Return the header with the numbers of ``design``, as structs of core.h."""
-    rows = [
-        f"{name:18} {'  '.join(f'{n:15}' for n in vars(most).values())}" for name, most in step_bounds(design).items()
-    ]
+    about = (
+        f"The digest of the design is {design.to_parameters()['design.hash']}. This file is written by "
+        '"hsv export-controller"; write it anew instead of changing it.',
+        f'The tube is certified for the inertial coupling "{_plain(design.coupling)}" and the factors tau that '
+        f"tube_law admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h describes "
+        "the arrays.",
+        "Maximum number of operations in a step, step 0 included; a division counts as a multiplication, a subtraction "
+        "as an addition:",
+    )
+    rows = [("block", *_COUNTS), *((name, *vars(most).values()) for name, most in step_bounds(design).items())]
     # The factors tau are a parameter of the block, so that the gain is F alone.
     tube = replace(TubeLaw(design).kernel, gains=design.feedback_gain[None])
     lines = [
-        f'/* Numbers of the design "{_plain(design.name)}", whose digest is',
-        f" * {design.to_parameters()['design.hash']}:",
-        ' * written by "hsv export-controller"; write them anew instead of changing them.',
+        f'/* Numbers of the design "{_plain(design.name)}".',
+        *(f" *\n{textwrap.fill(text, 119, initial_indent=' * ', subsequent_indent=' * ')}" for text in about),
         " *",
-        f' * The tube is certified for the inertial coupling "{_plain(design.coupling)}" and the factors tau that tube_law',
-        f" * admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h describes the",
-        " * arrays. Maximum number of operations in a step, step 0 included; a division counts as a multiplication, a",
-        " * subtraction as an addition:",
-        " *",
-        " *   block              multiplications        additions      comparisons  numbers of state",
-        *(f" *   {row}" for row in rows),
+        *(f" *   {name:18}{''.join(f'{count:>17}' for count in counts)}" for name, *counts in rows),
         " */",
         "#ifndef DESIGN_H",
         "#define DESIGN_H",

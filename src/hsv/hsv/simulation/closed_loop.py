@@ -1,4 +1,4 @@
-"""The closed loop in one process: the core flies it with the same arithmetic, in the same order, as the graph of nodes."""
+"""The closed loop in one process: the core flies it with the arithmetic and the order of the graph of nodes."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def vehicle_struct(vehicle: VehicleParameters) -> Struct:
 
 def forces(
     x: np.ndarray, u: np.ndarray, p: VehicleParameters, conditions: np.ndarray | None = None
-) -> tuple[float, ...]:
+) -> tuple[float, float, float, float, float]:
     """Return lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa.
 
     Paper eq. 2, eq. 3. Lift is across the inertial path, drag along it.
@@ -58,7 +58,8 @@ def forces(
     """
     found = ffi.new("double[6]")
     lib.hsv_forces(doubles(vector(x)), doubles(vector(u)), vehicle_struct(p).pointer, _conditions(conditions), found)
-    return tuple(found)[:5]
+    lift, drag, thrust, moment, pressure, _ = found
+    return lift, drag, thrust, moment, pressure
 
 
 def air_relative(velocity: float, path_angle: float, forward: float, up: float) -> tuple[float, float, float, float]:
