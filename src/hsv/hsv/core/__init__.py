@@ -36,7 +36,7 @@ __all__ = [
 ]
 
 _STRUCT = re.compile(r"typedef struct \{(.*?)\n\} (\w+);", re.DOTALL)
-_POINTER = re.compile(r"(const )?\w+ \*(\w+); *(?:/\* \(([^)]*)\))?")
+_POINTER = re.compile(r"(const )?\w+ \*(\w+); *(?:/\* (?:\(([^)]*)\))?(.*?)\*/)?")
 _DIMENSION = re.compile(r"(\d+|\w+)(?: \+ (\d+))?(?: <= (\d+))?")
 _LANES = {"sse2": 1, "avx2": 4, "avx512": 8}
 _ELEMENTS = {"double": np.dtype(float), "int64_t": np.dtype(np.int64), "uint8_t": np.dtype(np.uint8)}
@@ -63,6 +63,7 @@ class _Pointer(NamedTuple):
 
     constant: bool
     shape: tuple[_Dimension, ...]
+    optional: bool
 
 
 @cache
@@ -70,8 +71,8 @@ def _pointers(kind: str) -> dict[str, _Pointer]:
     text = files("hsv.core").joinpath("core.h").read_text(encoding="utf-8")
     [body] = [body for body, name in _STRUCT.findall(text) if name == kind]
     return {
-        name: _Pointer(bool(constant), tuple(map(_Dimension.read, filter(None, shape.split(",")))))
-        for constant, name, shape in _POINTER.findall(body)
+        name: _Pointer(bool(constant), tuple(map(_Dimension.read, filter(None, shape.split(",")))), "NULL" in words)
+        for constant, name, shape, words in _POINTER.findall(body)
     }
 
 
@@ -86,9 +87,15 @@ def _element(declared: Any) -> tuple[str, tuple[int, ...]]:
 
 @cache
 def dtype(kind: str) -> np.dtype[Any]:
-    """Return the numpy type of a struct of core.h that holds no pointers."""
+    """Return the numpy type of a struct of core.h.
+
+    Raises:
+        TypeError: It holds pointers or other structs.
+    """
     fields = ffi.typeof(kind).fields
     elements = [_element(field.type) for _, field in fields]
+    if not {element for element, _ in elements} <= {*_ELEMENTS}:
+        raise TypeError(f"expected a Struct {kind}")
     return np.dtype(
         {
             "names": [name for name, _ in fields],
@@ -223,17 +230,20 @@ class Struct:
             self._fill(kind, target, value)
 
     def _address(self, kind: str, name: str, declared: Any, value: Any, counts: dict[str, int]) -> Any:
-        if value is None:
+        pointer = _pointers(kind).get(name)  # of a function there is none
+        if value is None and (pointer is None or pointer.optional):
             return ffi.NULL
         value = value.struct if isinstance(value, Data) else value
         if isinstance(value, Struct):
             self._kept.append(value)
             return value.pointer
-        if not isinstance(value, np.ndarray | list | tuple):
+        if pointer is None or isinstance(value, ffi.CData):
             self._kept.append(value)
             return value if isinstance(value, ffi.CData) else ffi.cast(declared, value)
-        constant, shape = _pointers(kind)[name]
+        constant, shape, _ = pointer
         element = declared.item.cname
+        if np.iscomplexobj(value):
+            raise TypeError("complex numbers, expected real ones")
         array = np.ascontiguousarray(value, _ELEMENTS.get(element) or dtype(element))
         # numpy returns a view of an array that was unpickled: its type is equal, but another object.
         same = isinstance(value, np.ndarray) and array.ctypes.data == value.ctypes.data

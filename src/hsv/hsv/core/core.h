@@ -220,8 +220,8 @@ typedef struct {
 typedef int32_t (*hsv_step_function)(int64_t k, const double *in, double *out, double *state, const double *par);
 typedef struct {
     hsv_step_function function; /* NULL: the core's own law flies */
-    double *state;
-    const double *par;
+    double *state;     /* or NULL */
+    const double *par; /* or NULL */
 } hsv_call;
 
 /* Invariant set of the tube: (e - c)' P (e - c) <= 1 for the errors of the rigid states and of the notch filter. */

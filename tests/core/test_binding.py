@@ -1,0 +1,155 @@
+"""Structs of the core: filled by the names of fields, with arrays of the declared shapes, or refused in one line."""
+
+import pickle
+import re
+from dataclasses import fields, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from flights import components
+
+from hsv.control.design_file import find_design, read_design
+from hsv.control.nominal_trajectory import nominal_data
+from hsv.control.notch_filter import NotchSection, discretise
+from hsv.core import Data, Struct, dtype, ffi, instruction_set, lanes, lib
+from hsv.errors import ParameterError
+from hsv.simulation.closed_loop import flight_struct
+from hsv.simulation.history import History
+from hsv.vehicle.parameters import VehicleParameters
+from hsv.vehicle.vehicle import load_vehicle
+
+NOTCH = discretise([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(20.0, 0.05, 21.0, 0.6)], 0.02)
+
+
+def test_fields_of_the_vehicle_are_those_of_the_core_in_its_order():
+    assert [name for name, _ in ffi.typeof("hsv_vehicle").fields] == list(VehicleParameters._fields)
+    vehicle = load_vehicle().coupled()
+    struct = Struct("hsv_vehicle", vehicle)
+    assert tuple(getattr(struct.pointer, name) for name in vehicle._fields) == vehicle
+
+
+def test_counts_follow_from_shapes():
+    assert NOTCH.pointer.sections == 2
+    assert [NOTCH.pointer.A[i] for i in range(8)] == NOTCH.A.ravel().tolist()
+    nominal = nominal_data(read_design(find_design("smooth"))).pointer
+    assert nominal.count > 1 and nominal.interpolated
+    assert nominal.polytope.vertices == nominal.polytope.altitude.vertices * nominal.polytope.velocity.vertices
+    assert nominal.polytope.size % lib.SUMS == 0
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"B": NOTCH.B[:1]}, "hsv_notch.B: array of shape (1, 2), expected (sections, 2) with sections = 2"),
+        ({"A": NOTCH.A[:, 0]}, "hsv_notch.A: array of shape (2, 2), expected (sections <= 4, 2, 2)"),
+        ({"A": np.zeros((5, 2, 2))}, "hsv_notch.A: array of shape (5, 2, 2), expected (sections <= 4, 2, 2)"),
+        ({"D": "no numbers"}, "hsv_notch.D: "),
+        ({"G": None}, "hsv_notch.G: "),
+    ],
+)
+def test_arrays_of_other_shapes_are_refused_by_name(changes, message):
+    given = SimpleNamespace(**{field.name: getattr(NOTCH, field.name) for field in fields(NOTCH)} | changes)
+    with pytest.raises(ParameterError, match=re.escape(message)) as refused:
+        Struct("hsv_notch", given)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_field_that_is_missing_or_no_number_is_named():
+    with pytest.raises(ParameterError, match=r"hsv_vehicle\.mass: .* no attribute"):
+        Struct("hsv_vehicle", SimpleNamespace())
+    with pytest.raises(ParameterError, match=r"hsv_vehicle\.gravity: "):
+        Struct("hsv_vehicle", load_vehicle().coupled()._replace(gravity="9.81 m"))
+
+
+def test_what_the_core_writes_to_is_never_a_copy():
+    memory = components("case1", duration=1.0).plant.memory()
+    for wrong in (memory.actuators.astype(np.float32), memory.actuators.tolist(), np.asfortranarray(memory.actuators)):
+        with pytest.raises(
+            ParameterError, match=r"hsv_plant_memory\.actuators: expected an array that the core can wri"
+        ):
+            Struct("hsv_plant_memory", memory._replace(actuators=wrong))
+
+
+def test_data_are_pickled_and_point_to_arrays_of_their_own():
+    copied = pickle.loads(pickle.dumps(NOTCH))
+    assert NOTCH.struct is NOTCH.struct and copied.pointer != NOTCH.pointer
+    assert copied.pointer.sections == 2 and np.array_equal(copied.A, NOTCH.A)
+    parts = pickle.loads(pickle.dumps(components("case1_hard_sensors", duration=1.0)))
+    before = parts.plant.step(parts.plant.initial.input).state
+    assert np.array_equal(parts.plant._memory.command, parts.plant.initial.input) and np.isfinite(before).all()
+
+
+def test_records_have_the_layout_of_the_core():
+    for kind in ("hsv_fault", "hsv_fault_memory", "hsv_sensor_memory", "hsv_tube_memory"):
+        assert dtype(kind).itemsize == ffi.sizeof(kind)
+        assert dtype(kind).names == tuple(name for name, _ in ffi.typeof(kind).fields)
+
+
+def test_the_instructions_are_those_of_the_processor_or_fewer(monkeypatch):
+    instruction_set.cache_clear()
+    monkeypatch.setenv("HSV_CORE", "sse2")
+    assert (instruction_set(), lanes()) == ("sse2", 1)
+    instruction_set.cache_clear()
+    monkeypatch.setenv("HSV_CORE", "mmx")
+    with pytest.raises(ParameterError, match="HSV_CORE = .mmx.: expected one of sse2"):
+        instruction_set()
+    monkeypatch.undo()
+    instruction_set.cache_clear()
+
+
+WRONG = (
+    None,
+    "",
+    "text",
+    [],
+    {},
+    object(),
+    np.nan,
+    2**80,
+    -1,
+    np.zeros(0),
+    np.zeros(3),
+    np.zeros((2, 2)),
+    np.zeros((5, 9, 9)),
+    np.zeros((2, 9), complex),
+    np.full((2, 2), "x"),
+    b"bytes",
+)
+
+
+def test_ten_thousand_random_parameter_sets_are_filled_or_refused_in_one_line():
+    random = np.random.default_rng(11)
+    parts = components("case1_active", duration=1.0)
+    flight = flight_struct(parts, History.empty(51))
+    known = [
+        ("hsv_notch", NOTCH),
+        ("hsv_plant", parts.plant.data),
+        ("hsv_plant_memory", parts.plant.memory()),
+        ("hsv_nominal", parts.nominal_trajectory.data),
+        ("hsv_polytope", parts.nominal_trajectory.data.polytope),
+        ("hsv_reference", parts.nominal_trajectory.reference.data),
+        ("hsv_tube", parts.controller.kernel),
+        ("hsv_effectiveness", parts.controller.kernel.effectiveness),
+        ("hsv_link", parts.fault_injector.link),
+        ("hsv_actuators", parts.plant.data.actuators),
+        ("hsv_sensors", parts.plant.data.sensors),
+        ("hsv_atmosphere", parts.plant.data.atmosphere),
+        ("hsv_flight", flight.source),
+    ]
+    refused = 0
+    for _ in range(10_000):
+        kind, source = known[random.integers(len(known))]
+        own = source._fields if isinstance(source, tuple) else vars(source)
+        names = [name for name, _ in ffi.typeof(kind).fields if name in own]
+        changes = {names[random.integers(len(names))]: WRONG[random.integers(len(WRONG))] for _ in range(2)}
+        if isinstance(source, SimpleNamespace):
+            given = SimpleNamespace(**vars(source) | changes)
+        else:
+            given = replace(source, **changes) if isinstance(source, Data) else source._replace(**changes)
+        try:
+            Struct(kind, given)
+        except ParameterError as error:
+            refused += 1
+            assert "\n" not in str(error) and str(error).startswith("hsv_")
+    assert refused > 5000

@@ -1,0 +1,132 @@
+"""Other builds of the core: with sanitizers, other compilers and levels of optimisation; golden flights as ever."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCES = ROOT / "src" / "hsv"
+STRICT = "-Wall -Wextra -Werror"
+
+PROGRAM = """
+import json, sys
+sys.path[:0] = [{tests!r}, {support!r}]
+from test_golden_flights import LINES, compare_three_ways
+import hsv.core
+assert hsv.core.__file__.startswith({folder!r}), hsv.core.__file__
+compare_three_ways(range({first}, len(LINES), {stride}))
+print(hsv.core.instruction_set())
+"""
+
+
+def build(folder, compiler="", flags=""):
+    """Build the package with its core into a folder, from a copy of its sources; return the folder to import from."""
+    copy, library = folder / "hsv", folder / "library"
+    shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("*.so", "build", "*.egg-info", "__pycache__"))
+    command = [sys.executable, "setup.py", "-q", "build", "--build-base", str(folder / "base"), "--build-lib", library]
+    environment = (
+        os.environ | {"HSV_CFLAGS": flags} | ({"CC": compiler, "LDSHARED": f"{compiler} -shared"} if compiler else {})
+    )
+    built = subprocess.run(command, cwd=copy, env=environment, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr[-3000:]
+    return library
+
+
+def fly(library, first, stride, **environment):
+    """Fly golden flights three ways with the core of a build; return the instructions that it used."""
+    program = PROGRAM.format(
+        tests=str(ROOT / "tests" / "simulation"),
+        support=str(ROOT / "tests" / "support"),
+        folder=str(library),
+        first=first,
+        stride=stride,
+    )
+    flown = subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {"PYTHONPATH": str(library)} | environment,
+        capture_output=True,
+        text=True,
+    )
+    assert (flown.returncode, flown.stderr) == (0, ""), flown.stderr[-3000:]
+    return flown.stdout.strip()
+
+
+def sanitized(folder):
+    """Build with both sanitizers; return the folder to import from and the environment that they need."""
+    library = build(folder, "gcc", "-O1 -fsanitize=address,undefined -fno-sanitize-recover=all")
+    runtime = subprocess.run(["gcc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True)
+    # Python and numpy keep memory to their end.
+    return library, {"LD_PRELOAD": runtime.stdout.strip(), "ASAN_OPTIONS": "detect_leaks=0"}
+
+
+def test_flights_under_the_address_and_undefined_behaviour_sanitizers(tmp_path):
+    library, environment = sanitized(tmp_path)
+    fly(library, 7, 60, **environment)
+
+
+@pytest.mark.long
+def test_all_flights_and_the_binding_under_the_sanitizers(tmp_path):
+    library, environment = sanitized(tmp_path)
+    fly(library, 0, 2, **environment)
+    words = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        str(ROOT / "tests" / "core" / "test_binding.py"),
+    ]
+    tested = subprocess.run(
+        words, env=os.environ | {"PYTHONPATH": str(library)} | environment, cwd=ROOT, capture_output=True, text=True
+    )
+    assert tested.returncode == 0, tested.stdout[-3000:]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("level", ["-O0", "-O3"])
+def test_any_compiler_and_level_of_optimisation_gives_the_same_bits(tmp_path, compiler, level):
+    if not shutil.which(compiler):
+        pytest.skip(f"no {compiler}")
+    library = build(tmp_path, compiler, f"{level} {STRICT} -Wno-unused-parameter -Wno-missing-field-initializers")
+    widest = fly(library, 3, 30)
+    for instructions in ("sse2", "avx2", "avx512"):
+        if instructions <= widest or instructions == "sse2":
+            assert fly(library, 3, 30, HSV_CORE=instructions) == instructions
+
+
+def test_the_core_compiles_without_warnings(tmp_path):
+    for source in sorted((SOURCES / "hsv" / "core").glob("[a-z]*.c")):
+        command = ["gcc", "-std=gnu99", "-O1", "-ffp-contract=off", "-Wno-psabi", *STRICT.split(), "-c", source]
+        compiled = subprocess.run([*command, "-o", tmp_path / "out.o"], capture_output=True, text=True)
+        assert (compiled.returncode, compiled.stderr) == (0, ""), source
+
+
+@pytest.mark.long
+def test_a_fault_in_a_formula_is_seen(tmp_path):
+    # The golden flights themselves are tested: a density that is off in its last digit is another flight.
+    library = build(tmp_path)
+    header = tmp_path / "hsv" / "hsv" / "core" / "vehicle.h"
+    text = header.read_text()
+    assert "0.5 * density" in text
+    header.write_text(text.replace("0.5 * density", "0.5000000000000001 * density"))
+    shutil.rmtree(library)
+    command = [
+        sys.executable,
+        "setup.py",
+        "-q",
+        "build",
+        "--force",
+        "--build-base",
+        tmp_path / "base",
+        "--build-lib",
+        library,
+    ]
+    subprocess.run(command, cwd=tmp_path / "hsv", check=True, capture_output=True)
+    with pytest.raises(AssertionError):
+        fly(library, 3, 100)
