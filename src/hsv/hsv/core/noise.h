@@ -11,13 +11,8 @@
 #define NOISE_H
 #include "elementary.h"
 
-/* Return the high word of the product of two words of 64 bits. */
-static inline uint64_t high_product(uint64_t a, uint64_t b)
-{
-    const uint64_t half = 0xFFFFFFFF, a_low = a & half, a_high = a >> 32, b_low = b & half, b_high = b >> 32;
-    const uint64_t middle = a_high * b_low + (a_low * b_low >> 32), other = a_low * b_high + (middle & half);
-    return a_high * b_high + (middle >> 32) + (other >> 32);
-}
+/* The high word of the product of two words of 64 bits. */
+static inline uint64_t high_product(uint64_t a, uint64_t b) { return (uint64_t)((unsigned __int128)a * b >> 64); }
 
 void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words)
 {
