@@ -1,13 +1,10 @@
 """The documentation's build (make docs)."""
 
-import os
 import re
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
-# Undecorated, compiled functions are Python functions, with signature and docstring.
-os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 import reference_pages  # noqa: E402
 import repository_pages  # noqa: E402

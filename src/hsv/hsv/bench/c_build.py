@@ -30,7 +30,7 @@ def c_flight(components: Components) -> Callable[[], History]:
     core = Path(str(files("hsv.core")))
     with tempfile.TemporaryDirectory(prefix="hsv_bench_") as folder:
         library = compiled(Path(folder, "flight.so"), [core / "scalar.c", core / "complex.c"], "gnu99")
-        loop = ctypes.CDLL(str(library)).hsv_fly_1
+        loop = ctypes.CDLL(str(library)).hsv_fly_single
     loop.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64, ctypes.c_int64]
     history = History.empty(components.plant.steps + 1, estimated=False)
     flight, memory = flight_struct(components, history), loop_memory(1)

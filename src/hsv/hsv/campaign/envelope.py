@@ -9,7 +9,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.core import doubles, ffi, lib
 from hsv.simulation.metrics import FlightCurves
 
 WINDOWS = 400
@@ -57,16 +56,18 @@ class Envelope:
 
     def add(self, flight: FlightCurves, steps: int) -> None:
         """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
-        starts, curves = window_starts(steps, len(self.count)), signals(flight)
-        stride = curves.strides[0] // curves.itemsize
-        lib.hsv_envelope(
-            *curves.shape,
-            stride,
-            ffi.cast("double *", curves.ctypes.data),
-            len(starts),
-            ffi.from_buffer("int64_t[]", starts),
-            *map(doubles, (self.low, self.high, self.total, self.count)),
-        )
+        curves = signals(flight)
+        rows = curves.shape[1]
+        starts = window_starts(steps, len(self.count))
+        starts = starts[starts < rows]
+        reached = slice(len(starts))
+        finite = np.where(np.isfinite(curves), curves, np.nan)
+        self.low[reached] = np.fmin(self.low[reached], np.fmin.reduceat(finite, starts, axis=1).T)
+        self.high[reached] = np.fmax(self.high[reached], np.fmax.reduceat(finite, starts, axis=1).T)
+        means = np.add.reduceat(finite, starts, axis=1).T / np.diff(starts, append=rows)[:, None]
+        whole = np.isfinite(means).all(axis=1)
+        self.total[reached][whole] += means[whole]
+        self.count[reached] += whole
 
     def merge(self, other: Envelope) -> None:
         """Take in all flights of ``other``."""

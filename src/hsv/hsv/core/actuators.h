@@ -9,8 +9,7 @@
  * Order: dynamics with the limits that faults leave; scale, bias, drift and oscillation of the effector; what replaces
  * its position, the newest of which wins; the stops.
  */
-#ifndef ACTUATORS_H
-#define ACTUATORS_H
+#pragma once
 #include "faults.h"
 
 enum { POSITION, RATE };
@@ -47,15 +46,13 @@ void hsv_actuator_step(int64_t order, const double *map, const double *state, do
     } else if (order == 1)
         moved = target + map[0] * (position - target);
     const double reach = rate_limit * h;
-    if (magnitude(moved - position) > reach)
-        moved = position + (moved > position ? reach : -reach);
+    if (magnitude(moved - position) > reach) moved = position + (moved > position ? reach : -reach);
     const double low = minimum(minimum_stop, position), high = maximum(maximum_stop, position);
     if (moved <= low)
         moved = low, speed = maximum(speed, 0.0);
     else if (moved >= high)
         moved = high, speed = minimum(speed, 0.0);
-    if (order < 2)
-        speed = (moved - position) / h;
+    if (order < 2) speed = (moved - position) / h;
     out[0] = moved, out[1] = speed;
     out[2] = order > 0 || rate_limit < INFINITY ? 0.5 * (position + moved) : moved;
 }
@@ -66,12 +63,9 @@ static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, 
 {
     const double *p = fault->parameter;
     switch (fault->code) {
-    case SCALE:
-        return p[0] * position;
-    case BIAS:
-        return position + p[0];
-    case DRIFT:
-        return position + limited(p[0] * elapsed, -p[1], p[1]);
+    case SCALE: return p[0] * position;
+    case BIAS: return position + p[0];
+    case DRIFT: return position + limited(p[0] * elapsed, -p[1], p[1]);
     case OSCILLATION:
     case SOLID_OSCILLATION: {
         const double turns = p[1] * elapsed;
@@ -79,14 +73,10 @@ static double deflected(const hsv_fault *fault, const hsv_fault_memory *memory, 
         sine_cosine(6.283185307179586 * (turns - __builtin_floor(turns)) + p[2], &sine, &cosine);
         return (fault->code == OSCILLATION ? position : memory->kept) + p[0] * sine;
     }
-    case LOCK:
-        return memory->kept;
-    case LOCK_AT:
-        return p[0];
-    case FLOAT: /* at zero, or along the flow */
-        return -p[0] * alpha;
-    case HARD_OVER:
-        return memory->kept + p[0] * since;
+    case LOCK: return memory->kept;
+    case LOCK_AT: return p[0];
+    case FLOAT: /* at zero, or along the flow */ return -p[0] * alpha;
+    case HARD_OVER: return memory->kept + p[0] * since;
     }
     return position;
 }
@@ -106,8 +96,7 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
         int changed = length != 1.0;
         for (int64_t i = 0; i < faults->count; i++) {
             const hsv_fault *fault = &faults->rows[i];
-            if (!faults->memory[i].acting || fault->channel != channel)
-                continue;
+            if (!faults->memory[i].acting || fault->channel != channel) continue;
             if (fault->code == BANDWIDTH && fault->parameter[0] < frequency) {
                 frequency = fault->parameter[0];
                 order = order > 1 ? order : 1;
@@ -129,12 +118,9 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
         for (int64_t i = 0; i < faults->count; i++) {
             const hsv_fault *fault = &faults->rows[i];
             hsv_fault_memory *memory = &faults->memory[i];
-            if (!memory->acting || fault->channel != channel || fault->code < SCALE)
-                continue;
-            if (memory->onset == (double)k && substep == 0.0)
-                memory->kept = effector[channel];
-            if (fault->code >= LOCK)
-                replaced = fault->code != FLOAT;
+            if (!memory->acting || fault->channel != channel || fault->code < SCALE) continue;
+            if (memory->onset == (double)k && substep == 0.0) memory->kept = effector[channel];
+            if (fault->code >= LOCK) replaced = fault->code != FLOAT;
             const double elapsed = ((double)k - fault->start) * faults->period + middle;
             const double since = ((double)k - memory->onset) * faults->period + middle;
             position = deflected(fault, memory, elapsed, since, alpha, position);
@@ -146,4 +132,3 @@ void hsv_move_effectors(const hsv_actuators *actuators, double *state, hsv_fault
         effector[channel] = position;
     }
 }
-#endif

@@ -9,8 +9,7 @@
  * density varies as a Gauss-Markov process along the path. A gust is (1 - cos) shaped (MIL-F-8785C, CS-25.341), its
  * mean over a period in closed form. Speed of sound: US Standard Atmosphere 1976.
  */
-#ifndef ATMOSPHERE_H
-#define ATMOSPHERE_H
+#pragma once
 #include "noise.h"
 #include "vehicle.h"
 
@@ -87,7 +86,8 @@ void hsv_atmosphere_step(const hsv_atmosphere *air, double *memory, int64_t k, i
     for (int64_t i = 0; i < air->gusts; i++)
         if (k >= air->gust_start[i]) {
             double *distance = &memory[DISTANCE + i];
-            const double mean = hsv_gust_mean(*distance, *distance + way, air->gust_length[i], air->gust_stays[i] != 0.0);
+            const double mean =
+                hsv_gust_mean(*distance, *distance + way, air->gust_length[i], air->gust_stays[i] != 0.0);
             conditions[WIND_FORWARD] += air->gust[2 * i] * mean;
             conditions[WIND_UP] += air->gust[2 * i + 1] * mean;
             *distance = *distance + way;
@@ -101,4 +101,3 @@ double hsv_speed_of_sound(double altitude)
     const double temperature = 216.65 + 0.001 * maximum(geopotential - 20000.0, 0.0);
     return root(1.4 * 287.05287 * temperature);
 }
-#endif

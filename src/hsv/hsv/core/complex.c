@@ -4,17 +4,12 @@
 
 #define STEP 1e-40
 
-static void complex_vehicle_step(const hsv_vehicle *p, const real *x, const real *u, real *out)
-{
-    derivative(x, u, (const Vehicle *)p, NULL, out);
-}
-
 void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out)
 {
     real z[STATES], v[INPUTS], rates[STATES];
     memcpy(z, x, sizeof z);
     memcpy(v, u, sizeof v);
-    complex_vehicle_step(p, z, v, rates);
+    derivative(z, v, (const Vehicle *)p, NULL, rates);
     memcpy(out, rates, sizeof rates);
 }
 
@@ -22,19 +17,18 @@ void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle 
 void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double *A, double *B)
 {
     real z[STATES + INPUTS], rates[STATES];
-    for (int i = 0; i < STATES + INPUTS; i++)
-        z[i] = i < STATES ? x[i] : u[i - STATES];
+    for (int i = 0; i < STATES + INPUTS; i++) z[i] = i < STATES ? x[i] : u[i - STATES];
     for (int j = 0; j < STATES + INPUTS; j++) {
         __imag__ z[j] = STEP;
-        complex_vehicle_step(p, z, z + STATES, rates);
+        derivative(z, z + STATES, (const Vehicle *)p, NULL, rates);
         for (int i = 0; i < STATES; i++)
             *(j < STATES ? A + STATES * i + j : B + INPUTS * i + j - STATES) = __imag__ rates[i] / STEP;
         __imag__ z[j] = 0.0;
     }
 }
 
-/* Write the states (count, 9) one period (count), s, after x (count, 9) with the inputs u (count, 2) held, and STEP times
- * their derivatives (count, 9, 12) by state, input and length of the period: weighted sums are divided once. */
+/* Write the states (count, 9) one period (count), s, after x (count, 9) with the inputs u (count, 2) held, and STEP
+ * times their derivatives (count, 9, 12) by state, input and length of the period: weighted sums are divided once. */
 void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
                      const hsv_vehicle *p, double *end, double *changes)
 {
@@ -43,9 +37,7 @@ void hsv_transitions(int64_t count, const double *x, const double *u, const doub
         for (int j = 0; j < VARIABLES; j++) {
             real z[VARIABLES];
             for (int i = 0; i < VARIABLES; i++)
-                z[i] = i < STATES            ? x[STATES * k + i]
-                       : i < STATES + INPUTS ? u[INPUTS * k + i - STATES]
-                                             : period[k];
+                z[i] = i < STATES ? x[STATES * k + i] : i < STATES + INPUTS ? u[INPUTS * k + i - STATES] : period[k];
             __imag__ z[j] = STEP;
             advance(z, z + STATES, (const Vehicle *)p, NULL, z[VARIABLES - 1], substeps[k]);
             for (int i = 0; i < STATES; i++) {

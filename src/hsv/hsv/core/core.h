@@ -1,32 +1,24 @@
 /* The numeric core as Python sees it. cffi reads what stands between the two marks, so that the layout of a struct is
  * declared once; hsv.core fills structs by the names of their fields and checks every array against the shape in the
  * comment beside it, from which the counts follow. SI units and radians. */
-#ifndef CORE_H
-#define CORE_H
+#pragma once
 #include <stdint.h>
 /* begin */
 typedef double number;
-enum {
-    STATES = 9,
-    INPUTS = 2,
-    RIGID = 5,       /* the first states are those of the rigid body */
-    CONDITIONS = 7,  /* of air and engine, see vehicle.h */
-    MAX_SECTIONS = 4,
-    MAX_DELAY = 50,  /* steps of a delaying fault, and of the latency of a sensor */
-    INTEGRATED = 2,  /* altitude and velocity */
-    HISTORY = 25,    /* x, q_f, x_n, u_n, u, actuator: what the fingerprint is made of */
-    AUXILIARY = 3,   /* index of the nominal gain, input before the limits */
-    SUMS = 12        /* entries of the scheduled model that are summed at a time */
-};
+/* Numbers of states (the first of which are those of the rigid body), inputs, and conditions of air and engine; most
+ * sections of the notch filter, most steps of a delay; integrated states; columns of a history, see
+ * hsv.simulation.history; entries of the scheduled model that are summed at a time. */
+enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
+enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
 enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };
 enum { FUEL, ELEVATOR };
 
-/* Kinds of faults, in the order in which those that act at once are composed, and ways in which they occur. */
+/* clang-format off */
+/* Kinds of faults, of the command, an actuator, an effector, the engine and sensors, in the order of composition. */
 enum {
-    LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, /* of the command */
-    BANDWIDTH, RATE_LIMIT, STOP_LIMIT,          /* of an actuator's dynamics */
-    SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION, /* of an effector */
-    THRUST_LOSS, UNSTART, UNSTART_OUTSIDE, /* of the engine */
+    LOSS, REVERSAL, DELAY, DEAD_ZONE, BACKLASH, BANDWIDTH, RATE_LIMIT, STOP_LIMIT,
+    SCALE, BIAS, DRIFT, OSCILLATION, LOCK, LOCK_AT, FLOAT, HARD_OVER, SOLID_OSCILLATION,
+    THRUST_LOSS, UNSTART, UNSTART_OUTSIDE,
     SENSOR_SCALE, SENSOR_NOISE, SENSOR_BIAS, SENSOR_RUNAWAY, SENSOR_DROP_OUT, SENSOR_FREEZE
 };
 enum { ALWAYS, PERIODIC, RANDOM };
@@ -35,19 +27,12 @@ enum { SSE2, AVX2, AVX512 }; /* instructions; elsewhere than on x86-64, the firs
 /* First stream of random numbers of each block, which has 256 of them. A number that was assigned once stays: flights
  * are repeated by it. */
 enum {
-    TURBULENCE_FORWARD = 256,
-    TURBULENCE_UP = 512,
-    DENSITY_VARIATION = 768,
-    SENSOR_NOISE_STREAM = 4096,
-    SENSOR_CONSTANTS = 4352,
-    SENSOR_LOSS = 4608,
-    SENSOR_FAULT_NOISE = 4864,
-    SENSOR_FAULT_LOSS = 5120,
-    FAULT_OCCURRENCE = 8192,
-    LINK_LOSS = 12288,
-    LINK_DELAY = 12544,
-    LINK_CORRUPTION = 12800
+    TURBULENCE_FORWARD = 256, TURBULENCE_UP = 512, DENSITY_VARIATION = 768,
+    SENSOR_NOISE_STREAM = 4096, SENSOR_CONSTANTS = 4352, SENSOR_LOSS = 4608,
+    SENSOR_FAULT_NOISE = 4864, SENSOR_FAULT_LOSS = 5120, FAULT_OCCURRENCE = 8192,
+    LINK_LOSS = 12288, LINK_DELAY = 12544, LINK_CORRUPTION = 12800
 };
+/* clang-format on */
 
 typedef struct {
 #include "vehicle_fields.h"
@@ -115,18 +100,15 @@ typedef struct {
 } hsv_tube;
 
 typedef struct {
-    double planned[8];          /* s_n of the filter of the plan */
-    double integral[2];
-    double predicted[9], held[2]; /* of the effectiveness estimator: state of the step before, input held since */
+    double planned[8], integral[2]; /* s_n of the filter of the plan */
+    double predicted[9], held[2];   /* of the effectiveness estimator: state of the step before, input held since */
     double known[9];
 } hsv_tube_memory;
 
 /* Extended Kalman filter of constant gain. */
 typedef struct {
-    double gain[11][5];
-    double start[9];
+    double gain[11][5], start[9], period;
     hsv_vehicle vehicle;
-    double period;
     int64_t substeps;
 } hsv_estimator;
 
@@ -140,10 +122,10 @@ typedef struct {
 
 typedef struct {
     double wind[2], shear, shear_altitude, sigma[2], length[2];
-    const int64_t *gust_start;  /* (gusts) */
-    const double *gust;         /* (gusts, 2) forward, up */
-    const double *gust_length;  /* (gusts) */
-    const double *gust_stays;   /* (gusts) */
+    const int64_t *gust_start; /* (gusts) */
+    const double *gust;        /* (gusts, 2) forward, up */
+    const double *gust_length; /* (gusts) */
+    const double *gust_stays;  /* (gusts) */
     double density_offset, density_sigma, density_length, period;
     int64_t still, gusts;
 } hsv_atmosphere;
@@ -172,7 +154,7 @@ typedef struct {
 typedef struct {
     double start, stop; /* steps [start, stop) */
     int64_t channel, code, occurrence;
-    double cycle[2];      /* period and duty in steps, or probabilities of going and of coming in a step */
+    double cycle[2]; /* period and duty in steps, or probabilities of going and of coming in a step */
     double parameter[12];
 } hsv_fault;
 
@@ -202,13 +184,13 @@ typedef struct {
 } hsv_plant;
 
 typedef struct {
-    double *actuators;           /* (2, 2) position and rate of each */
-    double *command;             /* (2) of the period before */
-    double *effector;            /* (2) */
-    double *atmosphere;          /* (air) */
-    hsv_sensor_memory *sensors;  /* (9) */
-    double *link;                /* (payloads) */
-    double *conditions;          /* (7) */
+    double *actuators;          /* (2, 2) position and rate of each */
+    double *command;            /* (2) of the period before */
+    double *effector;           /* (2) */
+    double *atmosphere;         /* (air) */
+    hsv_sensor_memory *sensors; /* (9) */
+    double *link;               /* (payloads) */
+    double *conditions;         /* (7) */
     int64_t air, payloads;
 } hsv_plant_memory;
 
@@ -220,8 +202,8 @@ typedef struct {
 typedef int32_t (*hsv_step_function)(int64_t k, const double *in, double *out, double *state, const double *par);
 typedef struct {
     hsv_step_function function; /* NULL: the core's own law flies */
-    double *state;     /* or NULL */
-    const double *par; /* or NULL */
+    double *state;              /* or NULL */
+    const double *par;          /* or NULL */
 } hsv_call;
 
 /* Invariant set of the tube: (e - c)' P (e - c) <= 1 for the errors of the rigid states and of the notch filter. */
@@ -231,6 +213,15 @@ typedef struct {
     const double *centre; /* (size) c */
     int64_t size;
 } hsv_tube_set;
+
+/* Actuators over a period: a(k+1) = A a + B c, mean position C a + D c. */
+typedef struct {
+    const double *A; /* (states <= 4, states) */
+    const double *B; /* (states, 2) */
+    const double *C; /* (2, states) */
+    const double *D; /* (2, 2) */
+    int64_t states;
+} hsv_sampled;
 
 /* A flight: what flies, and what it remembers. */
 typedef struct {
@@ -249,14 +240,14 @@ typedef struct {
     hsv_faults *faults; /* on the command */
     hsv_call nominal_law, controller;
     const hsv_tube_set *set; /* NULL: no level is computed */
-    double *history;   /* (rows, 25) */
-    double *auxiliary; /* (rows, 3) */
-    double *estimated; /* (rows, 9), or NULL */
-    int64_t rows;      /* of the history, the first of which is the step at which a piece begins */
-    int64_t ended;     /* steps flown, written where it diverges */
-    int64_t returned;  /* by the controller, written */
-    double answer[2];  /* of the controller, written */
-    double worst;      /* level in the set, written */
+    double *history;         /* (rows, 25) */
+    double *auxiliary;       /* (rows, 3) */
+    double *estimated;       /* (rows, 9), or NULL */
+    int64_t rows;            /* of the history, the first of which is the step at which a piece begins */
+    int64_t ended;           /* steps flown, written where it diverges */
+    int64_t returned;        /* by the controller, written */
+    double answer[2];        /* of the controller, written */
+    double worst;            /* level in the set, written */
 } hsv_flight;
 
 /* Elementary functions and random numbers. */
@@ -274,7 +265,6 @@ void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, doubl
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
 void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out);
 void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
-void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
 void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double *conditions, double period,
                  int64_t substeps);
 int hsv_in_model_range(const double *x, double angle_limit);
@@ -284,8 +274,8 @@ void hsv_transitions(int64_t count, const double *x, const double *u, const doub
 
 /* Equilibria and small linear systems. */
 void hsv_solve(int64_t n, int64_t m, double *A, double *b);
-double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate,
-                   double *unknown, double *x, double *u);
+double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
+                   double *x, double *u);
 void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *command, const double *rate,
                         const double *bend, const double *guess, double period, int64_t substeps, double *state,
                         double *input, double *defect, double *imbalance);
@@ -333,6 +323,7 @@ int64_t hsv_tube_step(const hsv_tube *tube, hsv_tube_memory *memory, int64_t k, 
                       const double *u_n, const double *s, double *u_feedback, double *u_unsaturated, double *u);
 double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_memory *memory, int64_t k,
                               const double *x);
+void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
 void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds);
 double hsv_level(const double *P, int64_t size, const double *x);
 
@@ -347,21 +338,16 @@ int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity,
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation);
 void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, double *filtered, double *states);
-void hsv_respond(int64_t steps, int64_t states, const double *A, const double *B, const double *C, const double *D,
-                 const double *commands, double *before, double *means);
-void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch, int64_t steps,
-                      int64_t states, const double *A, const double *B, const double *C, const double *D,
-                      const double *scheduled, const double *lag, double *errors, double *feedback);
+void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *commands, double *before, double *means);
+void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch,
+                      const hsv_sampled *actuators, int64_t steps, const double *scheduled, const double *lag,
+                      double *errors, double *feedback);
 void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
-                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed,
-                          double *worst);
+                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed, double *worst);
 double hsv_worst_level(const hsv_tube_set *set, int64_t steps, const double *state, const double *deviation,
                        const double *reference);
 void hsv_curves(int64_t steps, int64_t stride, const double *history, const double *auxiliary, const double *reference,
                 double *curves, uint8_t *saturated);
-void hsv_envelope(int64_t signals, int64_t steps, int64_t stride, const double *curves, int64_t windows,
-                  const int64_t *starts, double *low, double *high, double *total, double *count);
 /* end */
 /* Of any argument, for lanes. */
 void hsv_any_sine_cosine(double x, double *sine, double *cosine);
-#endif

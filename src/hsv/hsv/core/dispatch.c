@@ -2,11 +2,11 @@
 #include "core.h"
 
 typedef int64_t Fly(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
-extern Fly hsv_fly_1;
-extern const int64_t hsv_memory_1;
+extern Fly hsv_fly_single;
+extern const int64_t hsv_memory_single;
 #ifdef __x86_64__
-extern Fly hsv_fly_1_avx2, hsv_fly_4, hsv_fly_8;
-extern const int64_t hsv_memory_4, hsv_memory_8;
+extern Fly hsv_fly_avx2_single, hsv_fly_avx2, hsv_fly_avx512;
+extern const int64_t hsv_memory_avx2, hsv_memory_avx512;
 #endif
 
 int hsv_widest(void)
@@ -14,8 +14,7 @@ int hsv_widest(void)
 #ifdef __x86_64__
     if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl"))
         return AVX512;
-    if (__builtin_cpu_supports("avx2"))
-        return AVX2;
+    if (__builtin_cpu_supports("avx2")) return AVX2;
 #endif
     return SSE2;
 }
@@ -24,22 +23,19 @@ int hsv_widest(void)
 int64_t hsv_memory_size(int64_t flights)
 {
 #ifdef __x86_64__
-    if (flights > 1)
-        return flights == 8 ? hsv_memory_8 : hsv_memory_4;
+    if (flights > 1) return flights == 8 ? hsv_memory_avx512 : hsv_memory_avx2;
 #endif
-    (void)flights;
-    return hsv_memory_1;
+    return flights > 0 ? hsv_memory_single : 0;
 }
 
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
 {
-    Fly *fly = hsv_fly_1;
+    Fly *fly = hsv_fly_single;
 #ifdef __x86_64__
     if (count > 1)
-        fly = count == 8 ? hsv_fly_8 : hsv_fly_4;
+        fly = count == 8 ? hsv_fly_avx512 : hsv_fly_avx2;
     else if (instructions != SSE2)
-        fly = hsv_fly_1_avx2;
+        fly = hsv_fly_avx2_single;
 #endif
-    (void)instructions, (void)count;
-    return fly(flights, memory, start, stop);
+    return instructions < SSE2 || count < 1 ? start : fly(flights, memory, start, stop);
 }

@@ -6,27 +6,22 @@
  *
  *   (1 + i) D + b = P (1 + g) e + d + v,   y = D + b,
  *
- * with D the measured change of the pitch rate, b that of the nominal vehicle without elevator and opposite sign, i the
- * relative error of the moment of inertia, g that of the elevator's effect, d a slowly changing disturbance, and v the
- * rest, at most a declared share of e. Every step thus bounds P by an interval; the disturbance is learned while one of
- * these intervals contains P = 1, which is when the elevator is healthy. An interval without 1 is a fault. A loss of
- * effectiveness, y - d proportional to e, and an offset, y - d - e constant, are then followed, each as the intersection
- * of what the steps leave of it. The command is divided by the middle of the interval of P while a loss explains all
- * steps. Source: docs/active_fault_tolerance.md.
+ * D the measured change of the pitch rate, b that of the nominal vehicle without elevator and opposite sign, i and g
+ * the relative errors of inertia and elevator, d a slowly changing disturbance, v the rest, at most a declared share of
+ * e. Every step bounds P by an interval. An interval without P = 1 is a fault; a loss of effectiveness, y - d
+ * proportional to e, and an offset, y - d - e constant, are then followed, each as the intersection of what the steps
+ * leave of it. While a loss explains all steps, the command is divided by the middle of its interval
+ * (docs/active_fault_tolerance.md).
  */
-#ifndef EFFECTIVENESS_H
-#define EFFECTIVENESS_H
+#pragma once
 #include "vehicle.h"
 
 /* What is known: P by which the command is divided, its interval, the interval of an offset (rad/s), the disturbance
  * learned with g = 0 and the effect in that step (rad/s), mode, steps that the explanations have explained. */
 enum { EFFECTIVENESS, LOW, HIGH, OFFSET_LOW, OFFSET_HIGH, DISTURBANCE, EFFECT, MODE, COUNT, KNOWN };
-/* Modes, as numbers. */
-#define HEALTHY 0.0
-#define LOST 1.0    /* a loss of effectiveness explains all steps since the fault */
-#define OTHER 2.0   /* an offset explains them, a loss does not */
-#define PENDING 3.0 /* an explanation has yet to explain more steps before it replaces another */
-#define CONFIRMED 5.0 /* steps */
+/* Modes, as numbers: LOST where a loss of effectiveness explains all steps since the fault, OTHER where only an offset
+ * does, PENDING where an explanation has yet to explain CONFIRMED steps before it replaces another. */
+static const double HEALTHY = 0.0, LOST = 1.0, OTHER = 2.0, PENDING = 3.0, CONFIRMED = 5.0;
 
 typedef struct {
     real low, high;
@@ -94,11 +89,16 @@ static inline void judge(const hsv_effectiveness *data, real *known, mask usable
     disturbance = choose(healthy & (new == HEALTHY), within(learned, greatest), disturbance);
     const Interval kept = kept_where(explained, low, high);
     const Interval kept_offset = kept_where(offset_low <= offset_high, offset_low, offset_high);
-    const real update[KNOWN] = {estimate,         kept.low,    kept.high, kept_offset.low,
-                                kept_offset.high, disturbance, choose(new == HEALTHY, e, known[EFFECT]),
-                                new,              count};
-    for (int i = 0; i < KNOWN; i++)
-        known[i] = choose(usable, update[i], known[i]);
+    const real update[KNOWN] = {estimate,
+                                kept.low,
+                                kept.high,
+                                kept_offset.low,
+                                kept_offset.high,
+                                disturbance,
+                                choose(new == HEALTHY, e, known[EFFECT]),
+                                new,
+                                count};
+    for (int i = 0; i < KNOWN; i++) known[i] = choose(usable, update[i], known[i]);
 }
 
 /* Return the effectiveness by which the elevator command of step k is divided. A step whose measurement is not finite,
@@ -109,10 +109,8 @@ static inline real effectiveness_step(const hsv_effectiveness *data, const Vehic
                                       const real *held, real *known, int64_t k, const real *x)
 {
     if (k == 0) {
-        for (int i = 0; i < STATES; i++)
-            predicted[i] = all(data->start[i]);
-        for (int i = 0; i < KNOWN; i++)
-            known[i] = all(i <= HIGH ? 1.0 : 0.0);
+        for (int i = 0; i < STATES; i++) predicted[i] = all(data->start[i]);
+        for (int i = 0; i < KNOWN; i++) known[i] = all(i <= HIGH ? 1.0 : 0.0);
     } else {
         real with[STATES], without[STATES];
         const real idle[INPUTS] = {held[FUEL], all(0.0)};
@@ -133,8 +131,6 @@ static inline real effectiveness_step(const hsv_effectiveness *data, const Vehic
             predicted[i] = choose(is_finite(now), now, predicted[i]);
         }
     }
-    for (int i = 0; i < RIGID; i++)
-        predicted[i] = x[i];
+    for (int i = 0; i < RIGID; i++) predicted[i] = x[i];
     return known[EFFECTIVENESS];
 }
-#endif

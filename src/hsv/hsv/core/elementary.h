@@ -1,38 +1,29 @@
 /* Elementary functions with the same bits on every processor.
  *
- * Those of libm differ between machines in the last bit. These consist of additions, subtractions, multiplications,
- * divisions and square roots alone; their error is at most one unit in the last place in the ranges stated. Outside the
- * ranges the result is NaN.
+ * Those of libm differ between machines in the last bit. The error of these is at most one unit in the last place in
+ * the ranges stated; outside them the result is NaN.
  *
  * sine_cosine and exponential accept a complex argument whose imaginary part is so small that its square vanishes, as
  * the complex step needs. sine_cosine, exponential and arctangent2 accept lanes.
  *
- * Sources: argument reduction after Cody and Waite; products and sums with their rounding errors after Dekker (1971)
- * and Knuth; power series.
+ * Sources: argument reduction after Cody and Waite; rounding errors after Dekker (1971) and Knuth; power series.
  */
-#ifndef ELEMENTARY_H
-#define ELEMENTARY_H
+#pragma once
 #include "real.h"
 
-#define ANGLE_RANGE 1e5     /* rad, greatest magnitude of an argument of sine, cosine and tangent */
-#define EXPONENT_RANGE 700.0
-#define RATIO_RANGE 1e140   /* greatest magnitude of an argument of the arctangent; the least nonzero one is its inverse */
-#define HALF_PI_1 1.5707963267341256 /* the first 33 bits of pi / 2, the next 33 bits, the remainder */
-#define HALF_PI_2 6.077100506303966e-11
-#define HALF_PI_3 2.0222662487959506e-21
-#define HALF_PI_HIGH 1.5707963267948966
-#define HALF_PI_LOW 6.123233995736766e-17
-#define QUARTER_PI_HIGH 0.7853981633974483
-#define QUARTER_PI_LOW 3.061616997868383e-17
-#define TWO_OVER_PI 0.6366197723675814
-#define LOG_2_HIGH 0.6931471803691238 /* the first 32 bits of log 2, and the remainder */
-#define LOG_2_LOW 1.9082149292705877e-10
-#define LOG_2_INVERSE 1.4426950408889634
-#define ROOT_2 1.4142135623730951
-#define TAN_PI_8 0.41421356237309503
-#define TAN_3_PI_8 2.414213562373095
-#define TO_INTEGER 0x1.8p52   /* added and subtracted again, it rounds to the nearest integer */
-#define SPLIT 0x1.0000002p27  /* splits a number in two of 26 bits each */
+/* Greatest magnitudes of arguments: of sine, cosine and tangent (rad); of the exponential; of the arctangent, whose
+ * least nonzero one is the inverse. */
+static const double ANGLE_RANGE = 1e5, EXPONENT_RANGE = 700.0, RATIO_RANGE = 1e140;
+/* The first 33 bits of pi / 2, the next 33 bits, the remainder; sums of two numbers; the first 32 bits of log 2. */
+static const double HALF_PI_1 = 1.5707963267341256, HALF_PI_2 = 6.077100506303966e-11,
+                    HALF_PI_3 = 2.0222662487959506e-21;
+static const double HALF_PI_HIGH = 1.5707963267948966, HALF_PI_LOW = 6.123233995736766e-17;
+static const double QUARTER_PI_HIGH = 0.7853981633974483, QUARTER_PI_LOW = 3.061616997868383e-17;
+static const double LOG_2_HIGH = 0.6931471803691238, LOG_2_LOW = 1.9082149292705877e-10;
+static const double TWO_OVER_PI = 0.6366197723675814, LOG_2_INVERSE = 1.4426950408889634, ROOT_2 = 1.4142135623730951;
+static const double TAN_PI_8 = 0.41421356237309503, TAN_3_PI_8 = 2.414213562373095;
+/* Added and subtracted again, the first rounds to the nearest integer; the second splits a number in two of 26 bits. */
+static const double TO_INTEGER = 0x1.8p52, SPLIT = 0x1.0000002p27;
 
 /* Return sin y - y for |y| <= pi / 4; the series is summed in pairs. */
 static inline plain sine_rest(plain y)
@@ -87,8 +78,7 @@ static inline plain arctangent_rest(plain high, plain low)
 {
     const plain z = high * high;
     plain series = all(0.0);
-    for (int k = 22; k >= 1; k--)
-        series = series * z + (k % 2 ? -1.0 : 1.0) / (2 * k + 1);
+    for (int k = 22; k >= 1; k--) series = series * z + (k % 2 ? -1.0 : 1.0) / (2 * k + 1);
     return high * z * series + low / (1.0 + z);
 }
 
@@ -130,8 +120,7 @@ void hsv_any_sine_cosine(double x, double *sine, double *cosine)
 
 double hsv_tangent(double x)
 {
-    if (!(__builtin_fabs(x) <= ANGLE_RANGE))
-        return NAN;
+    if (!(__builtin_fabs(x) <= ANGLE_RANGE)) return NAN;
     double s, s_low, c, c_low, high, low;
     turned_terms(x, &s, &s_low, &c, &c_low);
     two_sum(s, s_low, &s, &s_low);
@@ -144,20 +133,25 @@ double hsv_tangent(double x)
 double hsv_arcsine(double x)
 {
     /* (2k)! / (4^k k!^2 (2k + 1)), k = 1 ... 25 */
-    static const double series[] = {
-        0.16666666666666666, 0.075, 0.044642857142857144, 0.030381944444444444, 0.022372159090909092,
-        0.017352764423076924, 0.01396484375, 0.011551800896139705, 0.009761609529194078, 0.008390335809616815,
-        0.0073125258735988454, 0.006447210311889649, 0.005740037670841924, 0.005153309682319905, 0.004660143486915096,
-        0.004240907093679363, 0.003880964558837669, 0.0035692053938259347, 0.003297059503473485, 0.0030578216492580306,
-        0.002846178401108942, 0.00265787063820729, 0.0024894486782468836, 0.002338091892111975, 0.0022014739737101384};
+    static const double series[] = {0.16666666666666666,   0.075,
+                                    0.044642857142857144,  0.030381944444444444,
+                                    0.022372159090909092,  0.017352764423076924,
+                                    0.01396484375,         0.011551800896139705,
+                                    0.009761609529194078,  0.008390335809616815,
+                                    0.0073125258735988454, 0.006447210311889649,
+                                    0.005740037670841924,  0.005153309682319905,
+                                    0.004660143486915096,  0.004240907093679363,
+                                    0.003880964558837669,  0.0035692053938259347,
+                                    0.003297059503473485,  0.0030578216492580306,
+                                    0.002846178401108942,  0.00265787063820729,
+                                    0.0024894486782468836, 0.002338091892111975,
+                                    0.0022014739737101384};
     const double a = __builtin_fabs(x);
-    if (!(a <= 1.0))
-        return NAN;
+    if (!(a <= 1.0)) return NAN;
     /* arcsin a = pi / 2 - 2 arcsin r with r^2 = (1 - a) / 2. */
     const double z = a <= 0.5 ? a * a : 0.5 * (1.0 - a);
     double sum = 0.0, angle;
-    for (int k = 24; k >= 0; k--)
-        sum = sum * z + series[k];
+    for (int k = 24; k >= 0; k--) sum = sum * z + series[k];
     if (a <= 0.5)
         angle = a + a * z * sum;
     else {
@@ -178,8 +172,7 @@ double hsv_arctangent2(double y, double x)
     if (!(a == 0.0 || (1.0 / RATIO_RANGE <= a && a <= RATIO_RANGE)) ||
         !(b == 0.0 || (1.0 / RATIO_RANGE <= b && b <= RATIO_RANGE)))
         return NAN;
-    if (a == 0.0)
-        return x >= 0.0 ? 0.0 : 2.0 * HALF_PI_HIGH;
+    if (a == 0.0) return x >= 0.0 ? 0.0 : 2.0 * HALF_PI_HIGH;
     /* The angle of (b, a) is a multiple of pi / 4 and the angle of another point, at most pi / 8. */
     double base, base_low, high, low;
     if (a <= TAN_PI_8 * b) {
@@ -209,8 +202,7 @@ double hsv_arctangent2(double y, double x)
 /* Return the natural logarithm of a normal positive number. */
 double hsv_logarithm(double x)
 {
-    if (!(DBL_MIN <= x && x <= DBL_MAX))
-        return NAN;
+    if (!(DBL_MIN <= x && x <= DBL_MAX)) return NAN;
     uint64_t bits;
     memcpy(&bits, &x, sizeof bits);
     int exponent = (int)(bits >> 52) - 1023;
@@ -224,8 +216,7 @@ double hsv_logarithm(double x)
     /* log m = 2 artanh s = f - s (f - 2 s^2 (1/3 + s^2/5 + ...)) with f = m - 1, exact, and s = f / (2 + f). */
     const double f = mantissa - 1.0, s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
     double series = 0.0;
-    for (int k = 12; k >= 1; k--)
-        series = series * z + 1.0 / (2 * k + 1);
+    for (int k = 12; k >= 1; k--) series = series * z + 1.0 / (2 * k + 1);
     const double correction = s * (half_square + 2.0 * z * series), count = exponent;
     return count * LOG_2_HIGH - ((half_square - (correction + count * LOG_2_LOW)) - f);
 }
@@ -264,8 +255,7 @@ static inline real arctangent2(real y, real x)
         return choose(y < 0.0, -angle, angle);
     }
     real angle = a;
-    for (int i = 0; i < LANES; i++)
-        lane(angle, i) = hsv_arctangent2(lane(y, i), lane(x, i));
+    for (int i = 0; i < LANES; i++) lane(angle, i) = hsv_arctangent2(lane(y, i), lane(x, i));
     return angle;
 }
 #endif
@@ -286,8 +276,7 @@ static inline real exponential(real x)
 {
     const plain a = real_part(x);
     const mask inside = magnitude(a) <= EXPONENT_RANGE;
-    const plain value = every(inside) ? plain_exponential(a)
-                                      : choose(inside, plain_exponential(choose(inside, a, all(0.0))), all(NAN));
+    const plain value =
+        every(inside) ? plain_exponential(a) : choose(inside, plain_exponential(choose(inside, a, all(0.0))), all(NAN));
     return value * (1.0 + (x - a)); /* the last factor is one where x is real */
 }
-#endif

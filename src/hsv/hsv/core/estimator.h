@@ -2,12 +2,11 @@
  *
  *   x^-(k) = phi_T(x^(k-1), u(k-1) + b(k-1)),   [x^(k); b(k)] = [x^-(k); b(k-1)] + L (y(k) - x^-(k)),
  *
- * with phi_T the equations of motion of the design's vehicle over a period, b an offset of each input that takes up what
- * the model does not know, and L the steady gain about the trim in which the flight starts
+ * with phi_T the equations of motion of the design's vehicle over a period, b an offset of each input that takes up
+ * what the model does not know, and L the steady gain about the trim in which the flight starts
  * (hsv.control.estimator). It uses the measurement y of the rigid states; the elastic ones are predicted.
  */
-#ifndef ESTIMATOR_H
-#define ESTIMATOR_H
+#pragma once
 #include "vehicle.h"
 
 enum { ESTIMATED = STATES + INPUTS };
@@ -17,24 +16,16 @@ static inline void estimate_step(const hsv_estimator *estimator, const Vehicle *
                                  const real *measurement, const real *command, real *estimate)
 {
     if (k == 0) {
-        for (int i = 0; i < STATES; i++)
-            estimate[i] = all(estimator->start[i]);
-        for (int i = 0; i < INPUTS; i++)
-            memory[STATES + i] = all(0.0);
+        for (int i = 0; i < STATES; i++) estimate[i] = all(estimator->start[i]);
+        for (int i = 0; i < INPUTS; i++) memory[STATES + i] = all(0.0);
     } else {
         real held[INPUTS];
-        for (int i = 0; i < STATES; i++)
-            estimate[i] = memory[i];
-        for (int i = 0; i < INPUTS; i++)
-            held[i] = command[i] + memory[STATES + i];
+        for (int i = 0; i < STATES; i++) estimate[i] = memory[i];
+        for (int i = 0; i < INPUTS; i++) held[i] = command[i] + memory[STATES + i];
         advance(estimate, held, vehicle, NULL, all(estimator->period), estimator->substeps);
     }
-    for (int i = 0; i < STATES; i++)
-        memory[i] = estimate[i];
+    for (int i = 0; i < STATES; i++) memory[i] = estimate[i];
     for (int i = 0; i < ESTIMATED; i++)
-        for (int j = 0; j < RIGID; j++)
-            memory[i] += estimator->gain[i][j] * (measurement[j] - estimate[j]);
-    for (int i = 0; i < STATES; i++)
-        estimate[i] = memory[i];
+        for (int j = 0; j < RIGID; j++) memory[i] += estimator->gain[i][j] * (measurement[j] - estimate[j]);
+    for (int i = 0; i < STATES; i++) estimate[i] = memory[i];
 }
-#endif

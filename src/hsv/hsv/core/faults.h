@@ -6,8 +6,7 @@
  * On the command (paper eq. 14, eq. 15): loss of effectiveness, reversal, delay, dead zone, backlash. On the engine:
  * loss of thrust and an unstarted inlet. Faults of actuators and effectors are in actuators.h, of sensors in sensors.h.
  */
-#ifndef FAULTS_H
-#define FAULTS_H
+#pragma once
 #include "noise.h"
 
 /* Note which faults act in step k; return how many do. */
@@ -26,16 +25,14 @@ int64_t hsv_begin_faults(hsv_faults *faults, int64_t k, int64_t seed)
                 memory->away = 0;
             else {
                 const double drawn = first_uniform(seed, k, FAULT_OCCURRENCE + fault->code, fault->channel);
-                if (drawn < fault->cycle[memory->away])
-                    memory->away = !memory->away;
+                if (drawn < fault->cycle[memory->away]) memory->away = !memory->away;
             }
             acts = !memory->away;
         }
         memory->acting = acts;
         if (acts) {
             acting++;
-            if (memory->last != step - 1.0)
-                memory->onset = step;
+            if (memory->last != step - 1.0) memory->onset = step;
             memory->last = step;
         }
     }
@@ -46,13 +43,11 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
 {
     double value = fault->parameter[0];
     const int fresh = memory->onset == (double)k;
-    if (fresh)
-        memory->kept = command;
+    if (fresh) memory->kept = command;
     switch (fault->code) {
     case LOSS: {
         const double ramp = fault->parameter[1], elapsed = ((double)k - fault->start) * period;
-        if (elapsed < ramp)
-            value = 1.0 + (value - 1.0) * (elapsed / ramp);
+        if (elapsed < ramp) value = 1.0 + (value - 1.0) * (elapsed / ramp);
         return value * command;
     }
     case REVERSAL: /* the whole command, or its change since the start of the fault */
@@ -60,15 +55,13 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
     case DELAY: {
         const int64_t size = (int64_t)value + 1;
         if (fresh)
-            for (int64_t j = 0; j < size; j++)
-                memory->queue[j] = command;
+            for (int64_t j = 0; j < size; j++) memory->queue[j] = command;
         memory->queue[k % size] = command;
         return memory->queue[(k + 1) % size];
     }
     case DEAD_ZONE: {
         const double off = command - memory->kept;
-        if (magnitude(off) <= 0.5 * value)
-            return memory->kept;
+        if (magnitude(off) <= 0.5 * value) return memory->kept;
         return off > 0.0 ? command - 0.5 * value : command + 0.5 * value;
     }
     case BACKLASH:
@@ -81,8 +74,7 @@ static double commanded(const hsv_fault *fault, hsv_fault_memory *memory, int64_
 /* Replace the command by what reaches the actuators. */
 void hsv_apply_command_faults(hsv_faults *faults, int64_t k, int64_t seed, double *actuator)
 {
-    if (hsv_begin_faults(faults, k, seed) == 0)
-        return;
+    if (hsv_begin_faults(faults, k, seed) == 0) return;
     for (int64_t i = 0; i < faults->count; i++)
         if (faults->memory[i].acting) {
             double *channel = &actuator[faults->rows[i].channel];
@@ -96,18 +88,15 @@ static int unstarted(const hsv_fault *fault, hsv_fault_memory *memory, int64_t k
                      double mach, double fuel)
 {
     const double *p = fault->parameter, step = (double)k;
-    if (memory->onset == step)
-        memory->kept = 0.0;
+    if (memory->onset == step) memory->kept = 0.0;
     const double off_alpha = (alpha - p[5]) / p[6], off_mach = (mach - p[7]) / p[8], limit = p[9];
     const double distance = off_alpha * off_alpha + off_mach * off_mach;
     if (memory->kept == 0.0) {
-        if (distance > 1.0 || fuel > limit)
-            memory->kept = 1.0, memory->since = step;
+        if (distance > 1.0 || fuel > limit) memory->kept = 1.0, memory->since = step;
     } else {
         const double regained = 1.0 - p[10];
         const int long_enough = (step - memory->since) * period >= p[11];
-        if (long_enough && distance < regained * regained && fuel < regained * limit)
-            memory->kept = 0.0;
+        if (long_enough && distance < regained * regained && fuel < regained * limit) memory->kept = 0.0;
     }
     return memory->kept == 1.0;
 }
@@ -118,19 +107,14 @@ void hsv_apply_engine_faults(hsv_faults *faults, int64_t k, int64_t seed, double
                              double *engine)
 {
     engine[0] = engine[1] = engine[2] = 1.0, engine[3] = 0.0;
-    if (hsv_begin_faults(faults, k, seed) == 0)
-        return;
+    if (hsv_begin_faults(faults, k, seed) == 0) return;
     for (int64_t i = 0; i < faults->count; i++) {
         const hsv_fault *fault = &faults->rows[i];
         hsv_fault_memory *memory = &faults->memory[i];
-        if (!memory->acting)
-            continue;
-        if (fault->code == UNSTART_OUTSIDE && !unstarted(fault, memory, k, faults->period, alpha, mach, fuel))
-            continue;
+        if (!memory->acting) continue;
+        if (fault->code == UNSTART_OUTSIDE && !unstarted(fault, memory, k, faults->period, alpha, mach, fuel)) continue;
         const double *p = fault->parameter;
         engine[0] *= p[0];
-        if (fault->code != THRUST_LOSS)
-            engine[1] = p[1], engine[2] = p[2], engine[3] = p[3] + p[4] * alpha;
+        if (fault->code != THRUST_LOSS) engine[1] = p[1], engine[2] = p[2], engine[3] = p[3] + p[4] * alpha;
     }
 }
-#endif

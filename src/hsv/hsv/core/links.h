@@ -4,8 +4,7 @@
  * payload has one bit of one of its numbers flipped; with a checksum, or where the number is then not finite or beyond
  * LARGEST, the receiver notices, and the payload is lost.
  */
-#ifndef LINKS_H
-#define LINKS_H
+#pragma once
 #include "noise.h"
 
 #define LARGEST 1e6 /* SI */
@@ -17,8 +16,7 @@ enum { NEWEST, LOSING, BEGUN, ACCEPTED };
 /* Fill a link with one payload, as if it had been sent until now. */
 void hsv_fill_link(double *memory, int64_t size, const double *payload, int64_t n)
 {
-    for (int64_t i = 0; i < size - ACCEPTED; i++)
-        memory[ACCEPTED + i] = payload[i % n];
+    for (int64_t i = 0; i < size - ACCEPTED; i++) memory[ACCEPTED + i] = payload[i % n];
     memory[NEWEST] = -(double)size;
     memory[BEGUN] = 1.0;
 }
@@ -28,10 +26,8 @@ static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, i
 {
     double drawn[2];
     hsv_uniforms(seed, k, LINK_CORRUPTION + link->channel, 0, drawn);
-    if (!(drawn[0] < link->corruption))
-        return 1;
-    if (link->checksum)
-        return 0;
+    if (!(drawn[0] < link->corruption)) return 1;
+    if (link->checksum) return 0;
     const int64_t bit = (int64_t)(drawn[1] * (double)(64 * n));
     double *number = &payload[bit / 64];
     const double before = *number;
@@ -39,19 +35,17 @@ static int passes(const hsv_link *link, double *payload, int64_t n, int64_t k, i
     memcpy(&word, number, sizeof word);
     word ^= UINT64_C(1) << (bit % 64);
     memcpy(number, &word, sizeof word);
-    if (magnitude(*number) <= LARGEST)
-        return 1;
+    if (magnitude(*number) <= LARGEST) return 1;
     memcpy(number, &before, sizeof before); /* it may arrive again, late */
     return 0;
 }
 
 /* Replace the payload (n) that is sent in step k by the one that the receiver then has. */
-void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload, int64_t n)
+void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, int64_t seed, double *payload,
+                 int64_t n)
 {
-    if (link->ideal)
-        return;
-    if (memory[BEGUN] == 0.0)
-        hsv_fill_link(memory, size, payload, n);
+    if (link->ideal) return;
+    if (memory[BEGUN] == 0.0) hsv_fill_link(memory, size, payload, n);
     const int64_t slots = link->delay + link->jitter + 1;
     memcpy(memory + ACCEPTED + n * (1 + k % slots), payload, (size_t)n * sizeof *payload);
     int64_t newest = k - link->delay;
@@ -75,4 +69,3 @@ void hsv_receive(const hsv_link *link, double *memory, int64_t size, int64_t k, 
     }
     memcpy(payload, memory + ACCEPTED, (size_t)n * sizeof *payload);
 }
-#endif

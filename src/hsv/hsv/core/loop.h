@@ -12,8 +12,7 @@
  *
  * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
  */
-#ifndef LOOP_H
-#define LOOP_H
+#pragma once
 #include "effectiveness.h"
 #include "estimator.h"
 #include "metrics.h"
@@ -22,8 +21,8 @@
 #include "tube_law.h"
 
 typedef struct {
-    Plants plants;
-    Vehicle estimator_vehicle, tube_vehicle;
+    int equipped; /* whether any plant has more than an ideal one */
+    Vehicle vehicle, estimator_vehicle, tube_vehicle;
     TubeMemory tube;
     real predicted[STATES], known[KNOWN]; /* of the effectiveness estimator */
     LevelMemory levels;
@@ -33,16 +32,16 @@ typedef struct {
     int64_t row[LANES], active[LANES]; /* of reference and gain in each lane */
 } Loop;
 
-static inline void measure_lanes(Loop *f, int64_t k)
+static inline void measure_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
 {
-    if (!f->plants.equipped) {
+    if (!f->equipped) {
         memcpy(f->measurement, f->x, sizeof f->x);
         return;
     }
     for (int i = 0; i < LANES; i++) {
         double x[STATES], y[STATES];
         take_lane(f->x, STATES, i, x);
-        hsv_sense(f->plants.plant[i], f->plants.memory[i], f->plants.faults[i], k, x, y);
+        hsv_sense(flights[i]->plant, flights[i]->plant_memory, flights[i]->plant_faults, k, x, y);
         give_lane(y, STATES, i, f->measurement);
     }
 }
@@ -71,25 +70,20 @@ static inline void schedule_lanes(hsv_flight *const *flights, Loop *f, int64_t k
 static inline void begin(hsv_flight *const *flights, Loop *f)
 {
     const hsv_flight *first = flights[0];
-    const hsv_vehicle *vehicles[LANES];
     memset(f, 0, sizeof *f);
-    gather_plants(flights, &f->plants);
-    for (int i = 0; i < LANES; i++)
-        vehicles[i] = first->estimator ? &first->estimator->vehicle : &first->plant->vehicle;
-    gather_vehicle(vehicles, &f->estimator_vehicle);
-    for (int i = 0; i < LANES; i++)
-        vehicles[i] = first->tube->effectiveness ? &first->tube->effectiveness->vehicle : &first->plant->vehicle;
-    gather_vehicle(vehicles, &f->tube_vehicle);
     for (int i = 0; i < LANES; i++) {
         f->row[i] = f->active[i] = -1;
+        f->equipped |= is_equipped(flights[i]->plant, flights[i]->plant_faults);
         give_lane(flights[i]->x, STATES, i, f->x);
+        gather_vehicle(&flights[i]->plant->vehicle, i, &f->vehicle);
+        if (first->estimator) gather_vehicle(&first->estimator->vehicle, i, &f->estimator_vehicle);
+        if (first->tube->effectiveness) gather_vehicle(&first->tube->effectiveness->vehicle, i, &f->tube_vehicle);
     }
-    measure_lanes(f, 0);
+    measure_lanes(flights, f, 0);
     notch_rest(first->notch, f->measurement[PITCH_RATE], f->notch);
     schedule_lanes(flights, f, 0);
     if (first->nominal->count > 0)
-        for (int i = 0; i < STATES; i++)
-            f->x_n[i] = f->measurement[i] - f->x_r[i];
+        for (int i = 0; i < STATES; i++) f->x_n[i] = f->measurement[i] - f->x_r[i];
 }
 
 #if LANES == 1
@@ -101,13 +95,11 @@ static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const doub
     const hsv_call *law = &flight->nominal_law, *controller = &flight->controller;
     double found[INPUTS + 1];
     if (law->function) {
-        if (law->function(k, f->x_n, found, law->state, law->par))
-            return -1;
+        if (law->function(k, f->x_n, found, law->state, law->par)) return -1;
         f->u_n[0] = found[0], f->u_n[1] = found[1], f->gain_index = found[INPUTS];
     } else if (flight->nominal->count > 0)
         nominal_input(flight->nominal, f->x_n, f->u_n, &f->gain_index);
-    if (!controller->function)
-        return 0;
+    if (!controller->function) return 0;
     double in[3 * STATES + 1 + 2 * INPUTS + 2 * MAX_SECTIONS], *next = in; /* the order of hsv_block.h */
     memcpy(next, estimate, sizeof f->x), next += STATES;
     *next++ = q_f;
@@ -137,8 +129,7 @@ static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t
         take_lane(f->actuator, INPUTS, i, row);
         auxiliary[0] = lane(f->gain_index, i);
         take_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
-        if (flights[i]->estimated)
-            take_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
+        if (flights[i]->estimated) take_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
     }
 }
 
@@ -146,8 +137,7 @@ static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t
 static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t k)
 {
     const mask inside = in_model_range(f->x, flights[0]->plant->vehicle.angle_limit);
-    if (every(inside))
-        return 0;
+    if (every(inside)) return 0;
     int flying = 0;
     for (int i = 0; i < LANES; i++)
         if (flights[i]->ended > k) {
@@ -159,47 +149,44 @@ static inline int end_flights(hsv_flight *const *flights, const Loop *f, int64_t
     return flying == 0;
 }
 
-/* Fly the steps start ... stop - 1 of a group of flights, which share all but vehicle, seed, faults, reference, gains of
- * the tube law and the numbers of the equipment. Return the step after the last one flown, -1 - k where a block from
+/* Fly the steps start ... stop - 1 of a group of flights, which share all but vehicle, seed, faults, reference, gains
+ * of the tube law and the numbers of the equipment. Return the step after the last one flown, -1 - k where a block from
  * outside failed in step k. */
 static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t stop)
 {
     const hsv_flight *first = flights[0];
     const hsv_notch *notch = first->notch;
     const hsv_plant *plant = first->plant;
-    if (start == 0)
-        begin(flights, f);
+    if (start == 0) begin(flights, f);
     for (int64_t k = start; k < stop; k++) {
         real estimate[STATES], s[2 * MAX_SECTIONS], x_n[STATES], u_feedback[INPUTS], u_unsaturated[INPUTS];
         if (k > 0) {
-            if (f->plants.equipped)
-                advance_plants(&f->plants, k - 1, f->actuator, f->x);
+            if (f->equipped)
+                advance_plants(flights, &f->vehicle, k - 1, f->actuator, f->x);
             else {
                 real effector[INPUTS];
                 for (int j = 0; j < INPUTS; j++)
                     effector[j] = limited(f->actuator[j], plant->actuators.minimum[j], plant->actuators.maximum[j]);
-                advance(f->x, effector, &f->plants.vehicle, NULL, all(plant->period), plant->substeps);
+                advance(f->x, effector, &f->vehicle, NULL, all(plant->period), plant->substeps);
             }
-            measure_lanes(f, k);
+            measure_lanes(flights, f, k);
             schedule_lanes(flights, f, k);
         }
         memcpy(estimate, f->measurement, sizeof estimate);
         if (first->estimator) {
             estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u, estimate);
-            if (k == 0)
-                notch_rest(notch, estimate[PITCH_RATE], f->notch);
+            if (k == 0) notch_rest(notch, estimate[PITCH_RATE], f->notch);
         }
         memcpy(s, f->notch, sizeof s);
         const real q_f = notch_step(notch, f->notch, estimate[PITCH_RATE]);
         int answered = 0;
 #if LANES == 1
-        flights[0]->history[HISTORY * (k - start) + STATES] = q_f; /* tells a watching process which step is under way */
+        flights[0]->history[HISTORY * (k - start) + STATES] =
+            q_f; /* tells a watching process which step is under way */
         answered = call_blocks(flights[0], f, k, estimate, q_f, s, u_unsaturated);
-        if (answered < 0)
-            return -1 - k;
+        if (answered < 0) return -1 - k;
 #else
-        if (first->nominal->count > 0)
-            nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
+        if (first->nominal->count > 0) nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
 #endif
         if (answered)
             for (int j = 0; j < INPUTS; j++)
@@ -213,16 +200,14 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
                       f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
         }
         memcpy(x_n, f->x_n, sizeof x_n);
-        if (first->set)
-            level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);
+        if (first->set) level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);
         if (first->nominal->count > 0)
             nominal_advance(&first->nominal->polytope, f->measurement[ALTITUDE], f->measurement[VELOCITY], f->x_n,
                             f->u_n, f->d_r);
         memcpy(f->actuator, f->u, sizeof f->u);
         for (int i = 0; i < LANES; i++) {
             hsv_flight *own = flights[i];
-            if (own->link->ideal && own->faults->count == 0)
-                continue;
+            if (own->link->ideal && own->faults->count == 0) continue;
             double actuator[INPUTS];
             take_lane(f->actuator, INPUTS, i, actuator);
             hsv_receive(own->link, own->link_memory, own->payloads, k, own->plant->seed, actuator, INPUTS);
@@ -232,11 +217,8 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
         write_rows(flights, f, k - start, estimate, q_f, x_n, u_unsaturated);
         if (first->set)
             for (int i = 0; i < LANES; i++)
-                if (flights[i]->ended > k)
-                    flights[i]->worst = lane(f->levels.worst, i);
-        if (end_flights(flights, f, k))
-            return k + 1;
+                if (flights[i]->ended > k) flights[i]->worst = lane(f->levels.worst, i);
+        if (end_flights(flights, f, k)) return k + 1;
     }
     return stop;
 }
-#endif

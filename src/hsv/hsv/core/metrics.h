@@ -1,13 +1,12 @@
-/* What campaigns and certificates read of flights: level in the invariant set, curves of the metrics, envelopes. */
-#ifndef METRICS_H
-#define METRICS_H
+/* What campaigns and certificates read of flights: level in the invariant set, curves of the metrics. */
+#pragma once
 #include "nominal.h"
 #include "notch_filter.h"
 #include "vehicle.h"
 
 typedef struct {
     real actual[2 * MAX_SECTIONS], planned[2 * MAX_SECTIONS]; /* states of the filter for x and for x_r + x_n */
-    real worst; /* greatest level so far; once it is NaN it stays so */
+    real worst;                                               /* greatest level so far; once it is NaN it stays so */
 } LevelMemory;
 
 /* Take step k into the greatest level (e - c)' P (e - c), e = (x - x_r - x_n, s - s_n). */
@@ -21,8 +20,7 @@ static inline void level_step(const hsv_tube_set *set, LevelMemory *memory, int6
         memcpy(memory->planned, memory->actual, sizeof memory->planned);
         memory->worst = all(-INFINITY);
     }
-    for (int64_t i = 0; i < rigid; i++)
-        error[i] = x[i] - x_r[i] - x_n[i] - set->centre[i];
+    for (int64_t i = 0; i < rigid; i++) error[i] = x[i] - x_r[i] - x_n[i] - set->centre[i];
     for (int64_t i = 0; i < states; i++)
         error[rigid + i] = memory->actual[i] - memory->planned[i] - set->centre[rigid + i];
     const real value = level(set->shape, set->size, error);
@@ -61,41 +59,8 @@ void hsv_curves(int64_t steps, int64_t stride, const double *history, const doub
                                 u[ELEVATOR],
                                 magnitude(x[ALPHA] - x_r[ALPHA] - x_n[ALPHA]),
                                 magnitude(x[PITCH] - x_r[PITCH] - x_n[PITCH])};
-        for (int i = 0; i < 10; i++)
-            curves[stride * i + k] = row[i];
-        for (int i = 0; i < INPUTS; i++)
-            saturated[INPUTS * k + i] = u[i] != unsaturated[i];
+        for (int i = 0; i < 10; i++) curves[stride * i + k] = row[i];
+        for (int i = 0; i < INPUTS; i++) saturated[INPUTS * k + i] = u[i] != unsaturated[i];
     }
 }
-
-/* Take the curves of a flight, each "stride" numbers long, into least and greatest value (windows, signals), and, of
- * windows whose values are all finite, into the sum of the means and their number (windows). */
-void hsv_envelope(int64_t signals, int64_t steps, int64_t stride, const double *curves, int64_t windows,
-                  const int64_t *starts, double *low, double *high, double *total, double *count)
-{
-    for (int64_t window = 0; window < windows && starts[window] < steps; window++) {
-        const int64_t end = window + 1 < windows && starts[window + 1] < steps ? starts[window + 1] : steps;
-        int whole = 1;
-        double means[64];
-        for (int64_t i = 0; i < signals; i++) {
-            double *least = &low[signals * window + i], *greatest = &high[signals * window + i], sum = 0.0;
-            for (int64_t k = starts[window]; k < end; k++) {
-                const double value = curves[stride * i + k];
-                sum += value;
-                if (is_finite(value)) {
-                    *least = minimum(*least, value);
-                    *greatest = maximum(*greatest, value);
-                }
-            }
-            whole &= is_finite(sum);
-            means[i] = sum / (double)(end - starts[window]);
-        }
-        if (whole) {
-            for (int64_t i = 0; i < signals; i++)
-                total[signals * window + i] += means[i];
-            count[window] += 1.0;
-        }
-    }
-}
-#endif
 #endif

@@ -7,8 +7,7 @@
  *
  * A stream belongs to one channel of one named block: what is added to a flight leaves the noise of the rest as it was.
  */
-#ifndef NOISE_H
-#define NOISE_H
+#pragma once
 #include "elementary.h"
 
 /* The high word of the product of two words of 64 bits. */
@@ -62,4 +61,3 @@ static inline double first_normal(int64_t seed, int64_t step, int64_t stream, in
     hsv_normals(seed, step, stream, draw, pair);
     return pair[0];
 }
-#endif

@@ -8,8 +8,7 @@
  * to the envelope. Interpolated gains: K = a K_g + (1 - a) K_(g+1) with x_n' (a P_g + (1 - a) P_(g+1)) x_n = 1, so
  * that u_n is continuous (Wan and Kothare, Automatica 39, 2003).
  */
-#ifndef NOMINAL_H
-#define NOMINAL_H
+#pragma once
 #include "real.h"
 
 /* The first deviation lies on the boundary of the outermost ellipsoid by design: a relative slack of x' P x <= 1. */
@@ -22,8 +21,7 @@ static inline real level(const double *P, int64_t size, const real *x)
     real total = all(0.0);
     for (int64_t i = 0; i < size; i++) {
         real row = all(0.0);
-        for (int64_t j = 0; j < size; j++)
-            row += P[size * i + j] * x[j];
+        for (int64_t j = 0; j < size; j++) row += P[size * i + j] * x[j];
         total += x[i] * row;
     }
     return total;
@@ -32,8 +30,7 @@ static inline real level(const double *P, int64_t size, const real *x)
 static inline real gain_times_state(const double *row, const real *x)
 {
     real total = all(0.0);
-    for (int j = 0; j < STATES; j++)
-        total += row[j] * x[j];
+    for (int j = 0; j < STATES; j++) total += row[j] * x[j];
     return total;
 }
 
@@ -52,12 +49,10 @@ static inline mask nominal_input(const hsv_nominal *nominal, const real *x_n, re
         *index = choose(now, all(g), *index);
         held = choose(now, value, held);
         inside |= now;
-        if (every(inside))
-            break;
+        if (every(inside)) break;
         beyond = choose(inside, beyond, value);
     }
-    for (int i = 0; i < INPUTS; i++)
-        u_n[i] = all(0.0);
+    for (int i = 0; i < INPUTS; i++) u_n[i] = all(0.0);
     const int first = (int)least_lane(*index), last = (int)greatest_lane(*index);
     for (int g = first; g <= last && g < count; g++)
         for (int i = 0; i < INPUTS; i++) {
@@ -76,8 +71,7 @@ static inline mask nominal_input(const hsv_nominal *nominal, const real *x_n, re
 static inline int piece_of(const hsv_axis *axis, double value)
 {
     int i = 0;
-    while (i < axis->pieces - 1 && value >= axis->breakpoints[i + 1])
-        i++;
+    while (i < axis->pieces - 1 && value >= axis->breakpoints[i + 1]) i++;
     return i;
 }
 
@@ -109,8 +103,7 @@ static inline mask vertex_weights(const hsv_polytope *polytope, real altitude, r
     const mask h_inside = axis_weights(&polytope->altitude, altitude, h_weights);
     const mask v_inside = axis_weights(&polytope->velocity, velocity, v_weights);
     for (int64_t i = 0; i < n_h; i++)
-        for (int64_t j = 0; j < n_v; j++)
-            weights[i * n_v + j] = h_weights[i] * v_weights[j];
+        for (int64_t j = 0; j < n_v; j++) weights[i * n_v + j] = h_weights[i] * v_weights[j];
     return h_inside & v_inside;
 }
 
@@ -120,13 +113,10 @@ static inline void weighted_entries(const hsv_polytope *polytope, const real *we
     /* As many sums at a time as there are registers for: each addition waits for the one before it in its sum. */
     for (int64_t e = 0; e < polytope->size; e += SUMS) {
         real sums[SUMS];
-        for (int i = 0; i < SUMS; i++)
-            sums[i] = all(0.0);
+        for (int i = 0; i < SUMS; i++) sums[i] = all(0.0);
         for (int64_t r = 0; r < polytope->vertices; r++)
-            for (int i = 0; i < SUMS; i++)
-                sums[i] += weights[r] * polytope->S[r * polytope->size + e + i];
-        for (int i = 0; i < SUMS; i++)
-            S[e + i] = sums[i];
+            for (int i = 0; i < SUMS; i++) sums[i] += weights[r] * polytope->S[r * polytope->size + e + i];
+        for (int i = 0; i < SUMS; i++) S[e + i] = sums[i];
     }
 }
 
@@ -141,14 +131,11 @@ static inline mask nominal_advance(const hsv_polytope *polytope, real altitude, 
     for (int i = 0; i < STATES; i++) {
         const int64_t first = i * (STATES + INPUTS);
         real total = all(0.0);
-        for (int64_t e = starts[2 * i]; e < starts[2 * i + 1]; e++)
-            total += S[e] * x_n[entries[e] - first];
+        for (int64_t e = starts[2 * i]; e < starts[2 * i + 1]; e++) total += S[e] * x_n[entries[e] - first];
         for (int64_t e = starts[2 * i + 1]; e < starts[2 * i + 2]; e++)
             total += S[e] * u_n[entries[e] - first - STATES];
         new[i] = total + d_r[i];
     }
-    for (int i = 0; i < STATES; i++)
-        x_n[i] = new[i];
+    for (int i = 0; i < STATES; i++) x_n[i] = new[i];
     return inside;
 }
-#endif

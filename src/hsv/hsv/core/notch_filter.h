@@ -5,8 +5,7 @@
  * discretised by the prewarped bilinear rule (hsv.control.notch_filter). It starts at rest for its first input:
  * s(0) = G q(0).
  */
-#ifndef NOTCH_FILTER_H
-#define NOTCH_FILTER_H
+#pragma once
 #include "real.h"
 
 static inline void notch_rest(const hsv_notch *notch, real rate, real *s)
@@ -30,4 +29,3 @@ static inline real notch_step(const hsv_notch *notch, real *s, real rate)
     }
     return rate;
 }
-#endif

@@ -4,8 +4,7 @@
  * actuators are ideal, the command is there in time and no fault of theirs acts, the vehicle takes the command within
  * the stops; otherwise actuators and vehicle move on the substeps of the actuators.
  */
-#ifndef PLANT_H
-#define PLANT_H
+#pragma once
 #include "vehicle.h"
 
 enum { ACTUATOR_SUBSTEPS = 4 };
@@ -33,7 +32,8 @@ void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_
 {
     double *conditions = memory->conditions;
     if (!plant->atmosphere.still)
-        hsv_atmosphere_step(&plant->atmosphere, memory->atmosphere, k, plant->seed, x[ALTITUDE], x[VELOCITY], conditions);
+        hsv_atmosphere_step(&plant->atmosphere, memory->atmosphere, k, plant->seed, x[ALTITUDE], x[VELOCITY],
+                            conditions);
     const AirRelative air =
         air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
     const double mach = air.speed / hsv_speed_of_sound(x[ALTITUDE]);
@@ -48,84 +48,66 @@ static inline int is_calm(const hsv_plant *plant, const hsv_plant_faults *faults
     return plant->atmosphere.still && faults->engine.count == 0;
 }
 
-/* The plants of a group of flights, one in each lane. */
-typedef struct {
-    Vehicle vehicle;
-    const hsv_plant *plant[LANES];
-    hsv_plant_memory *memory[LANES];
-    hsv_plant_faults *faults[LANES];
-    int equipped; /* whether anything is there that is stepped lane by lane */
-} Plants;
-
-static inline void gather_vehicle(const hsv_vehicle *const *p, Vehicle *vehicle)
+/* Whether a plant has anything that is stepped lane by lane. */
+static inline int is_equipped(const hsv_plant *plant, const hsv_plant_faults *faults)
 {
-    for (int i = 0; i < LANES; i++)
-        for (size_t j = 0; j < sizeof *vehicle / sizeof(plain); j++)
-            lane(((plain *)vehicle)[j], i) = ((const double *)p[i])[j];
+    const int ideal = plant->actuators.ideal && plant->sensors.ideal && plant->link.ideal && plant->late == 0.0;
+    return !ideal || !is_calm(plant, faults) || faults->effector.count > 0 || faults->sensor.count > 0;
 }
 
-static inline void gather_plants(hsv_flight *const *flights, Plants *plants)
+/* Take the numbers of a vehicle into a lane. */
+static inline void gather_vehicle(const hsv_vehicle *p, int i, Vehicle *vehicle)
 {
-    const hsv_vehicle *vehicles[LANES];
-    plants->equipped = 0;
-    for (int i = 0; i < LANES; i++) {
-        const hsv_plant *plant = plants->plant[i] = flights[i]->plant;
-        const hsv_plant_faults *faults = plants->faults[i] = flights[i]->plant_faults;
-        plants->memory[i] = flights[i]->plant_memory;
-        vehicles[i] = &plant->vehicle;
-        plants->equipped |= !(plant->actuators.ideal && plant->sensors.ideal && plant->link.ideal &&
-                              plant->late == 0.0 && is_calm(plant, faults) && faults->effector.count == 0 &&
-                              faults->sensor.count == 0);
-    }
-    gather_vehicle(vehicles, &plants->vehicle);
+    for (size_t j = 0; j < sizeof *vehicle / sizeof(plain); j++)
+        lane(((plain *)vehicle)[j], i) = ((const double *)p)[j];
 }
 
 static inline void take_lane(const real *from, int count, int i, double *to)
 {
-    for (int j = 0; j < count; j++)
-        to[j] = lane(from[j], i);
+    for (int j = 0; j < count; j++) to[j] = lane(from[j], i);
 }
 
 static inline void give_lane(const double *from, int count, int i, real *to)
 {
-    for (int j = 0; j < count; j++)
-        lane(to[j], i) = from[j];
+    for (int j = 0; j < count; j++) lane(to[j], i) = from[j];
 }
 
-/* Move the effectors in the lanes that are "moving" over a length of substeps, and then the vehicle. */
-static inline void advance_moving(Plants *plants, const int *moving, int64_t k, double substep, double length,
-                                  const real *command, const real *conditions, real *x)
+/* Move the effectors of the flights that are "moving" over a length of substeps, and then all vehicles. */
+static inline void advance_moving(hsv_flight *const *flights, const Vehicle *vehicle, const int *moving, int64_t k,
+                                  double substep, double length, const real *command, const real *conditions, real *x)
 {
     real effector[INPUTS] = {all(0.0), all(0.0)};
     for (int i = 0; i < LANES; i++)
         if (moving[i]) {
-            hsv_plant_memory *memory = plants->memory[i];
+            hsv_plant_memory *memory = flights[i]->plant_memory;
             double own[INPUTS];
             take_lane(command, INPUTS, i, own);
-            hsv_move_effectors(&plants->plant[i]->actuators, memory->actuators, &plants->faults[i]->effector, k, substep,
-                               length, own, lane(x[ALPHA], i), memory->effector);
+            hsv_move_effectors(&flights[i]->plant->actuators, memory->actuators, &flights[i]->plant_faults->effector, k,
+                               substep, length, own, lane(x[ALPHA], i), memory->effector);
             give_lane(memory->effector, INPUTS, i, effector);
         }
-    advance(x, effector, &plants->vehicle, conditions, all(length * plants->plant[0]->actuators.substep), 1);
+    advance(x, effector, vehicle, conditions, all(length * flights[0]->plant->actuators.substep), 1);
 }
 
-/* Replace the states x by those one period after step k; "actuator" is what reaches the actuators, from then on held. */
-static inline void advance_plants(Plants *plants, int64_t k, const real *actuator, real *x)
+/* Replace the states x by those one period after step k; "actuator" is what reaches the actuators, from then on held.
+ */
+static inline void advance_plants(hsv_flight *const *flights, const Vehicle *vehicle, int64_t k, const real *actuator,
+                                  real *x)
 {
-    const hsv_plant *first = plants->plant[0];
+    const hsv_plant *first = flights[0]->plant;
     const double late = first->late;
     real held[CONDITIONS], before[INPUTS], effector[INPUTS], passed[STATES];
-    const int calm = is_calm(first, plants->faults[0]);
+    const int calm = is_calm(first, flights[0]->plant_faults);
     int moving[LANES], number = 0;
     for (int i = 0; i < LANES; i++) {
-        hsv_plant_memory *memory = plants->memory[i];
+        hsv_plant_memory *memory = flights[i]->plant_memory;
         if (!calm) {
             double own[STATES];
             take_lane(x, STATES, i, own);
-            hsv_plant_conditions(plants->plant[i], memory, plants->faults[i], k, own, lane(actuator[FUEL], i));
+            hsv_plant_conditions(flights[i]->plant, memory, flights[i]->plant_faults, k, own, lane(actuator[FUEL], i));
             give_lane(memory->conditions, CONDITIONS, i, held);
         }
-        const int64_t acting = hsv_begin_faults(&plants->faults[i]->effector, k, plants->plant[i]->seed);
+        const int64_t acting = hsv_begin_faults(&flights[i]->plant_faults->effector, k, flights[i]->plant->seed);
         number += moving[i] = acting > 0 || !first->actuators.ideal || late != 0.0;
         give_lane(memory->command, INPUTS, i, before);
     }
@@ -134,29 +116,22 @@ static inline void advance_plants(Plants *plants, int64_t k, const real *actuato
     if (number < LANES) {
         for (int j = 0; j < INPUTS; j++)
             effector[j] = limited(actuator[j], first->actuators.minimum[j], first->actuators.maximum[j]);
-        for (int i = 0; i < LANES; i++)
-            if (!moving[i]) {
-                take_lane(effector, INPUTS, i, plants->memory[i]->effector);
-                for (int j = 0; j < INPUTS; j++) {
-                    plants->memory[i]->actuators[2 * j] = lane(effector[j], i);
-                    plants->memory[i]->actuators[2 * j + 1] = 0.0;
-                }
-            }
-        advance(passed, effector, &plants->vehicle, conditions, all(first->period), first->substeps);
+        advance(passed, effector, vehicle, conditions, all(first->period), first->substeps);
     }
     if (number > 0)
         for (int j = 0; j < ACTUATOR_SUBSTEPS; j++) {
             const double share = late - j < 0.0 ? 0.0 : late - j > 1.0 ? 1.0 : late - j; /* of the command before */
-            if (share > 0.0)
-                advance_moving(plants, moving, k, j, share, before, conditions, x);
+            if (share > 0.0) advance_moving(flights, vehicle, moving, k, j, share, before, conditions, x);
             if (share < 1.0)
-                advance_moving(plants, moving, k, j + share, 1.0 - share, actuator, conditions, x);
+                advance_moving(flights, vehicle, moving, k, j + share, 1.0 - share, actuator, conditions, x);
         }
     for (int i = 0; i < LANES; i++) {
-        take_lane(actuator, INPUTS, i, plants->memory[i]->command);
-        if (!moving[i])
-            for (int j = 0; j < STATES; j++)
-                lane(x[j], i) = lane(passed[j], i);
+        hsv_plant_memory *memory = flights[i]->plant_memory;
+        take_lane(actuator, INPUTS, i, memory->command);
+        if (moving[i]) continue;
+        take_lane(effector, INPUTS, i, memory->effector);
+        for (int j = 0; j < INPUTS; j++)
+            memory->actuators[2 * j] = memory->effector[j], memory->actuators[2 * j + 1] = 0.0;
+        for (int j = 0; j < STATES; j++) lane(x[j], i) = lane(passed[j], i);
     }
 }
-#endif

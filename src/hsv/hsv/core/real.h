@@ -12,8 +12,7 @@
  * Bits repeat on every processor because only additions, subtractions, multiplications, divisions and square roots of
  * IEEE 754 are used, in the order written, without contraction to fused operations (-ffp-contract=off).
  */
-#ifndef REAL_H
-#define REAL_H
+#pragma once
 #include "core.h"
 
 #include <float.h>
@@ -71,10 +70,7 @@ static inline real all(double x) { return x - (real){0.0}; }
 static inline real choose(mask m, real a, real b) { return (real)((m & (mask)a) | (~m & (mask)b)); }
 static inline mask opposite(mask m) { return ~m; }
 static inline real magnitude(real x) { return (real)((mask)x & INT64_MAX); }
-static inline real power_of_two(real n)
-{
-    return (real)(((word)(n + 0x1.8p52) << 52) + (UINT64_C(1023) << 52));
-}
+static inline real power_of_two(real n) { return (real)(((word)(n + 0x1.8p52) << 52) + (UINT64_C(1023) << 52)); }
 #define lane(x, i) ((x)[i])
 #if LANES == 8
 static inline int lane_bits(mask m) { return _mm512_test_epi64_mask((__m512i)m, (__m512i)m); }
@@ -88,15 +84,13 @@ static inline int any(mask m) { return lane_bits(m) != 0; }
 static inline double least_lane(real x)
 {
     double found = x[0];
-    for (int i = 1; i < LANES; i++)
-        found = x[i] < found ? x[i] : found;
+    for (int i = 1; i < LANES; i++) found = x[i] < found ? x[i] : found;
     return found;
 }
 static inline double greatest_lane(real x)
 {
     double found = x[0];
-    for (int i = 1; i < LANES; i++)
-        found = x[i] > found ? x[i] : found;
+    for (int i = 1; i < LANES; i++) found = x[i] > found ? x[i] : found;
     return found;
 }
 #endif
@@ -111,4 +105,3 @@ static inline plain limited(plain x, double low, double high)
     const plain above = choose(low > x, all(low), x);
     return choose(high < above, all(high), above);
 }
-#endif

@@ -1,6 +1,7 @@
 /* The core for one flight: the loop, its blocks one step at a time, and everything that is computed with doubles. */
 #define BASE
-#include "loop.h"
+#define NAME single
+#include "instance.h"
 #include "sequences.h"
 #include "trim.h"
 
@@ -11,7 +12,6 @@ _Static_assert(offsetof(hsv_tube_memory, predicted) == sizeof(TubeMemory), "one 
 static const Vehicle *vehicle_of(const hsv_vehicle *p) { return (const Vehicle *)p; }
 
 void hsv_sine_cosine(double x, double *sine, double *cosine) { sine_cosine(x, sine, cosine); }
-
 double hsv_exponential(double x) { return exponential(x); }
 
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out)
@@ -27,12 +27,6 @@ void hsv_forces(const double *x, const double *u, const hsv_vehicle *p, const do
     out[0] = f.lift, out[1] = f.drag, out[2] = f.thrust, out[3] = f.moment, out[4] = f.pressure, out[5] = alpha;
 }
 
-void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out)
-{
-    const AirRelative air = air_relative(velocity, path_angle, forward, up);
-    out[0] = air.speed, out[1] = air.turn, out[2] = air.sine, out[3] = air.cosine;
-}
-
 void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double *conditions, double period,
                  int64_t substeps)
 {
@@ -44,13 +38,12 @@ int hsv_in_model_range(const double *x, double angle_limit) { return in_model_ra
 void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                        const double *actuator, double *x)
 {
-    Plants plants = {.plant = {plant}, .memory = {memory}, .faults = {faults}};
-    plants.vehicle = *vehicle_of(&plant->vehicle);
-    advance_plants(&plants, k, actuator, x);
+    hsv_flight flight = {.plant = plant, .plant_memory = memory, .plant_faults = faults};
+    hsv_flight *const flights[] = {&flight};
+    advance_plants(flights, vehicle_of(&plant->vehicle), k, actuator, x);
 }
 
 void hsv_notch_rest(const hsv_notch *notch, double rate, double *s) { notch_rest(notch, rate, s); }
-
 double hsv_notch_step(const hsv_notch *notch, double *s, double rate) { return notch_step(notch, s, rate); }
 
 void hsv_estimate(const hsv_estimator *estimator, double *memory, int64_t k, const double *measurement,
@@ -74,8 +67,7 @@ int64_t hsv_tube_step(const hsv_tube *tube, hsv_tube_memory *memory, int64_t k, 
                       const double *x, double q_f, const double *x_r, const double *u_r, const double *x_n,
                       const double *u_n, const double *s, double *u_feedback, double *u_unsaturated, double *u)
 {
-    const double effectiveness =
-        tube->effectiveness ? hsv_effectiveness_step(tube->effectiveness, memory, k, x) : 1.0;
+    const double effectiveness = tube->effectiveness ? hsv_effectiveness_step(tube->effectiveness, memory, k, x) : 1.0;
     const int64_t active = active_gain(tube, k);
     tube_step(tube, (TubeMemory *)memory, tube->gains + INPUTS * STATES * active, effectiveness, k, monitored,
               filter_states, x, q_f, x_r, u_r, x_n, u_n, s, u_feedback, u_unsaturated, u);
@@ -88,6 +80,12 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
 {
     return effectiveness_step(effectiveness, vehicle_of(&effectiveness->vehicle), memory->predicted, memory->held,
                               memory->known, k, x);
+}
+
+void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out)
+{
+    const AirRelative air = air_relative(velocity, path_angle, forward, up);
+    out[0] = air.speed, out[1] = air.turn, out[2] = air.sine, out[3] = air.cosine;
 }
 
 void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds)
@@ -103,9 +101,3 @@ int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, 
 {
     return vertex_weights(polytope, altitude, velocity, weights);
 }
-
-int64_t hsv_fly_1(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
-{
-    return fly(flights, memory, start, stop);
-}
-const int64_t hsv_memory_1 = sizeof(Loop);

@@ -3,11 +3,10 @@
  *   y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n)))))
  *
  * with scale factor s and lag of the sensor, bias b and noise n (constant bias, Gauss-Markov drift, random walk, white
- * noise), latency in whole samples, samples that are lost and held, quantisation, range, and what fails. An ideal sensor
- * passes its state to the bit. In step 0 lags rest and queues are full of the first sample.
+ * noise), latency in whole samples, samples that are lost and held, quantisation, range, and what fails. An ideal
+ * sensor passes its state to the bit. In step 0 lags rest and queues are full of the first sample.
  */
-#ifndef SENSORS_H
-#define SENSORS_H
+#pragma once
 #include "faults.h"
 #include "vehicle.h"
 
@@ -27,13 +26,11 @@ static double sensor_error(const hsv_sensors *s, hsv_sensor_memory *m, int i, in
         error += s->noise[i] * drawn[0];
         if (s->drift_sigma[i] > 0.0) {
             const double decay = s->drift_decay[i], share = root(maximum(1.0 - decay * decay, 0.0));
-            m->drift = k == 0 ? s->drift_sigma[i] * drawn[1]
-                              : decay * m->drift + s->drift_sigma[i] * share * drawn[1];
+            m->drift = k == 0 ? s->drift_sigma[i] * drawn[1] : decay * m->drift + s->drift_sigma[i] * share * drawn[1];
             error += m->drift;
         }
     }
-    if (s->walk[i] > 0.0 && k > 0)
-        m->walk += s->walk[i] * first_normal(seed, k, SENSOR_NOISE_STREAM + i, 1);
+    if (s->walk[i] > 0.0 && k > 0) m->walk += s->walk[i] * first_normal(seed, k, SENSOR_NOISE_STREAM + i, 1);
     return error + m->walk;
 }
 
@@ -47,15 +44,12 @@ static double sensor_sample(const hsv_sensors *s, hsv_sensor_memory *m, int i, i
     if (s->latency[i] > 0) {
         const int64_t size = s->latency[i] + 1;
         if (k == 0)
-            for (int64_t j = 0; j < size; j++)
-                m->queue[j] = value;
+            for (int64_t j = 0; j < size; j++) m->queue[j] = value;
         m->queue[k % size] = value;
         value = m->queue[(k + 1) % size];
     }
-    if (s->drop_out[i] > 0.0 && k > 0 && first_uniform(seed, k, SENSOR_LOSS + i, 0) < s->drop_out[i])
-        return m->held;
-    if (s->quantum[i] > 0.0)
-        value = s->quantum[i] * __builtin_floor(value / s->quantum[i] + 0.5);
+    if (s->drop_out[i] > 0.0 && k > 0 && first_uniform(seed, k, SENSOR_LOSS + i, 0) < s->drop_out[i]) return m->held;
+    if (s->quantum[i] > 0.0) value = s->quantum[i] * __builtin_floor(value / s->quantum[i] + 0.5);
     m->held = limited(value, s->minimum[i], s->maximum[i]);
     return m->held;
 }
@@ -68,23 +62,16 @@ static double sensor_failed(const hsv_fault *fault, hsv_fault_memory *memory, in
     const int fresh = memory->onset == (double)k;
     const int64_t draw = (int64_t)fault->start;
     switch (fault->code) {
-    case SENSOR_SCALE:
-        return first * value;
-    case SENSOR_NOISE:
-        return value + first * first_normal(seed, k, SENSOR_FAULT_NOISE + fault->channel, draw);
-    case SENSOR_BIAS:
-        return value + first;
-    case SENSOR_RUNAWAY:
-        return value + limited(first * (((double)k - fault->start) * period), -limit, limit);
+    case SENSOR_SCALE: return first * value;
+    case SENSOR_NOISE: return value + first * first_normal(seed, k, SENSOR_FAULT_NOISE + fault->channel, draw);
+    case SENSOR_BIAS: return value + first;
+    case SENSOR_RUNAWAY: return value + limited(first * (((double)k - fault->start) * period), -limit, limit);
     case SENSOR_DROP_OUT:
-        if (fresh)
-            memory->kept = k > 0 ? given : value;
-        if (first_uniform(seed, k, SENSOR_FAULT_LOSS + fault->channel, draw) >= first)
-            memory->kept = value;
+        if (fresh) memory->kept = k > 0 ? given : value;
+        if (first_uniform(seed, k, SENSOR_FAULT_LOSS + fault->channel, draw) >= first) memory->kept = value;
         return memory->kept;
     case SENSOR_FREEZE:
-        if (fresh)
-            memory->kept = value;
+        if (fresh) memory->kept = value;
         return memory->kept;
     }
     return value;
@@ -96,10 +83,10 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
     double pitch_error = 0.0;
-    for (int i = STATES - 1; i >= 0; i--) { /* the error of the pitch angle is known before that of the angle of attack */
+    for (int i = STATES - 1; i >= 0;
+         i--) { /* the error of the pitch angle is known before that of the angle of attack */
         measurement[i] = x[i];
-        if (!sensors->on[i])
-            continue;
+        if (!sensors->on[i]) continue;
         double error = sensor_error(sensors, &memory[i], i, k, seed);
         if (i == PITCH)
             pitch_error = error;
@@ -115,7 +102,5 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
                 *value = sensor_failed(fault, &faults->memory[j], k, seed, faults->period, *value,
                                        memory[fault->channel].given);
             }
-    for (int i = 0; i < STATES; i++)
-        memory[i].given = measurement[i];
+    for (int i = 0; i < STATES; i++) memory[i].given = measurement[i];
 }
-#endif

@@ -1,6 +1,5 @@
 /* Many steps at once: the plan of a governor, and what the design measures along flights and random sequences. */
-#ifndef SEQUENCES_H
-#define SEQUENCES_H
+#pragma once
 #include "nominal.h"
 #include "noise.h"
 #include "notch_filter.h"
@@ -13,13 +12,12 @@ int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity,
     const int inside = vertex_weights(polytope, altitude, velocity, weights);
     weighted_entries(polytope, weights, entries);
     memset(S, 0, ENTRIES * sizeof *S);
-    for (int64_t e = 0; e < polytope->used; e++)
-        S[polytope->entries[e]] = entries[e];
+    for (int64_t e = 0; e < polytope->used; e++) S[polytope->entries[e]] = entries[e];
     return inside;
 }
 
-/* Write u_r + u_n (steps, 2) and x_n (steps, 9) from the step "first" on, where x_n is "start"; the model is scheduled by
- * x_r + x_n. Return whether x_n stays in the family. */
+/* Write u_r + u_n (steps, 2) and x_n (steps, 9) from the step "first" on, where x_n is "start"; the model is scheduled
+ * by x_r + x_n. Return whether x_n stays in the family. */
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation)
 {
@@ -32,8 +30,7 @@ int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t
         const double *x_r = reference->state + STATES * row, *u_r = reference->input + INPUTS * row;
         memcpy(deviation + STATES * k, x_n, sizeof x_n);
         held &= nominal_input(nominal, x_n, u_n, &index);
-        for (int i = 0; i < INPUTS; i++)
-            plan[INPUTS * k + i] = u_r[i] + u_n[i];
+        for (int i = 0; i < INPUTS; i++) plan[INPUTS * k + i] = u_r[i] + u_n[i];
         nominal_advance(&nominal->polytope, x_r[ALTITUDE] + x_n[ALTITUDE], x_r[VELOCITY] + x_n[VELOCITY], x_n, u_n,
                         reference->defect + STATES * row);
     }
@@ -45,55 +42,48 @@ void hsv_notch_along(const hsv_notch *notch, int64_t steps, const double *rate, 
 {
     double s[2 * MAX_SECTIONS] = {0};
     const size_t count = 2 * (size_t)notch->sections;
-    if (steps > 0)
-        notch_rest(notch, rate[0], s);
+    if (steps > 0) notch_rest(notch, rate[0], s);
     for (int64_t k = 0; k < steps; k++) {
         memcpy(states + (size_t)k * count, s, count * sizeof *s);
         filtered[k] = notch_step(notch, s, rate[k]);
     }
 }
 
-/* Write C a + D c (rows, 2), and A a + B c into "new". */
-static void respond_once(int64_t states, const double *A, const double *B, const double *C, const double *D,
-                         const double *a, const double *c, double *output, double *new)
+/* Add C a + D c to the output (2), and replace a by A a + B c. */
+static void respond_once(const hsv_sampled *f, const double *c, double *a, double *output)
 {
+    const int64_t n = f->states;
+    double new[4] = {0};
     for (int i = 0; i < INPUTS; i++) {
-        for (int64_t j = 0; j < states; j++)
-            output[i] += C[states * i + j] * a[j];
-        for (int j = 0; j < INPUTS; j++)
-            output[i] += D[INPUTS * i + j] * c[j];
+        for (int64_t j = 0; j < n; j++) output[i] += f->C[n * i + j] * a[j];
+        for (int j = 0; j < INPUTS; j++) output[i] += f->D[INPUTS * i + j] * c[j];
     }
-    for (int64_t i = 0; i < states; i++) {
-        new[i] = 0.0;
-        for (int64_t j = 0; j < states; j++)
-            new[i] += A[states * i + j] * a[j];
-        for (int j = 0; j < INPUTS; j++)
-            new[i] += B[INPUTS * i + j] * c[j];
+    for (int64_t i = 0; i < n; i++) {
+        for (int64_t j = 0; j < n; j++) new[i] += f->A[n * i + j] * a[j];
+        for (int j = 0; j < INPUTS; j++) new[i] += f->B[INPUTS * i + j] * c[j];
     }
+    memcpy(a, new, (size_t)n * sizeof *a);
 }
 
-/* Write the states (steps, states) of sampled actuators before each step, and their mean positions (steps, 2), for
- * commands (steps, 2), from zero. At most 4 states. */
-void hsv_respond(int64_t steps, int64_t states, const double *A, const double *B, const double *C, const double *D,
-                 const double *commands, double *before, double *means)
+/* Write the states (steps, states) before each step and the mean positions (steps, 2), for commands (steps, 2). */
+void hsv_respond(const hsv_sampled *actuators, int64_t steps, const double *commands, double *before, double *means)
 {
-    double a[4] = {0}, new[4];
+    double a[4] = {0};
+    memset(means, 0, (size_t)(INPUTS * steps) * sizeof *means);
     for (int64_t k = 0; k < steps; k++) {
-        means[INPUTS * k] = means[INPUTS * k + 1] = 0.0;
-        memcpy(before + states * k, a, (size_t)states * sizeof *a);
-        respond_once(states, A, B, C, D, a, commands + INPUTS * k, means + INPUTS * k, new);
-        memcpy(a, new, (size_t)states * sizeof *a);
+        memcpy(before + actuators->states * k, a, (size_t)actuators->states * sizeof *a);
+        respond_once(actuators, commands + INPUTS * k, a, means + INPUTS * k);
     }
 }
 
-/* Write the effect of the plan's lag on the error (steps, 5 + filter + actuator states) and on the feedback (steps, 2) in
- * closed loop, from zero; see hsv.design.error_system. gain (2, 5): F; scheduled, lag (steps, 2). */
-void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch, int64_t steps,
-                      int64_t states, const double *A, const double *B, const double *C, const double *D,
-                      const double *scheduled, const double *lag, double *errors, double *feedback)
+/* Write the effect of the plan's lag on the error (steps, 5 + filter + actuator states) and on the feedback (steps, 2)
+ * in closed loop, from zero; see hsv.design.error_system. gain (2, 5): F; scheduled, lag (steps, 2). */
+void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hsv_notch *notch,
+                      const hsv_sampled *actuators, int64_t steps, const double *scheduled, const double *lag,
+                      double *errors, double *feedback)
 {
-    double x[RIGID] = {0}, new[RIGID], s[2 * MAX_SECTIONS] = {0}, a[4] = {0}, turned[4], S[ENTRIES];
-    const int64_t filter = 2 * notch->sections, width = RIGID + filter + states;
+    double x[RIGID] = {0}, new[RIGID], s[2 * MAX_SECTIONS] = {0}, a[4] = {0}, S[ENTRIES];
+    const int64_t states = actuators->states, filter = 2 * notch->sections, width = RIGID + filter + states;
     for (int64_t k = 0; k < steps; k++) {
         double *error = errors + width * k, *own = feedback + INPUTS * k;
         memcpy(error, x, sizeof x);
@@ -105,18 +95,14 @@ void hsv_lag_response(const hsv_polytope *polytope, const double *gain, const hs
         for (int i = 0; i < INPUTS; i++) {
             own[i] = gain[RIGID * i + PITCH_RATE] * filtered;
             for (int j = 0; j < RIGID; j++)
-                if (j != PITCH_RATE)
-                    own[i] += gain[RIGID * i + j] * x[j];
+                if (j != PITCH_RATE) own[i] += gain[RIGID * i + j] * x[j];
         }
-        respond_once(states, A, B, C, D, a, own, held, turned);
-        memcpy(a, turned, (size_t)states * sizeof *a);
+        respond_once(actuators, own, a, held);
         for (int i = 0; i < RIGID; i++) {
             const double *row = S + (STATES + INPUTS) * i;
             new[i] = 0.0;
-            for (int j = 0; j < RIGID; j++)
-                new[i] += row[j] * x[j];
-            for (int j = 0; j < INPUTS; j++)
-                new[i] += row[STATES + j] * held[j];
+            for (int j = 0; j < RIGID; j++) new[i] += row[j] * x[j];
+            for (int j = 0; j < INPUTS; j++) new[i] += row[STATES + j] * held[j];
         }
         memcpy(x, new, sizeof x);
     }
@@ -137,15 +123,13 @@ static uint64_t mix(uint64_t state)
 static double square(const double *v, int64_t width)
 {
     double total = 0.0;
-    for (int64_t i = 0; i < width; i++)
-        total += v[i] * v[i];
+    for (int64_t i = 0; i < width; i++) total += v[i] * v[i];
     return total;
 }
 
 static void add_column(const double *column, double value, int64_t width, double *sum)
 {
-    for (int64_t i = 0; i < width; i++)
-        sum[i] += column[i] * value;
+    for (int64_t i = 0; i < width; i++) sum[i] += column[i] * value;
 }
 
 /* Write the next v of a vertex, whose rows are the columns of states, of disturbances, and a constant one. */
@@ -162,24 +146,20 @@ static uint64_t outward(const double *vertex, int64_t rows, int64_t width, int64
 {
     uint64_t signs = 0;
     memcpy(new, vertex + width * (rows - 1), (size_t)width * sizeof *new);
-    for (int64_t j = 0; j < n; j++)
-        add_column(vertex + width * j, v[j], width, new);
+    for (int64_t j = 0; j < n; j++) add_column(vertex + width * j, v[j], width, new);
     for (int64_t j = n; j < rows - 1; j++) {
         double along = 0.0;
-        for (int64_t i = 0; i < width; i++)
-            along += new[i] * vertex[width * j + i];
-        if (along >= 0.0)
-            signs |= UINT64_C(1) << j;
+        for (int64_t i = 0; i < width; i++) along += new[i] * vertex[width * j + i];
+        if (along >= 0.0) signs |= UINT64_C(1) << j;
         add_column(vertex + width * j, along >= 0.0 ? 1.0 : -1.0, width, new);
     }
     return signs;
 }
 
-/* Fly the sequences first ... end - 1, each of a kind (number mod 4: iid, held, switching, adversarial) from zero or from
- * the boundary; take the greatest levels into "worst" (4, 2). columns (vertices, rows, width), begin (width). */
+/* Fly the sequences first ... end - 1, each of a kind (number mod 4: iid, held, switching, adversarial) from zero or
+ * from the boundary; take the greatest levels into "worst" (4, 2). columns (vertices, rows, width), begin (width). */
 void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const double *columns, int64_t n,
-                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed,
-                          double *worst)
+                          const double *begin, int64_t first, int64_t end, int64_t steps, uint64_t seed, double *worst)
 {
     double v[MAX_WIDTH], new[MAX_WIDTH];
     for (int64_t sequence = first; sequence < end; sequence++) {
@@ -195,8 +175,7 @@ void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const d
                     v[i] += (double)(mix(state) >> 11) * 0x1p-53 - 0.5;
                 }
             const double norm = root(square(v, width));
-            for (int64_t i = 0; i < width; i++)
-                v[i] /= norm;
+            for (int64_t i = 0; i < width; i++) v[i] /= norm;
         } else
             memcpy(v, begin, (size_t)width * sizeof *v);
         double reached = boundary ? 0.0 : square(v, width);
@@ -218,8 +197,7 @@ void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const d
                 for (int64_t i = 0; i < vertices; i++) {
                     const uint64_t choice = outward(columns + rows * width * i, rows, width, n, v, new);
                     const double level = square(new, width);
-                    if (level > top)
-                        top = level, vertex = i, signs = choice;
+                    if (level > top) top = level, vertex = i, signs = choice;
                 }
             } else if (kind == 3)
                 signs = outward(columns + rows * width * vertex, rows, width, n, v, new);
@@ -230,4 +208,3 @@ void hsv_sample_sequences(int64_t vertices, int64_t rows, int64_t width, const d
         worst[2 * kind + boundary] = maximum(worst[2 * kind + boundary], reached);
     }
 }
-#endif

@@ -3,8 +3,7 @@
  * These are computed before a flight, but a flight is repeated by their bits: LAPACK chooses its kernels, and with them
  * the order of its sums, by the processor.
  */
-#ifndef TRIM_H
-#define TRIM_H
+#pragma once
 #include "estimator.h"
 #include "vehicle.h"
 
@@ -17,8 +16,7 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
     for (int64_t column = 0; column < n; column++) {
         int64_t pivot = column;
         for (int64_t row = column + 1; row < n; row++)
-            if (magnitude(A[n * row + column]) > magnitude(A[n * pivot + column]))
-                pivot = row;
+            if (magnitude(A[n * row + column]) > magnitude(A[n * pivot + column])) pivot = row;
         for (int64_t j = 0; pivot != column && j < n + m; j++) {
             double *first = j < n ? &A[n * column + j] : &b[m * column + j - n];
             double *second = j < n ? &A[n * pivot + j] : &b[m * pivot + j - n], swapped = *first;
@@ -26,16 +24,13 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
         }
         for (int64_t row = column + 1; row < n; row++) {
             const double share = A[n * row + column] / A[n * column + column];
-            for (int64_t j = column; j < n; j++)
-                A[n * row + j] -= share * A[n * column + j];
-            for (int64_t j = 0; j < m; j++)
-                b[m * row + j] -= share * b[m * column + j];
+            for (int64_t j = column; j < n; j++) A[n * row + j] -= share * A[n * column + j];
+            for (int64_t j = 0; j < m; j++) b[m * row + j] -= share * b[m * column + j];
         }
     }
     for (int64_t row = n - 1; row >= 0; row--)
         for (int64_t j = 0; j < m; j++) {
-            for (int64_t k = row + 1; k < n; k++)
-                b[m * row + j] -= A[n * row + k] * b[m * k + j];
+            for (int64_t k = row + 1; k < n; k++) b[m * row + j] -= A[n * row + k] * b[m * k + j];
             b[m * row + j] /= A[n * row + row];
         }
 }
@@ -48,8 +43,8 @@ void hsv_solve(int64_t n, int64_t m, double *A, double *b)
  * alpha plus the path angle (rad); the pitch rate (rad/s) is that of a steady pull-up. The elastic coordinates are
  * N_i / omega_i^2: the pitching moment is zero, whatever the inertial coupling. "rigid": without coupling.
  */
-double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate,
-                   double *unknown, double *x, double *u)
+double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
+                   double *x, double *u)
 {
     static const int rows[3] = {VELOCITY, ALPHA, PITCH_RATE};
     const double converged = 1e-9;
@@ -57,16 +52,15 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
     double rates[STATES], A[STATES * STATES], B[STATES * INPUTS], slope[9], right[3], trial[3];
     double best = INFINITY;
     memcpy(trial, unknown, sizeof trial);
-    for (int i = PITCH_RATE; i < STATES; i++)
-        x[i] = 0.0;
+    for (int i = PITCH_RATE; i < STATES; i++) x[i] = 0.0;
     x[PITCH_RATE] = pitch_rate;
     for (int iteration = 0; iteration < 60; iteration++) {
         x[ALPHA] = trial[0], x[PITCH] = trial[0] + path_angle;
         u[FUEL] = trial[1], u[ELEVATOR] = trial[2];
         derivative(x, u, vehicle, NULL, rates);
         rates[VELOCITY] -= acceleration;
-        const double size = maximum(maximum(magnitude(rates[VELOCITY]), magnitude(rates[ALPHA])),
-                                    magnitude(rates[PITCH_RATE]));
+        const double size =
+            maximum(maximum(magnitude(rates[VELOCITY]), magnitude(rates[ALPHA])), magnitude(rates[PITCH_RATE]));
         if (!is_finite(size) || (size >= best && best < converged)) /* at rounding level no further step helps */
             break;
         if (size < best) {
@@ -77,13 +71,11 @@ double hsv_balance(const hsv_vehicle *rigid, double path_angle, double accelerat
         for (int i = 0; i < 3; i++) {
             /* The path angle is given: pitch angle and angle of attack change together. */
             slope[3 * i] = A[STATES * rows[i] + ALPHA] + A[STATES * rows[i] + PITCH];
-            for (int j = 0; j < INPUTS; j++)
-                slope[3 * i + 1 + j] = B[INPUTS * rows[i] + j];
+            for (int j = 0; j < INPUTS; j++) slope[3 * i + 1 + j] = B[INPUTS * rows[i] + j];
             right[i] = rates[rows[i]];
         }
         hsv_solve(3, 1, slope, right);
-        for (int i = 0; i < 3; i++)
-            trial[i] -= right[i];
+        for (int i = 0; i < 3; i++) trial[i] -= right[i];
     }
     x[ALPHA] = unknown[0], x[PITCH] = unknown[0] + path_angle;
     u[FUEL] = unknown[1], u[ELEVATOR] = unknown[2];
@@ -127,12 +119,10 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
         double *d = defect + STATES * k, flown[STATES];
         const double *x = state + STATES * k, *now = command + 2 * k, *climb = rate + 2 * k;
         memset(d, 0, sizeof flown);
-        if (k + 1 == rows || (equal(now, now + 2) && equal(climb, still) && equal(climb + 2, still)))
-            continue;
+        if (k + 1 == rows || (equal(now, now + 2) && equal(climb, still) && equal(climb + 2, still))) continue;
         memcpy(flown, x, sizeof flown);
         advance(flown, input + INPUTS * k, (const Vehicle *)rigid, NULL, period, substeps);
-        for (int i = 0; i < STATES; i++)
-            d[i] = flown[i] - x[STATES + i];
+        for (int i = 0; i < STATES; i++) d[i] = flown[i] - x[STATES + i];
     }
 }
 
@@ -142,8 +132,7 @@ static void multiply(int n, int m, int p, const double *A, const double *B, doub
     memset(product, 0, (size_t)(n * p) * sizeof *product);
     for (int i = 0; i < n; i++)
         for (int k = 0; k < m; k++)
-            for (int j = 0; j < p; j++)
-                product[p * i + j] += A[m * i + k] * B[p * k + j];
+            for (int j = 0; j < p; j++) product[p * i + j] += A[m * i + k] * B[p * k + j];
 }
 
 /* Write the matrix F (11, 11) that takes states and held inputs over a period (s), by its power series; A (9, 9) and
@@ -153,13 +142,10 @@ void hsv_transition(const double *A, const double *B, double period, double *F)
     const int n = ESTIMATED;
     double rates[ROOM] = {0}, term[ROOM] = {0}, next[ROOM];
     for (int i = 0; i < STATES; i++) {
-        for (int j = 0; j < STATES; j++)
-            rates[n * i + j] = A[STATES * i + j] * period;
-        for (int j = 0; j < INPUTS; j++)
-            rates[n * i + STATES + j] = B[INPUTS * i + j] * period;
+        for (int j = 0; j < STATES; j++) rates[n * i + j] = A[STATES * i + j] * period;
+        for (int j = 0; j < INPUTS; j++) rates[n * i + STATES + j] = B[INPUTS * i + j] * period;
     }
-    for (int i = 0; i < n; i++)
-        term[(n + 1) * i] = 1.0;
+    for (int i = 0; i < n; i++) term[(n + 1) * i] = 1.0;
     memcpy(F, term, sizeof term);
     for (int order = 1; order < 25; order++) {
         multiply(n, n, n, term, rates, next);
@@ -172,8 +158,8 @@ void hsv_transition(const double *A, const double *B, double period, double *F)
 
 /* Iterate the Riccati equation to the steady gain (11, 5) of states and input offsets; return the iterations.
  *
- * process: standard deviations (11) of the noise that a period adds; noise: (5) of the measurements; settled: relative
- * change of the gain in an iteration where it is steady. */
+ * process, noise: standard deviations of the noise that a period adds (11) and of the measurements (5); settled:
+ * relative change of a steady gain in an iteration. */
 int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
                         int64_t iterations, double settled, double *gain)
 {
@@ -181,19 +167,15 @@ int64_t hsv_steady_gain(const double *A, const double *B, double period, const d
     double F[ROOM], F_t[ROOM], P[ROOM] = {0}, M[ROOM], product[ROOM], S[RIGID * RIGID], right[RIGID * ESTIMATED];
     hsv_transition(A, B, period, F);
     for (int i = 0; i < n; i++)
-        for (int j = 0; j < n; j++)
-            F_t[n * j + i] = F[n * i + j];
+        for (int j = 0; j < n; j++) F_t[n * j + i] = F[n * i + j];
     memset(gain, 0, (size_t)(n * r) * sizeof *gain);
     for (int64_t iteration = 0; iteration < iterations; iteration++) {
         multiply(n, n, n, F, P, product);
         multiply(n, n, n, product, F_t, M);
-        for (int i = 0; i < n; i++)
-            M[(n + 1) * i] += process[i] * process[i];
+        for (int i = 0; i < n; i++) M[(n + 1) * i] += process[i] * process[i];
         for (int i = 0; i < r; i++) {
-            for (int j = 0; j < r; j++)
-                S[r * i + j] = M[n * i + j] + (i == j ? noise[i] * noise[i] : 0.0);
-            for (int j = 0; j < n; j++)
-                right[n * i + j] = M[n * j + i];
+            for (int j = 0; j < r; j++) S[r * i + j] = M[n * i + j] + (i == j ? noise[i] * noise[i] : 0.0);
+            for (int j = 0; j < n; j++) right[n * i + j] = M[n * j + i];
         }
         hsv_solve(r, n, S, right);
         double change = 0.0;
@@ -212,9 +194,7 @@ int64_t hsv_steady_gain(const double *A, const double *B, double period, const d
             for (int j = 0; j <= i; j++)
                 P[n * i + j] = P[n * j + i] =
                     0.5 * ((M[n * i + j] - product[n * i + j]) + (M[n * j + i] - product[n * j + i]));
-        if (change <= settled)
-            return iteration + 1;
+        if (change <= settled) return iteration + 1;
     }
     return iterations;
 }
-#endif

@@ -10,8 +10,7 @@
  * Robust MPC, the paper's comparison (section 5.2), is the same with a nominal gain K in place of F and without x_n and
  * u_n ("planned" is 0).
  */
-#ifndef TUBE_LAW_H
-#define TUBE_LAW_H
+#pragma once
 #include "notch_filter.h"
 
 typedef struct {
@@ -22,8 +21,7 @@ typedef struct {
 static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
 {
     int64_t index = 0;
-    while (index + 1 < tube->count && tube->starts[index + 1] <= k)
-        index++;
+    while (index + 1 < tube->count && tube->starts[index + 1] <= k) index++;
     return index;
 }
 
@@ -42,16 +40,13 @@ static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const rea
 {
     const int64_t own_states = 2 * tube->notch.sections;
     if (k == 0) {
-        for (int64_t i = 0; i < own_states && i < filter_states; i++)
-            memory->planned[i] = s[i];
-        for (int j = 0; j < INTEGRATED; j++)
-            memory->integral[j] = all(0.0);
+        for (int64_t i = 0; i < own_states && i < filter_states; i++) memory->planned[i] = s[i];
+        for (int j = 0; j < INTEGRATED; j++) memory->integral[j] = all(0.0);
     }
     real rate_error = tube->planned ? q_f - x_n[PITCH_RATE] - x_r[PITCH_RATE] : q_f - x_r[PITCH_RATE];
     if ((tube->filtered || monitored) && own_states > 0 && own_states == filter_states) {
         const real planned_rate = notch_step(&tube->notch, memory->planned, x_r[PITCH_RATE] + x_n[PITCH_RATE]);
-        if (tube->filtered)
-            rate_error = q_f - planned_rate;
+        if (tube->filtered) rate_error = q_f - planned_rate;
     }
     mask limit = never();
     for (int i = 0; i < INPUTS; i++) {
@@ -62,8 +57,7 @@ static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const rea
             feedback += row[j] * (j == PITCH_RATE ? rate_error : error);
         }
         if (tube->integral_rate > 0.0) {
-            for (int j = 0; j < INTEGRATED; j++)
-                integral += tube->integral_rate * row[j] * memory->integral[j];
+            for (int j = 0; j < INTEGRATED; j++) integral += tube->integral_rate * row[j] * memory->integral[j];
             plan += integral;
         }
         const real arriving = feedback + plan + u_r[i];
@@ -79,4 +73,3 @@ static inline void tube_step(const hsv_tube *tube, TubeMemory *memory, const rea
             memory->integral[j] = choose(limit, memory->integral[j], more);
         }
 }
-#endif

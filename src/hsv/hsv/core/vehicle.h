@@ -20,8 +20,7 @@
  * (rad/s), eta_1 (kg^0.5 m) and its rate, eta_2 and its rate. Input u: equivalence ratio phi (1), elevator delta_e
  * (rad). V and alpha are inertial; air that moves acts through "conditions", see forces_in.
  */
-#ifndef VEHICLE_H
-#define VEHICLE_H
+#pragma once
 #include "elementary.h"
 
 /* Conditions of air and engine: wind forward and up (m/s), density relative to the model's, factors of thrust, lift and
@@ -41,7 +40,8 @@ typedef struct {
 static inline Forces forces(real altitude, real velocity, real alpha, const real *u, const Vehicle *p)
 {
     const real fuel = u[FUEL], elevator = u[ELEVATOR];
-    const real density = p->reference_density * exponential(-(altitude - p->reference_altitude) / p->density_scale_height);
+    const real density =
+        p->reference_density * exponential(-(altitude - p->reference_altitude) / p->density_scale_height);
     const real pressure = 0.5 * density * velocity * velocity;
     const real alpha2 = alpha * alpha;
     Forces f;
@@ -53,10 +53,9 @@ static inline Forces forces(real altitude, real velocity, real alpha, const real
     f.thrust = (p->thrust_beta_1 * fuel + p->thrust_beta_2) * alpha2 * alpha +
                (p->thrust_beta_3 * fuel + p->thrust_beta_4) * alpha2 +
                (p->thrust_beta_5 * fuel + p->thrust_beta_6) * alpha + (p->thrust_beta_7 * fuel + p->thrust_beta_8);
-    f.moment = p->thrust_moment_arm * f.thrust +
-               pressure * p->reference_area * p->mean_aerodynamic_chord *
-                   (p->moment_alpha_squared * alpha2 + p->moment_alpha * alpha + p->moment_zero +
-                    p->moment_elevator * elevator);
+    f.moment = p->thrust_moment_arm * f.thrust + pressure * p->reference_area * p->mean_aerodynamic_chord *
+                                                     (p->moment_alpha_squared * alpha2 + p->moment_alpha * alpha +
+                                                      p->moment_zero + p->moment_elevator * elevator);
     return f;
 }
 
@@ -83,12 +82,13 @@ static inline AirRelative air_relative(real velocity, real path_angle, real forw
  * turned by the angle between the two paths: lift is across the inertial path, drag along it. */
 static inline Forces forces_in(const real *conditions, const real *x, const real *u, const Vehicle *p, real *alpha)
 {
-    const AirRelative air = air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
+    const AirRelative air =
+        air_relative(x[VELOCITY], x[PITCH] - x[ALPHA], conditions[WIND_FORWARD], conditions[WIND_UP]);
     *alpha = x[ALPHA] - air.turn;
     Forces f = forces(x[ALTITUDE], air.speed, *alpha, u, p);
-    const real moment = conditions[DENSITY] * (f.moment - p->thrust_moment_arm * f.thrust +
-                                               f.pressure * p->reference_area * p->mean_aerodynamic_chord *
-                                                   conditions[MOMENT_INCREMENT]);
+    const real moment = conditions[DENSITY] *
+                        (f.moment - p->thrust_moment_arm * f.thrust +
+                         f.pressure * p->reference_area * p->mean_aerodynamic_chord * conditions[MOMENT_INCREMENT]);
     f.thrust *= conditions[THRUST_FACTOR]; /* which does not depend on the density */
     const real lift = f.lift * (conditions[DENSITY] * conditions[LIFT_FACTOR]);
     const real drag = f.drag * (conditions[DENSITY] * conditions[DRAG_FACTOR]);
@@ -122,10 +122,10 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     const plain c_1 = psi_1 / p->moment_of_inertia, c_2 = psi_2 / p->moment_of_inertia;
     const real angular = f.moment / p->moment_of_inertia;
     const plain k_1 = 1.0 + psi_1 * c_1, k_2 = 1.0 + psi_2 * c_2, k_12 = psi_1 * c_2;
-    const real right_1 = -2.0 * p->damping_ratio_1 * omega_1 * x[ETA_1_RATE] - omega_1 * omega_1 * x[ETA_1] + force_1 -
-                         psi_1 * angular;
-    const real right_2 = -2.0 * p->damping_ratio_2 * omega_2 * x[ETA_2_RATE] - omega_2 * omega_2 * x[ETA_2] + force_2 -
-                         psi_2 * angular;
+    const real right_1 =
+        -2.0 * p->damping_ratio_1 * omega_1 * x[ETA_1_RATE] - omega_1 * omega_1 * x[ETA_1] + force_1 - psi_1 * angular;
+    const real right_2 =
+        -2.0 * p->damping_ratio_2 * omega_2 * x[ETA_2_RATE] - omega_2 * omega_2 * x[ETA_2] + force_2 - psi_2 * angular;
     const plain determinant = k_1 * k_2 - k_12 * k_12;
     const real acceleration_1 = (k_2 * right_1 - k_12 * right_2) / determinant;
     const real acceleration_2 = (k_1 * right_2 - k_12 * right_1) / determinant;
@@ -135,7 +135,8 @@ static inline void derivative(const real *x, const real *u, const Vehicle *p, co
     sine_cosine(x[PITCH] - x[ALPHA], &sin_path, &cos_path);
     out[ALTITUDE] = velocity * sin_path;
     out[VELOCITY] = (f.thrust * cos_alpha - f.drag) / p->mass - p->gravity * sin_path;
-    out[ALPHA] = (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + p->gravity / velocity * cos_path;
+    out[ALPHA] =
+        (-f.thrust * sin_alpha - f.lift) / (p->mass * velocity) + x[PITCH_RATE] + p->gravity / velocity * cos_path;
     out[PITCH] = x[PITCH_RATE];
     out[PITCH_RATE] = angular + c_1 * acceleration_1 + c_2 * acceleration_2;
     out[ETA_1] = x[ETA_1_RATE];
@@ -151,8 +152,7 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
     const real h = period / (double)substeps;
     real slope[STATES], point[STATES], total[STATES];
     for (int64_t step = 0; step < substeps; step++) {
-        for (int i = 0; i < STATES; i++)
-            point[i] = total[i] = x[i];
+        for (int i = 0; i < STATES; i++) point[i] = total[i] = x[i];
         for (int stage = 0; stage < 4; stage++) {
             const real reach = stage == 2 ? h : 0.5 * h;
             derivative(point, u, p, conditions, slope);
@@ -161,8 +161,7 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
                 point[i] = x[i] + reach * slope[i];
             }
         }
-        for (int i = 0; i < STATES; i++)
-            x[i] += h / 6.0 * total[i];
+        for (int i = 0; i < STATES; i++) x[i] += h / 6.0 * total[i];
     }
 }
 
@@ -171,9 +170,7 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
 static inline mask in_model_range(const real *x, double angle_limit)
 {
     mask inside = (magnitude(x[ALPHA]) <= angle_limit) & (magnitude(x[PITCH]) <= angle_limit) & (x[VELOCITY] > 0.0);
-    for (int i = 0; i < STATES; i++)
-        inside &= is_finite(x[i]);
+    for (int i = 0; i < STATES; i++) inside &= is_finite(x[i]);
     return inside;
 }
-#endif
 #endif

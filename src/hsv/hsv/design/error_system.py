@@ -174,8 +174,8 @@ def lag_response(
         data.pointer,
         doubles(vector(gain)),
         notch.pointer,
+        actuators.pointer,
         len(lag),
-        a,
-        *(doubles(vector(each)) for each in (*actuators, scheduled, lag, errors, feedback)),
+        *(doubles(vector(each)) for each in (scheduled, lag, errors, feedback)),
     )
     return errors, feedback

@@ -60,8 +60,8 @@ def design_header(design: ControlDesign) -> str:
         f"The digest of the design is {design.to_parameters()['design.hash']}. This file is written by "
         '"hsv export-controller"; write it anew instead of changing it.',
         f'The tube is certified for the inertial coupling "{_plain(design.coupling)}" and the factors tau that '
-        f"tube_law admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h describes "
-        "the arrays.",
+        f"tube_law admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h "
+        "describes the arrays.",
         "Maximum number of operations in a step, step 0 included; a division counts as a multiplication, a subtraction "
         "as an addition:",
     )
@@ -74,8 +74,7 @@ def design_header(design: ControlDesign) -> str:
         " *",
         *(f" *   {name:18}{''.join(f'{count:>17}' for count in counts)}" for name, *counts in rows),
         " */",
-        "#ifndef DESIGN_H",
-        "#define DESIGN_H",
+        "#pragma once",
         '#include "core.h"',
         "",
         f"enum {{ SECTIONS = {len(design.notch)}, FILTERED = {int(design.filtered)} }};",
@@ -83,7 +82,6 @@ def design_header(design: ControlDesign) -> str:
         _array("designed_tau", "double", design.tau),
         *_constant("hsv_nominal", "nominal_data", nominal_data(design)),
         *_constant("hsv_tube", "tube_data", tube),
-        "#endif",
     ]
     return "\n".join(lines) + "\n"
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.core import doubles, lib, vector
+from hsv.core import Data, doubles, lib, vector
 from hsv.lpv.discretisation import zero_order_hold
 from hsv.vehicle.actuators import ActuatorSet
 from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
@@ -45,13 +45,15 @@ def actuator_system(actuators: Sequence[ActuatorSet]) -> tuple[np.ndarray, np.nd
     return A, B, C, D
 
 
-class SampledActuators(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SampledActuators(Data):
     """Actuators over a period, commands held: a+ = A a + B c exactly, and C a + D c is where they are on average.
 
     A (a, a), B (a, 2), C (2, a), D (2, 2). To a vehicle that answers slowly the average is all that counts, so that
     behind it the hull of the vertices of a polytopic model stays what it is.
     """
 
+    KIND = "hsv_sampled"
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
@@ -79,7 +81,8 @@ def respond(actuators: SampledActuators, commands: np.ndarray) -> tuple[np.ndarr
     They start from zero: commands are deviations from where the actuators rest.
     """
     states, means = np.empty((len(commands), len(actuators.A))), np.empty((len(commands), N_INPUTS))
-    lib.hsv_respond(*states.shape, *(doubles(vector(each)) for each in (*actuators, commands, states, means)))
+    given = (doubles(vector(each)) for each in (commands, states, means))
+    lib.hsv_respond(actuators.pointer, len(commands), *given)
     return states, means
 
 

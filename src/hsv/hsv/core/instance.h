@@ -1,0 +1,10 @@
+/* An instance of the loop: hsv_fly_NAME, and the memory that it needs between pieces. */
+#include "loop.h"
+#define JOINED_(a, b) a##b
+#define JOINED(a, b) JOINED_(a, b)
+
+int64_t JOINED(hsv_fly_, NAME)(hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
+{
+    return fly(flights, memory, start, stop);
+}
+const int64_t JOINED(hsv_memory_, NAME) = sizeof(Loop);
