@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from hsv.design.disturbance import Record, decompose
 from hsv.design.error_system import along_filter, lag_response, tube_errors
 from hsv.elementary import arcsine, arctangent2, exponential, logarithm, of_each, sine_cosine, tangent
 from hsv.elimination import solve
-from hsv.faults.laws import FaultRows, fault_rows
+from hsv.faults.laws import FaultRows, fault_memory, fault_rows
 from hsv.links import LinkData, link_state
 from hsv.lpv.actuated import SampledActuators, respond
 from hsv.lpv.polytope import Polytope, axis_weights
@@ -133,9 +134,10 @@ def polytopes(z: Golden) -> None:
         ("linear", linear),
     ):
         data = polytope.data()
-        z.check(
-            f"polytope.{name}.weights", [written(lib.hsv_weights, len(polytope.A), data.pointer, *p) for p in points]
-        )
+        # The schedule of one entry in each vertex is that of the weights.
+        r = len(polytope.A)
+        ones = replace(data, S=np.pad(np.eye(r), ((0, 0), (0, -r % lib.SUMS))), entries=np.arange(r))
+        z.check(f"polytope.{name}.weights", [written(lib.hsv_schedule, 99, ones.pointer, *p)[:r] for p in points])
         z.check(f"polytope.{name}.S", [written(lib.hsv_schedule, 99, data.pointer, *p) for p in points])
         room = ffi.new("double[99]")
         z.check(f"polytope.{name}.inside", [lib.hsv_schedule(data.pointer, *p, room) for p in points])
@@ -228,7 +230,7 @@ def tables(z: Golden, name: str) -> list[FaultRows]:
     rows["start"], rows["stop"], rows["channel"], rows["code"], rows["occurrence"] = columns[:, :5].T
     rows["cycle"], rows["parameter"] = columns[:, 5:7], columns[:, 7:]
     cases = np.split(rows, np.cumsum(z[f"faults.{name}.counts"])[:-1])
-    return [FaultRows(own.copy(), none.memory, PERIOD).fresh() for own in cases]
+    return [FaultRows(own.copy(), fault_memory(len(own)), PERIOD) for own in cases]
 
 
 def faults(z: Golden) -> None:
@@ -335,7 +337,7 @@ def filters(z: Golden) -> None:
 
 def effectiveness(z: Golden) -> None:
     flown = load_scenario("case1_active_deep", {"duration": "6 s", "fault[0].start": "0.6 s"}).parameters()
-    names = [field for field in EffectivenessData.__dataclass_fields__ if field not in ("vehicle", "start")]
+    names = [each.name for each in fields(EffectivenessData) if each.name not in ("vehicle", "start")]
     z.check("effectiveness.data.0", [getattr(effectiveness_data(flown, PERIOD), name) for name in names])
     for i, changes in enumerate(z["effectiveness.changes"]):
         data = effectiveness_data({**flown, **changes}, PERIOD)

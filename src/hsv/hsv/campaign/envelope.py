@@ -61,7 +61,7 @@ class Envelope:
         starts = window_starts(steps, len(self.count))
         starts = starts[starts < rows]
         reached = slice(len(starts))
-        finite = np.where(np.isfinite(curves), curves, np.nan)
+        finite = curves if np.isfinite(curves).all() else np.where(np.isfinite(curves), curves, np.nan)
         self.low[reached] = np.fmin(self.low[reached], np.fmin.reduceat(finite, starts, axis=1).T)
         self.high[reached] = np.fmax(self.high[reached], np.fmax.reduceat(finite, starts, axis=1).T)
         means = np.add.reduceat(finite, starts, axis=1).T / np.diff(starts, append=rows)[:, None]

@@ -95,7 +95,7 @@ class ControllerResult:
 
 
 class StepKernel(NamedTuple):
-    """A compiled step function, as of :func:`numba.cfunc`, with its arrays.
+    """A step function by its address, as a compiler of C or of Python makes it, with its arrays.
 
     The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; what is
     not 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` one after the other, ``out`` takes the wanted

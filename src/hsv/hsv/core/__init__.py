@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.resources import files
 from types import SimpleNamespace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -74,6 +75,13 @@ def _pointers(kind: str) -> dict[str, _Pointer]:
         name: _Pointer(bool(constant), tuple(map(_Dimension.read, filter(None, shape.split(",")))), "NULL" in words)
         for constant, name, shape, words in _POINTER.findall(body)
     }
+
+
+@cache
+def _fields(kind: str) -> dict[str, Any]:
+    """Return the types of the fields of a struct but those that count the elements of arrays."""
+    counts = {dimension.counts for pointer in _pointers(kind).values() for dimension in pointer.shape}
+    return {name: field.type for name, field in ffi.typeof(kind).fields if name not in counts}
 
 
 def _element(declared: Any) -> tuple[str, tuple[int, ...]]:
@@ -185,17 +193,28 @@ class Struct:
         self.source = source
         self.pointer = ffi.new(f"{kind} *")
         self._kept: list[Any] = []
-        self._fill(kind, self.pointer, source)
+        self._fill(kind, self.pointer[0], source)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Struct, (self.kind, self.source)
 
+    def replaced(self, source: Any, names: Iterable[str]) -> Struct:
+        """Return a struct of a ``source`` that differs in the fields of these ``names`` alone."""
+        other = Struct.__new__(Struct)
+        other.kind, other.source, other._kept = self.kind, source, [self]
+        other.pointer = ffi.new(f"{self.kind} *", self.pointer[0])
+        for name in names:
+            other._set(self.kind, other.pointer[0], name, _fields(self.kind)[name], source, {})
+        return other
+
     def _fill(self, kind: str, target: Any, source: Any) -> None:
+        if isinstance(source, tuple) and {*map(type, source)} == {float}:  # the numbers of a vehicle, many times
+            named: Any = source
+            ffi.memmove(ffi.addressof(target), ffi.new(f"{kind} *", named._asdict()), ffi.sizeof(kind))
+            return
         counts: dict[str, int] = {}
-        counted = {each.counts for pointer in _pointers(kind).values() for each in pointer.shape}
-        for name, field in ffi.typeof(kind).fields:
-            if name not in counted:
-                self._set(kind, target, name, field.type, source, counts)
+        for name, declared in _fields(kind).items():
+            self._set(kind, target, name, declared, source, counts)
         for name, count in counts.items():
             setattr(target, name, count)
 
@@ -242,19 +261,20 @@ class Struct:
             return value if isinstance(value, ffi.CData) else ffi.cast(declared, value)
         constant, shape, _ = pointer
         element = declared.item.cname
+        required = _ELEMENTS.get(element) or dtype(element)
+        fits = isinstance(value, np.ndarray) and value.dtype == required and value.flags.c_contiguous
+        if not constant and not (fits and value.flags.writeable):
+            raise TypeError("expected an array that the core can write to")
         if np.iscomplexobj(value):
             raise TypeError("complex numbers, expected real ones")
-        array = np.ascontiguousarray(value, _ELEMENTS.get(element) or dtype(element))
-        # numpy returns a view of an array that was unpickled: its type is equal, but another object.
-        same = isinstance(value, np.ndarray) and array.ctypes.data == value.ctypes.data
-        if not constant and not (same and array.flags.writeable):
-            raise TypeError("expected an array that the core can write to")
+        array = value if fits else np.ascontiguousarray(value, required)
         if shape:
             _measure(array.shape, shape, counts)
         self._kept.append(array)
         return ffi.cast(declared, ffi.from_buffer(array))
 
 
+@dataclass(frozen=True, eq=False)
 class Data:
     """Base of a frozen dataclass whose fields are those of a struct of core.h."""
 
@@ -270,6 +290,12 @@ class Data:
     def pointer(self) -> Any:
         """The pointer to :attr:`struct`."""
         return self.struct.pointer
+
+    def replaced(self, **changes: Any) -> Self:
+        """Return the data with other values of some fields; the struct is copied from this one."""
+        other = replace(self, **changes)
+        vars(other)["struct"] = self.struct.replaced(other, changes)
+        return other
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in vars(self).items() if name != "struct"}

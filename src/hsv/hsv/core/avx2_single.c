@@ -1,7 +1,9 @@
 /* One flight, with the instructions of AVX2. */
 #ifdef __x86_64__
-#pragma GCC target("avx2")
+#include "target.h"
+BEGIN_TARGET("avx2")
 #define LANES 1
 #define NAME avx2_single
 #include "instance.h"
+END_TARGET
 #endif

@@ -260,7 +260,6 @@ double hsv_logarithm(double x);
 void hsv_philox(const uint64_t *counter, const uint64_t *key, uint64_t *words);
 void hsv_uniforms(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
 void hsv_normals(int64_t seed, int64_t step, int64_t stream, int64_t draw, double *pair);
-
 /* Vehicle: conditions may be NULL. Forces: lift, drag, thrust, moment, dynamic pressure, angle of attack. */
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out);
 void hsv_complex_derivative(const double *x, const double *u, const hsv_vehicle *p, double *out);
@@ -271,7 +270,6 @@ int hsv_in_model_range(const double *x, double angle_limit);
 void hsv_jacobian(const double *x, const double *u, const hsv_vehicle *p, double *A, double *B);
 void hsv_transitions(int64_t count, const double *x, const double *u, const double *period, const int64_t *substeps,
                      const hsv_vehicle *p, double *end, double *changes);
-
 /* Equilibria and small linear systems. */
 void hsv_solve(int64_t n, int64_t m, double *A, double *b);
 double hsv_balance(const hsv_vehicle *rigid, double path_angle, double acceleration, double pitch_rate, double *unknown,
@@ -282,7 +280,6 @@ void hsv_reference_rows(const hsv_vehicle *rigid, int64_t rows, const double *co
 int64_t hsv_steady_gain(const double *A, const double *B, double period, const double *process, const double *noise,
                         int64_t iterations, double settled, double *gain);
 void hsv_transition(const double *A, const double *B, double period, double *F);
-
 /* Equipment, one flight. */
 void hsv_actuator_map(int64_t order, double frequency, double damping, double h, double *map);
 void hsv_actuator_step(int64_t order, const double *map, const double *state, double command, double minimum,
@@ -307,7 +304,6 @@ void hsv_sense(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_fault
                double *measurement);
 void hsv_plant_conditions(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                           const double *x, double fuel);
-
 /* Blocks of the loop, one step. */
 void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                        const double *actuator, double *x);
@@ -326,14 +322,11 @@ double hsv_effectiveness_step(const hsv_effectiveness *effectiveness, hsv_tube_m
 void hsv_air_relative(double velocity, double path_angle, double forward, double up, double *out);
 void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const double *step, double *bounds);
 double hsv_level(const double *P, int64_t size, const double *x);
-
 /* Flights: one, or as many as a register has lanes, in pieces. */
 int hsv_widest(void);
 int64_t hsv_memory_size(int64_t flights);
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop);
-
 /* Many steps at once: design, governor and metrics. */
-int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, double *weights);
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S);
 int hsv_plan(const hsv_nominal *nominal, const hsv_reference *reference, int64_t first, int64_t steps,
              const double *start, double *plan, double *deviation);

@@ -32,10 +32,7 @@ int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, voi
 {
     Fly *fly = hsv_fly_single;
 #ifdef __x86_64__
-    if (count > 1)
-        fly = count == 8 ? hsv_fly_avx512 : hsv_fly_avx2;
-    else if (instructions != SSE2)
-        fly = hsv_fly_avx2_single;
+    fly = count == 8 ? hsv_fly_avx512 : count == 4 ? hsv_fly_avx2 : instructions != SSE2 ? hsv_fly_avx2_single : fly;
 #endif
     return instructions < SSE2 || count < 1 ? start : fly(flights, memory, start, stop);
 }

@@ -73,12 +73,18 @@ static inline void quotient(plain high, plain low, plain by_high, plain by_low, 
     *rest = (((high - product) - error) + low - *q * by_low) / by_high;
 }
 
+/* 1 / (2k + 1), of the power series of arctangent and logarithm. */
+static const double ODD_INVERSE[] = {1.0 / 1.0,  1.0 / 3.0,  1.0 / 5.0,  1.0 / 7.0,  1.0 / 9.0,  1.0 / 11.0,
+                                     1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0, 1.0 / 21.0, 1.0 / 23.0,
+                                     1.0 / 25.0, 1.0 / 27.0, 1.0 / 29.0, 1.0 / 31.0, 1.0 / 33.0, 1.0 / 35.0,
+                                     1.0 / 37.0, 1.0 / 39.0, 1.0 / 41.0, 1.0 / 43.0, 1.0 / 45.0};
+
 /* Correct the angle high + low, whose tangent is at most tan(pi / 8), by the power series of the arctangent. */
 static inline plain arctangent_rest(plain high, plain low)
 {
     const plain z = high * high;
     plain series = all(0.0);
-    for (int k = 22; k >= 1; k--) series = series * z + (k % 2 ? -1.0 : 1.0) / (2 * k + 1);
+    for (int k = 22; k >= 1; k--) series = series * z + (k % 2 ? -ODD_INVERSE[k] : ODD_INVERSE[k]);
     return high * z * series + low / (1.0 + z);
 }
 
@@ -216,7 +222,7 @@ double hsv_logarithm(double x)
     /* log m = 2 artanh s = f - s (f - 2 s^2 (1/3 + s^2/5 + ...)) with f = m - 1, exact, and s = f / (2 + f). */
     const double f = mantissa - 1.0, s = f / (2.0 + f), z = s * s, half_square = 0.5 * f * f;
     double series = 0.0;
-    for (int k = 12; k >= 1; k--) series = series * z + 1.0 / (2 * k + 1);
+    for (int k = 12; k >= 1; k--) series = series * z + ODD_INVERSE[k];
     const double correction = s * (half_square + 2.0 * z * series), count = exponent;
     return count * LOG_2_HIGH - ((half_square - (correction + count * LOG_2_LOW)) - f);
 }

@@ -49,16 +49,10 @@ void hsv_curves(int64_t steps, int64_t stride, const double *history, const doub
     for (int64_t k = 0; k < steps; k++) {
         const double *x = history + HISTORY * k, *x_n = x + STATES + 1, *u = x_n + STATES + INPUTS;
         const double *x_r = reference + STATES * k, *unsaturated = auxiliary + AUXILIARY * k + 1;
-        const double row[10] = {x[ALTITUDE] - x_r[ALTITUDE],
-                                x[VELOCITY] - x_r[VELOCITY],
-                                x[ALPHA],
-                                x[PITCH],
-                                x[ETA_1_RATE],
-                                x[ETA_2_RATE],
-                                u[FUEL],
-                                u[ELEVATOR],
-                                magnitude(x[ALPHA] - x_r[ALPHA] - x_n[ALPHA]),
-                                magnitude(x[PITCH] - x_r[PITCH] - x_n[PITCH])};
+        const double alpha = x[ALPHA] - x_r[ALPHA] - x_n[ALPHA], pitch = x[PITCH] - x_r[PITCH] - x_n[PITCH];
+        const double h = x[ALTITUDE] - x_r[ALTITUDE], V = x[VELOCITY] - x_r[VELOCITY];
+        const double row[10] = {h,       V,           x[ALPHA],         x[PITCH],        x[ETA_1_RATE], x[ETA_2_RATE],
+                                u[FUEL], u[ELEVATOR], magnitude(alpha), magnitude(pitch)};
         for (int i = 0; i < 10; i++) curves[stride * i + k] = row[i];
         for (int i = 0; i < INPUTS; i++) saturated[INPUTS * k + i] = u[i] != unsaturated[i];
     }

@@ -59,7 +59,6 @@ static inline plain power_of_two(plain n)
 }
 
 #else
-#include <immintrin.h>
 typedef double real __attribute__((vector_size(8 * LANES)));
 typedef int64_t mask __attribute__((vector_size(8 * LANES)));
 typedef uint64_t word __attribute__((vector_size(8 * LANES)));

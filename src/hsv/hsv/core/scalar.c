@@ -5,15 +5,12 @@
 #include "sequences.h"
 #include "trim.h"
 
-#include <stddef.h>
-
-_Static_assert(offsetof(hsv_tube_memory, predicted) == sizeof(TubeMemory), "one layout of the tube law's memory");
+_Static_assert(sizeof(TubeMemory) == 10 * sizeof(double), "one layout of the tube law's memory");
 
 static const Vehicle *vehicle_of(const hsv_vehicle *p) { return (const Vehicle *)p; }
 
 void hsv_sine_cosine(double x, double *sine, double *cosine) { sine_cosine(x, sine, cosine); }
 double hsv_exponential(double x) { return exponential(x); }
-
 void hsv_derivative(const double *x, const double *u, const hsv_vehicle *p, const double *conditions, double *out)
 {
     derivative(x, u, vehicle_of(p), conditions, out);
@@ -34,7 +31,6 @@ void hsv_advance(double *x, const double *u, const hsv_vehicle *p, const double 
 }
 
 int hsv_in_model_range(const double *x, double angle_limit) { return in_model_range(x, angle_limit); }
-
 void hsv_advance_plant(const hsv_plant *plant, hsv_plant_memory *memory, hsv_plant_faults *faults, int64_t k,
                        const double *actuator, double *x)
 {
@@ -96,8 +92,3 @@ void hsv_effectiveness_bounds(const hsv_effectiveness *effectiveness, const doub
 }
 
 double hsv_level(const double *P, int64_t size, const double *x) { return level(P, size, x); }
-
-int hsv_weights(const hsv_polytope *polytope, double altitude, double velocity, double *weights)
-{
-    return vertex_weights(polytope, altitude, velocity, weights);
-}

@@ -169,7 +169,9 @@ static inline void advance(real *x, const real *u, const Vehicle *p, const real 
 /* Whether the state is finite and its angles are within the range of the curve fits. */
 static inline mask in_model_range(const real *x, double angle_limit)
 {
-    mask inside = (magnitude(x[ALPHA]) <= angle_limit) & (magnitude(x[PITCH]) <= angle_limit) & (x[VELOCITY] > 0.0);
+    mask inside = x[VELOCITY] > 0.0;
+    inside &= magnitude(x[ALPHA]) <= angle_limit;
+    inside &= magnitude(x[PITCH]) <= angle_limit;
     for (int i = 0; i < STATES; i++) inside &= is_finite(x[i]);
     return inside;
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,10 +23,6 @@ class FaultRows(NamedTuple):
     memory: np.ndarray
     period: float
 
-    def fresh(self) -> FaultRows:
-        """Return the same faults before they act."""
-        return self._replace(memory=_memory(len(self.rows)))
-
 
 def fault_rows(
     sides: Sequence[str],
@@ -41,6 +38,20 @@ def fault_rows(
         period: T (s).
         earlier: Those that were known before a change in flight; the same faults keep their memory.
     """
+    rows = _sorted_rows(tuple(sides), tuple(scheduled), period).copy()
+    memory = fault_memory(len(rows))
+    kept: dict[Any, list[np.void]] = {}
+    for row, before in zip(*earlier[:2], strict=True) if earlier else ():
+        kept.setdefault(_identity(row), []).append(before)
+    for i, row in enumerate(rows) if kept else ():
+        # Each of several identical faults keeps its own.
+        if same := kept.get(_identity(row)):
+            memory[i] = same.pop(0)
+    return FaultRows(rows, memory, period)
+
+
+@lru_cache(maxsize=64)
+def _sorted_rows(sides: tuple[str, ...], scheduled: tuple[tuple[Fault, int, int], ...], period: float) -> np.ndarray:
     chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
     rows = np.zeros(len(chosen), dtype("hsv_fault"))
     for row, (fault, start, stop) in zip(rows, chosen, strict=True):
@@ -48,18 +59,11 @@ def fault_rows(
         row["start"], row["stop"], row["channel"], row["code"] = start, stop, _place(fault.channel), fault.kind.code
         row["occurrence"], row["cycle"] = _occurrence(fault.values[own:], period)
         row["parameter"][:own] = fault.values[:own]
-    memory = _memory(len(rows))
-    kept: dict[Any, list[np.void]] = {}
-    for row, before in zip(*earlier[:2], strict=True) if earlier else ():
-        kept.setdefault(_identity(row), []).append(before)
-    for i, row in enumerate(rows):
-        # Each of several identical faults keeps its own.
-        if same := kept.get(_identity(row)):
-            memory[i] = same.pop(0)
-    return FaultRows(rows, memory, period)
+    return rows
 
 
-def _memory(count: int) -> np.ndarray:
+def fault_memory(count: int) -> np.ndarray:
+    """Return the memory of so many faults before they act."""
     memory = np.zeros(count, dtype("hsv_fault_memory"))
     memory["last"] = memory["onset"] = _NOT_YET
     return memory

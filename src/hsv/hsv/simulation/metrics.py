@@ -209,7 +209,7 @@ def read_curves(
 
 
 def _start(array: np.ndarray, kind: str) -> Any:
-    return ffi.cast(kind, array.ctypes.data)
+    return ffi.cast(kind, array.__array_interface__["data"][0])
 
 
 def flight_metrics(flight: FlightData | FlightCurves) -> dict[str, float]:

@@ -10,11 +10,11 @@ import numpy as np
 
 from hsv import core
 from hsv.core import Struct, lanes
+from hsv.faults.table import ENGINE_SIDE
 from hsv.simulation.closed_loop import Components, flight_struct, fly, is_ideal
 from hsv.simulation.flight import Flight, flight_of
 from hsv.simulation.history import History
 from hsv.threads import over_threads
-from hsv.vehicle.plant import PlantFaults
 
 Result = TypeVar("Result")
 
@@ -36,7 +36,10 @@ class FlightGroup:
         They can where all blocks are the core's own, and nothing differs but vehicle, seed, beginning, faults,
         reference, gains, and the numbers of sensors, links and air.
         """
-        return 1 < len(components) <= lanes() and all(_fits(components[0], other) for other in components)
+        if not 1 < len(components) <= lanes() or not all(map(_of_the_core, components)):
+            return False
+        first, *others = map(_shared, components)
+        return all(_same(first, other) for other in others)
 
     def begin(self, components: Sequence[Components], rows: int, tube_set: Struct | None = None) -> None:
         """Prepare the flights of ``components``, of so many ``rows``; spare lanes fly the last one again.
@@ -107,19 +110,16 @@ def fly_perturbed(
     return [result for results in done for result in results]
 
 
-def _fits(first: Components, other: Components) -> bool:
-    for own in (first, other):
-        if not (own.controller.compiled_with_loop and own.nominal_trajectory.law.compiled_with_loop):
-            return False
-    return first is other or all(map(_same, _shared(first), _shared(other)))
+def _of_the_core(components: Components) -> bool:
+    return components.controller.compiled_with_loop and components.nominal_trajectory.law.compiled_with_loop
 
 
 def _shared(components: Components) -> tuple[Any, ...]:
     """Return all that flights side by side have in common."""
     plant, notch, tube = components.plant, components.notch_filter, components.controller.kernel
     data, nominal = plant.data, components.nominal_trajectory.data
-    faults = PlantFaults.of(components.fault_injector.known, plant.period)
-    calm = data.atmosphere.still and not len(faults.engine.rows)
+    engine = any(row.fault.kind.side == ENGINE_SIDE for row in components.fault_injector.known)
+    calm = data.atmosphere.still and not engine
     return (
         (plant.steps, plant.period, data.substeps, data.late, calm, data.vehicle.angle_limit, is_ideal(components)),
         data.actuators,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, Self
 
@@ -227,8 +227,8 @@ class Plant:
         """Return the same with a ``vehicle`` of the same limits and another ``seed``; what these leave is shared."""
         other = copy(self)
         other.vehicle = vehicle
-        other.data = replace(self.data, vehicle=vehicle, seed=seed)
-        other.reset()
+        other.data = self.data.replaced(vehicle=vehicle, seed=seed)
+        other._begun = False
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
@@ -237,13 +237,17 @@ class Plant:
 
     def reset(self) -> PlantResult:
         """Return to the initial trim; return that state."""
+        self._begin()
+        return self._result()
+
+    def _begin(self) -> None:
         self._state = self.initial.state.copy()
         self._step = 0
         self._memory = self.memory()
         self._remembered = Struct("hsv_plant_memory", self._memory)
         self._active: tuple[ActiveFault, ...] = ()
         self._know(PlantFaults.of((), self.period))
-        return self._result()
+        self._begun = True
 
     def memory(self) -> PlantMemory:
         """Return the memory with which a flight begins: actuators at rest in trim, still air."""
@@ -258,6 +262,8 @@ class Plant:
 
     def place(self, step: int, state: np.ndarray) -> None:
         """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""
+        if not self._begun:
+            self._begin()
         self._state[:] = state
         self._step = step
 
@@ -266,6 +272,8 @@ class Plant:
 
         ``active``: the faults that are due; those of the command have acted already.
         """
+        if not self._begun:
+            self._begin()
         if active != self._active:
             known = [ScheduledFault(fault, since) for fault, since in active]
             self._know(PlantFaults.of(known, self.period, self._faults))

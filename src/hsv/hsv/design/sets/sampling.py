@@ -20,6 +20,9 @@ KINDS = ("iid", "held", "switching", "adversarial")
 
 _BATCH = 2500
 
+_WIDEST = 32
+"""Numbers in a state, as in ``core/sequences.h``."""
+
 
 def sample(found: EllipsoidSet, sequences: int, steps: int, seed: int) -> dict[str, Any]:
     """Return the worst level reached, by kind and start; the same ``seed`` gives the same bits on any thread count."""
@@ -32,6 +35,7 @@ def sample(found: EllipsoidSet, sequences: int, steps: int, seed: int) -> dict[s
     columns = np.zeros((len(A), A.shape[2] + G.shape[2], width))
     columns[:, : A.shape[2], : len(factor)] = np.swapaxes(A, 1, 2)
     columns[:, A.shape[2] :, : len(factor)] = np.swapaxes(G, 1, 2)
+    assert width <= _WIDEST
     begin = np.zeros(width)
     begin[: len(factor)] = start
 
