@@ -94,7 +94,7 @@ def test_an_envelope_has_the_extremes_and_the_mean_values_of_each_window():
             assert envelope.high[window, i] == max(finite, default=-math.inf)
             if stop <= 140:
                 mean = list(accumulate(curve))[-1] / (stop - start)
-                assert envelope.total[window, i] == mean + mean
+                assert envelope.total[window, i] == pytest.approx(mean + mean, rel=1e-14)
         assert envelope.count[window] == (2.0 if stop <= 140 else 0.0)
 
 

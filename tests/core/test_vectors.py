@@ -1,8 +1,8 @@
 """The core against the results of the functions before it, bit for bit: tests/golden/vectors.npz, of commit b8ecf8c.
 
-Inputs are stored as they were given. Of a large result NAME there are ``NAME.rows``, the first 8 bytes, little-endian, of
-the SHA-256 of each row's bytes, and ``NAME.first``, its first rows. Texts are JSON. Entry i of what concerns the vehicle
-has vehicle i % 5; case i of effectors has actuators i % 4 and a command that is late by 0.65 (i % 3) substeps.
+Inputs are stored as they were given. Of a large result NAME there are ``NAME.rows``, the first 8 bytes (little-endian)
+of the SHA-256 of each row, and ``NAME.first``, its first rows. Texts are JSON. Entry i of what concerns the vehicle has
+vehicle i % 5; case i of effectors has actuators i % 4 and a command that is late by 0.65 (i % 3) substeps.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ WHOLE = {
     **{page: "tests/examples/test_own_controllers.py" for page in PAGES if page.startswith("examples/")},
     "docs/c_controllers.md": "tests/examples/test_own_controllers.py",
     "docs/export.md": "tests/export/test_controller.py",
+    "docs/core.md": "tests/docs/test_code_blocks.py",
     "docs/explanation/notch.md": "tests/docs/test_code_blocks.py",
     "docs/hardware.md": "tests/docs/test_code_blocks.py",
     "docs/hosts.md": "tests/graph/test_hosts.py",

@@ -53,6 +53,17 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
     assert names["flight"].status.name == "FINISHED"
 
 
+def test_code_of_the_page_on_the_core_runs_and_its_lines_of_c_are_those_of_the_core(capsys):
+    for block in blocks("core.md", "python"):
+        exec(compile(block, "core.md", "exec"), {})
+    assert capsys.readouterr().out.splitlines()[-1].startswith("0.01")
+    sources = DOCS.parent / "src" / "hsv" / "hsv" / "core"
+    core = " ".join("".join(path.read_text(encoding="utf-8") for path in sources.glob("*.h")).split())
+    for block in blocks("core.md", "c"):
+        for line in block.splitlines():
+            assert line.strip() == "..." or " ".join(line.split()) in core, line
+
+
 def test_numbers_of_the_page_on_the_notch_filter_hold():
     for block in blocks("explanation/notch.md", "python"):
         exec(compile(block, "notch.md", "exec"), {})

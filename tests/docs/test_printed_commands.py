@@ -101,6 +101,7 @@ FULL = {
 
 ELSEWHERE = {
     "sudo apt-get install git g++ make cmake python3 python3-venv python3-dev": "on a new machine",
+    "sudo apt-get install g++ python3-dev python3-venv": "on a new machine",
     "make run": "make",
     "make test": "make",
     "source env.sh": "tests/tools/test_env_sh.py",
