@@ -3,7 +3,7 @@
 SHELL := /bin/bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help setup run test test-long fuzz test-ros test-viewers test-portability coverage ci-local lint references bench docs clean
+.PHONY: help setup run test test-long fuzz test-ros test-viewers test-portability coverage lint references bench docs clean
 
 SCENARIO ?= case1
 ARGS ?=
@@ -66,10 +66,6 @@ coverage: setup ## set up, then measure how much of the flight's packages their 
 		-m "not (graph or long or fuzz or full_ros or portability or viewer or reference)" \
 		tests/test_*.py tests/{airframe,control,faults,lpv,recording,simulation,vehicle} $(ARGS)
 
-# Roots for the steps come into .ci-local, made by mmdebstrap; nothing else of the machine changes.
-ci-local: setup ## set up, then run the steps of the hosted CI in fresh systems, as root (ARGS='--only "debian 12"')
-	@$(IN_ENVIRONMENT) python3 tools/ci_local.py $(ARGS)
-
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
 
@@ -89,5 +85,5 @@ docs: setup ## set up, then build the documentation into docs/_build (open docs/
 	@$(IN_ENVIRONMENT) python3 -m sphinx -q -W --keep-going -b html docs docs/_build
 
 clean: ## remove what set-up and tools made; recorded runs stay
-	rm -rf .venv .portability .ci-local .coverage src/hsv/build src/hsv/hsv/core/*.so ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
+	rm -rf .venv .portability .coverage src/hsv/build src/hsv/hsv/core/*.so ros_ws/build ros_ws/install ros_ws/log .pytest_cache .mypy_cache .ruff_cache .hypothesis docs/_build docs/reference/generated
 	find $(PYTHON_SOURCES) -name __pycache__ -prune -exec rm -rf {} +

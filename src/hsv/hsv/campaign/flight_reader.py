@@ -17,7 +17,7 @@ from hsv.simulation.metrics import CURVES, FlightCurves, FlightData, read_curves
 from hsv.simulation.side_by_side import FlightGroup
 from hsv.vehicle.dynamics import N_STATES
 
-PIECE = 1000
+PIECE = 500
 """Rows of a piece: those of 8 flights fit into a second-level cache of a megabyte."""
 
 
