@@ -24,7 +24,7 @@ from hsv_setup.interpreter import Interpreter, probe
 from hsv_setup.paths import ROOT, fingerprint, read_stamp, write_stamp
 
 CACHE = ROOT / ".portability"
-PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy")
+PACKAGES = ("cffi", "numpy", "pint", "pydantic", "pyyaml", "scipy", "tomli-w")
 """Packages that a flight in one process imports."""
 LIBRARY = ROOT / "src" / "hsv"
 """The sources of the library, and beside them its core, compiled for this machine by the set-up."""

@@ -10,12 +10,15 @@ import pytest
 from flights import components
 
 from hsv.control.design_file import find_design, read_design
+from hsv.control.nominal_law import level
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise
-from hsv.core import Data, Struct, dtype, ffi, instruction_set, lanes, lib
+from hsv.core import Data, Struct, dtype, ffi, fly, instruction_set, lanes, lib, loop_memory
+from hsv.elimination import solve
 from hsv.errors import ParameterError
 from hsv.simulation.closed_loop import flight_struct
 from hsv.simulation.history import History
+from hsv.vehicle.dynamics import derivative, jacobian
 from hsv.vehicle.parameters import VehicleParameters
 from hsv.vehicle.vehicle import load_vehicle
 
@@ -153,3 +156,49 @@ def test_ten_thousand_random_parameter_sets_are_filled_or_refused_in_one_line():
             refused += 1
             assert "\n" not in str(error) and str(error).startswith("hsv_")
     assert refused > 5000
+
+
+def test_flights_are_refused_that_the_memory_or_the_history_has_no_room_for():
+    flight = flight_struct(components("case1", duration=1.0), History.empty(10))
+    assert fly([flight], loop_memory(1), 0, 10) == 10
+    for flights, memory, stop in (
+        ([flight], loop_memory(1), 11),
+        ([flight] * 3, loop_memory(1), 10),
+        ([], loop_memory(1), 10),
+        ([flight], loop_memory(1)[:64], 10),
+        ([flight], np.zeros(10**6, np.uint8)[1:], 10),
+    ):
+        with pytest.raises(ValueError, match="expected"):
+            fly(flights, memory, 0, stop)
+
+
+def test_numbers_of_another_length_are_refused():
+    vehicle, two, five = load_vehicle().coupled(), np.zeros(2), np.eye(5)
+    for call in (
+        lambda: solve(np.eye(3), np.ones((5, 1))),
+        lambda: derivative(two, two, vehicle),
+        lambda: jacobian(np.zeros(9), np.zeros(3), vehicle),
+        lambda: level(five, np.zeros(3)),
+        lambda: level(five[:, :2], np.zeros(5)),
+        lambda: components("case1", duration=1.0).plant.step(np.zeros(1)),
+    ):
+        with pytest.raises(ValueError, match="array of shape .* expected"):
+            call()
+
+
+def test_integers_are_not_made_of_other_numbers():
+    link = components("case1", duration=1.0).fault_injector.link
+    for wrong in (1.0, "1", np.nan):
+        with pytest.raises(ParameterError, match=r"hsv_link\.delay: "):
+            Struct("hsv_link", replace(link, delay=wrong))
+    tube = components("case1", duration=1.0).controller.kernel
+    with pytest.raises(ParameterError, match=r"hsv_tube\.starts: array of float64, expected int64"):
+        Struct("hsv_tube", replace(tube, starts=np.array([0.5])))
+
+
+def test_a_struct_of_another_kind_and_a_change_of_a_count_are_refused():
+    data = components("case1", duration=1.0).plant.data
+    with pytest.raises(ParameterError, match=r"hsv_plant\.actuators: a Struct hsv_link, expected hsv_actuators"):
+        Struct("hsv_plant", replace(data, actuators=Struct("hsv_link", data.link)))
+    with pytest.raises(ParameterError, match=r"hsv_notch\.sections: may have changed"):
+        NOTCH.replaced(A=NOTCH.A[:1])

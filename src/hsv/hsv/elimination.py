@@ -11,7 +11,11 @@ def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return X (n, m) with A X = b for ``A`` (n, n) and ``b`` (n, m), by elimination with partial pivoting.
 
     Where ``A`` is singular, the result is not finite.
+
+    Raises:
+        ValueError: Other shapes.
     """
     left, right = np.array(A, float, order="C"), np.array(b, float, order="C")
-    lib.hsv_solve(*right.shape, doubles(left), doubles(right))
+    n, m = right.shape
+    lib.hsv_solve(n, m, doubles(left, n, n), doubles(right))
     return right

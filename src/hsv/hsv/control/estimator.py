@@ -135,6 +135,6 @@ class Estimator:
     def step(self, step: int, measurement: np.ndarray, command: np.ndarray) -> np.ndarray:
         """Return the estimate (9) of the state in ``step``, from the ``command`` (2) of the step before."""
         estimate = np.empty(N_STATES)
-        given = map(doubles, (vector(measurement), vector(command), estimate))
+        given = (doubles(vector(measurement), N_STATES), doubles(vector(command), N_INPUTS), doubles(estimate))
         lib.hsv_estimate(self.data.pointer, doubles(self._state), step, *given)
         return estimate

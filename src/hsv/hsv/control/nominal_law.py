@@ -10,6 +10,7 @@ import numpy as np
 
 from hsv.core import Data, doubles, ffi, lib, vector
 from hsv.lpv.polytope import PolytopeData
+from hsv.vehicle.dynamics import N_STATES
 
 MEMBERSHIP_TOLERANCE = 1e-6
 """Relative slack of x' P x <= 1, as in ``core/nominal.h``: the first deviation lies on the outermost boundary."""
@@ -70,7 +71,8 @@ class NominalLaw(Protocol):
 
 def level(ellipsoid: np.ndarray, x: np.ndarray) -> float:
     """Return x' P x over the first states, as many as P (s, s) has rows."""
-    return float(lib.hsv_level(doubles(vector(ellipsoid)), len(ellipsoid), doubles(vector(x))))
+    n = len(ellipsoid)
+    return float(lib.hsv_level(doubles(vector(ellipsoid), n, n), n, doubles(vector(x[:n]), n)))
 
 
 class FamilyLaw:
@@ -90,7 +92,7 @@ class FamilyLaw:
     def step(self, deviation: np.ndarray) -> LawResult:
         """Return the nominal input for x_n (9)."""
         u_n, found = np.empty(self.data.gains.shape[1]), ffi.new("double *")
-        inside = lib.hsv_nominal_input(self.data.pointer, doubles(vector(deviation)), doubles(u_n), found)
+        inside = lib.hsv_nominal_input(self.data.pointer, doubles(vector(deviation), N_STATES), doubles(u_n), found)
         index = int(found[0])
         status = NominalStatus.OK if inside else NominalStatus.OUTSIDE_FAMILY
         gain = self.data.gains[index] if len(self.data.gains) else np.empty(0)

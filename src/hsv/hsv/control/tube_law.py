@@ -130,7 +130,8 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         monitored: Whether the filter of the plan is stepped even where the law does not need it.
     """
     k, estimate, q_f, *others = inputs
-    given = [doubles(vector(each)) for each in others]
+    sizes = (N_STATES, N_INPUTS, N_STATES, N_INPUTS, len(inputs.filter_state))
+    given = [doubles(vector(each), size) for each, size in zip(others, sizes, strict=True)]
     feedback, unsaturated, limited = (np.empty(N_INPUTS) for _ in range(3))
     active = lib.hsv_tube_step(
         data.pointer,
@@ -138,7 +139,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         k,
         monitored,
         len(inputs.filter_state),
-        doubles(vector(estimate)),
+        doubles(vector(estimate), N_STATES),
         q_f,
         *given,
         *map(doubles, (feedback, unsaturated, limited)),

@@ -10,8 +10,9 @@ import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache
 from importlib.resources import files
+from operator import index
 from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, Self
 
@@ -119,10 +120,17 @@ def vector(value: Any) -> np.ndarray:
     return np.ascontiguousarray(value, float)
 
 
-def doubles(array: np.ndarray) -> Any:
-    """Return the pointer to the numbers of an array of float64 without gaps."""
+def doubles(array: np.ndarray, *shape: int) -> Any:
+    """Return the pointer to the numbers of an array of float64 without gaps, of a ``shape`` if one is given.
+
+    Raises:
+        ValueError: It has another shape: the core does not check the lengths of what it is given.
+        TypeError: It is no such array.
+    """
     if array.dtype != np.float64:
         raise TypeError(f"array of {array.dtype}, expected float64")
+    if shape and array.shape != shape:
+        raise ValueError(f"array of shape {array.shape}, expected {shape}")
     return ffi.from_buffer("double[]", array)
 
 
@@ -163,7 +171,14 @@ def fly(flights: Sequence[Struct], memory: np.ndarray, start: int, stop: int) ->
 
     Returns:
         The step after the last one flown; -1 - k where a block from outside failed in step k.
+
+    Raises:
+        ValueError: Another number of flights, too little memory, or more steps than a history has rows.
     """
+    if len(flights) not in (1, lanes()) or memory.nbytes < lib.hsv_memory_size(len(flights)) or memory.ctypes.data % 64:
+        raise ValueError(f"{len(flights)} flights, expected 1 or {lanes()}, with the memory for as many")
+    if any(stop - start > flight.pointer.rows for flight in flights):
+        raise ValueError(f"{stop - start} steps, expected at most the rows of each history")
     instructions = [*_LANES].index(instruction_set())
     pointers = ffi.new("hsv_flight *[]", [flight.pointer for flight in flights])
     return int(lib.hsv_fly(instructions, len(flights), pointers, ffi.from_buffer(memory), start, stop))
@@ -201,15 +216,19 @@ class Struct:
     def replaced(self, source: Any, names: Iterable[str]) -> Struct:
         """Return a struct of a ``source`` that differs in the fields of these ``names`` alone."""
         other = Struct.__new__(Struct)
-        other.kind, other.source, other._kept = self.kind, source, [self]
+        other.kind, other.source, other._kept = self.kind, source, [*self._kept]
         other.pointer = ffi.new(f"{self.kind} *", self.pointer[0])
+        counts: dict[str, int] = {}
         for name in names:
-            other._set(self.kind, other.pointer[0], name, _fields(self.kind)[name], source, {})
+            other._set(self.kind, other.pointer[0], name, _fields(self.kind)[name], source, counts)
+        if counts:
+            raise ParameterError(f"{self.kind}.{next(iter(counts))}: may have changed, expected a new struct")
         return other
 
     def _fill(self, kind: str, target: Any, source: Any) -> None:
-        if isinstance(source, tuple) and {*map(type, source)} == {float}:  # the numbers of a vehicle, many times
-            named: Any = source
+        named: Any = source
+        if isinstance(source, tuple) and {*map(type, source)} == {float} and named._fields == (*_fields(kind),):
+            # The numbers of a vehicle, many times.
             ffi.memmove(ffi.addressof(target), ffi.new(f"{kind} *", named._asdict()), ffi.sizeof(kind))
             return
         counts: dict[str, int] = {}
@@ -222,7 +241,7 @@ class Struct:
         try:
             value = getattr(source, name)
             if declared.kind == "primitive":
-                setattr(target, name, float(value) if declared.cname == "double" else int(value))
+                setattr(target, name, value if declared.cname == "double" else index(value))
             elif declared.kind == "array":
                 self._copy(getattr(target, name), declared, np.asarray(value))
             elif declared.kind == "struct":
@@ -243,6 +262,8 @@ class Struct:
 
     def _nest(self, kind: str, target: Any, value: Any) -> None:
         if isinstance(value, Struct):
+            if value.kind != kind:
+                raise TypeError(f"a Struct {value.kind}, expected {kind}")
             ffi.memmove(ffi.addressof(target), value.pointer, ffi.sizeof(kind))
             self._kept.append(value)
         else:
@@ -265,9 +286,10 @@ class Struct:
         fits = isinstance(value, np.ndarray) and value.dtype == required and value.flags.c_contiguous
         if not constant and not (fits and value.flags.writeable):
             raise TypeError("expected an array that the core can write to")
-        if np.iscomplexobj(value):
-            raise TypeError("complex numbers, expected real ones")
-        array = value if fits else np.ascontiguousarray(value, required)
+        given = np.asarray(value)
+        if given.size and not np.can_cast(given.dtype, required, "same_kind"):
+            raise TypeError(f"array of {given.dtype}, expected {required}")
+        array = value if fits else np.ascontiguousarray(given, required)
         if shape:
             _measure(array.shape, shape, counts)
         self._kept.append(array)
@@ -281,10 +303,10 @@ class Data:
     KIND: ClassVar[str]
     """Name of the struct"""
 
-    @cached_property
+    @property
     def struct(self) -> Struct:
-        """The data as the core takes them."""
-        return Struct(self.KIND, self)
+        """The data as the core takes them, the same in all threads."""
+        return vars(self).get("_struct") or vars(self).setdefault("_struct", Struct(self.KIND, self))
 
     @property
     def pointer(self) -> Any:
@@ -294,11 +316,11 @@ class Data:
     def replaced(self, **changes: Any) -> Self:
         """Return the data with other values of some fields; the struct is copied from this one."""
         other = replace(self, **changes)
-        vars(other)["struct"] = self.struct.replaced(other, changes)
+        vars(other)["_struct"] = self.struct.replaced(other, changes)
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "struct"}
+        return {name: value for name, value in vars(self).items() if name != "_struct"}
 
 
 def _measure(found: tuple[int, ...], declared: tuple[_Dimension, ...], counts: dict[str, int]) -> None:

@@ -18,7 +18,7 @@
 enum { ALONG, ACROSS_1, ACROSS_2, VARIATION, DISTANCE };
 
 /* Write F (2, 2) and the lower factor of I - F F' (three entries) of H_w over the distance r L. The states are standard
- * normal and uncorrelated; w is sigma / 2 times the first plus sqrt(3) times the second. */
+ * normal and uncorrelated; w = sigma / 2 (first + sqrt(3) second). */
 void hsv_dryden_cross_map(double r, double *map)
 {
     const double decay = exponential(-r), square = decay * decay;

@@ -24,8 +24,7 @@ enum {
 enum { ALWAYS, PERIODIC, RANDOM };
 enum { SSE2, AVX2, AVX512 }; /* instructions; elsewhere than on x86-64, the first stands for any */
 
-/* First stream of random numbers of each block, which has 256 of them. A number that was assigned once stays: flights
- * are repeated by it. */
+/* First stream of each block, which has 256. Never change a number: it determines the random numbers of a flight. */
 enum {
     TURBULENCE_FORWARD = 256, TURBULENCE_UP = 512, DENSITY_VARIATION = 768,
     SENSOR_NOISE_STREAM = 4096, SENSOR_CONSTANTS = 4352, SENSOR_LOSS = 4608,

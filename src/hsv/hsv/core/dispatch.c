@@ -30,9 +30,10 @@ int64_t hsv_memory_size(int64_t flights)
 
 int64_t hsv_fly(int instructions, int64_t count, hsv_flight *const *flights, void *memory, int64_t start, int64_t stop)
 {
-    Fly *fly = hsv_fly_single;
+    Fly *fly = count == 1 ? hsv_fly_single : 0;
 #ifdef __x86_64__
-    fly = count == 8 ? hsv_fly_avx512 : count == 4 ? hsv_fly_avx2 : instructions != SSE2 ? hsv_fly_avx2_single : fly;
+    if (instructions >= AVX2) fly = count == 1 ? hsv_fly_avx2_single : count == 4 ? hsv_fly_avx2 : 0;
+    if (instructions >= AVX512 && count == 8) fly = hsv_fly_avx512;
 #endif
-    return instructions < SSE2 || count < 1 ? start : fly(flights, memory, start, stop);
+    return fly && instructions >= SSE2 ? fly(flights, memory, start, stop) : start;
 }

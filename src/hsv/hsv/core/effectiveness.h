@@ -7,11 +7,10 @@
  *   (1 + i) D + b = P (1 + g) e + d + v,   y = D + b,
  *
  * D the measured change of the pitch rate, b that of the nominal vehicle without elevator and opposite sign, i and g
- * the relative errors of inertia and elevator, d a slowly changing disturbance, v the rest, at most a declared share of
- * e. Every step bounds P by an interval. An interval without P = 1 is a fault; a loss of effectiveness, y - d
+ * the relative errors of inertia and elevator, d a slowly changing disturbance, |v| at most a declared share of |e| and
+ * a noise. Every step bounds P by an interval. An interval without P = 1 is a fault; a loss of effectiveness, y - d
  * proportional to e, and an offset, y - d - e constant, are then followed, each as the intersection of what the steps
- * leave of it. While a loss explains all steps, the command is divided by the middle of its interval
- * (docs/active_fault_tolerance.md).
+ * leave of it. While a loss explains all steps, the command is divided by the middle of its interval.
  */
 #pragma once
 #include "vehicle.h"

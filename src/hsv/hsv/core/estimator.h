@@ -2,7 +2,7 @@
  *
  *   x^-(k) = phi_T(x^(k-1), u(k-1) + b(k-1)),   [x^(k); b(k)] = [x^-(k); b(k-1)] + L (y(k) - x^-(k)),
  *
- * with phi_T the equations of motion of the design's vehicle over a period, b an offset of each input that takes up
+ * with phi_T the flow of the design's vehicle over a period, b an offset of each input that takes up
  * what the model does not know, and L the steady gain about the trim in which the flight starts
  * (hsv.control.estimator). It uses the measurement y of the rigid states; the elastic ones are predicted.
  */

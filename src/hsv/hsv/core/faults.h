@@ -3,7 +3,7 @@
  * A fault acts in the steps [start, stop), always, periodically, or as a two-state Markov chain. Rows are sorted in the
  * order in which faults are composed, which is the order of their codes. Everything random is drawn once a period.
  *
- * On the command (paper eq. 14, eq. 15): loss of effectiveness, reversal, delay, dead zone, backlash. On the engine:
+ * On the command: loss of effectiveness (paper eq. 14, eq. 15), reversal, delay, dead zone, backlash. On the engine:
  * loss of thrust and an unstarted inlet. Faults of actuators and effectors are in actuators.h, of sensors in sensors.h.
  */
 #pragma once

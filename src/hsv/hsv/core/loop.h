@@ -1,13 +1,14 @@
 /* The closed loop: the order of a step, which nodes, replay and flights share.
  *
  *   x(k)              state of the vehicle at t = k T
- *   y(k)              measurement of x(k); the estimate, where an estimator flies, takes its place below
- *   q_f(k), s(k)      notch filter (eq. 39), stepped with the pitch rate in y(k)
+ *   y(k)              measurement of x(k)
+ *   x^(k)             estimate of x(k), or y(k) if no estimator flies
+ *   q_f(k), s(k)      notch filter (eq. 39), stepped with the pitch rate in x^(k)
  *   x_r, u_r, d_r     reference of the step and its defect
- *   u_n(k) = K x_n(k)                                         nominal law (eq. 32 to eq. 35)
- *   u(k)              tube law or another controller, limited to U (eq. 36, eq. 29)
+ *   u_n(k) = K x_n(k) nominal law (eq. 21; K by eq. 32 to eq. 35)
+ *   u(k)              tube law or another controller, from x^(k), limited to U (eq. 36, eq. 29)
  *   x_n(k+1)          nominal system (eq. 20), scheduled by y(k)
- *   actuator(k)       u(k) after the link of the command and the faults on it (eq. 14, eq. 15)
+ *   actuator(k)       u(k) after the link of the command and the faults on it (loss of effectiveness: eq. 14, eq. 15)
  *   x(k+1)            the plant, with actuator(k) held over [k T, (k+1) T)
  *
  * x_n(0) = y(0) - x_r(0). A flight ends when its state leaves the range of the model.
@@ -40,9 +41,9 @@ static inline void measure_lanes(hsv_flight *const *flights, Loop *f, int64_t k)
     }
     for (int i = 0; i < LANES; i++) {
         double x[STATES], y[STATES];
-        take_lane(f->x, STATES, i, x);
+        read_lane(f->x, STATES, i, x);
         hsv_sense(flights[i]->plant, flights[i]->plant_memory, flights[i]->plant_faults, k, x, y);
-        give_lane(y, STATES, i, f->measurement);
+        write_lane(y, STATES, i, f->measurement);
     }
 }
 
@@ -55,14 +56,14 @@ static inline void schedule_lanes(hsv_flight *const *flights, Loop *f, int64_t k
         row = row < 0 ? 0 : row < reference->rows ? row : reference->rows - 1;
         if (row != f->row[i]) {
             f->row[i] = row;
-            give_lane(reference->state + STATES * row, STATES, i, f->x_r);
-            give_lane(reference->input + INPUTS * row, INPUTS, i, f->u_r);
-            give_lane(reference->defect + STATES * row, STATES, i, f->d_r);
+            write_lane(reference->state + STATES * row, STATES, i, f->x_r);
+            write_lane(reference->input + INPUTS * row, INPUTS, i, f->u_r);
+            write_lane(reference->defect + STATES * row, STATES, i, f->d_r);
         }
         const int64_t active = active_gain(flights[i]->tube, k);
         if (active != f->active[i]) {
             f->active[i] = active;
-            give_lane(flights[i]->tube->gains + INPUTS * STATES * active, INPUTS * STATES, i, f->gain);
+            write_lane(flights[i]->tube->gains + INPUTS * STATES * active, INPUTS * STATES, i, f->gain);
         }
     }
 }
@@ -74,7 +75,7 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
     for (int i = 0; i < LANES; i++) {
         f->row[i] = f->active[i] = -1;
         f->equipped |= is_equipped(flights[i]->plant, flights[i]->plant_faults);
-        give_lane(flights[i]->x, STATES, i, f->x);
+        write_lane(flights[i]->x, STATES, i, f->x);
         gather_vehicle(&flights[i]->plant->vehicle, i, &f->vehicle);
         if (first->estimator) gather_vehicle(&first->estimator->vehicle, i, &f->estimator_vehicle);
         if (first->tube->effectiveness) gather_vehicle(&first->tube->effectiveness->vehicle, i, &f->tube_vehicle);
@@ -87,8 +88,7 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
 }
 
 #if LANES == 1
-/* Have functions from outside step the nominal law and the controller, where there are any; return whether the latter
- * has written a finite unsaturated input, -1 where one failed. */
+/* Call the external nominal law and controller, if any; return 1 if the controller answered, -1 on failure, else 0. */
 static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const double *estimate, double q_f,
                               const double *s, double *u_unsaturated)
 {
@@ -121,15 +121,15 @@ static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t
 {
     for (int i = 0; i < LANES; i++) {
         double *row = flights[i]->history + HISTORY * line, *auxiliary = flights[i]->auxiliary + AUXILIARY * line;
-        take_lane(f->x, STATES, i, row), row += STATES;
+        read_lane(f->x, STATES, i, row), row += STATES;
         *row++ = lane(q_f, i);
-        take_lane(x_n, STATES, i, row), row += STATES;
-        take_lane(f->u_n, INPUTS, i, row), row += INPUTS;
-        take_lane(f->u, INPUTS, i, row), row += INPUTS;
-        take_lane(f->actuator, INPUTS, i, row);
+        read_lane(x_n, STATES, i, row), row += STATES;
+        read_lane(f->u_n, INPUTS, i, row), row += INPUTS;
+        read_lane(f->u, INPUTS, i, row), row += INPUTS;
+        read_lane(f->actuator, INPUTS, i, row);
         auxiliary[0] = lane(f->gain_index, i);
-        take_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
-        if (flights[i]->estimated) take_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
+        read_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
+        if (flights[i]->estimated) read_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
     }
 }
 
@@ -209,10 +209,10 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
             hsv_flight *own = flights[i];
             if (own->link->ideal && own->faults->count == 0) continue;
             double actuator[INPUTS];
-            take_lane(f->actuator, INPUTS, i, actuator);
+            read_lane(f->actuator, INPUTS, i, actuator);
             hsv_receive(own->link, own->link_memory, own->payloads, k, own->plant->seed, actuator, INPUTS);
             hsv_apply_command_faults(own->faults, k, own->plant->seed, actuator);
-            give_lane(actuator, INPUTS, i, f->actuator);
+            write_lane(actuator, INPUTS, i, f->actuator);
         }
         write_rows(flights, f, k - start, estimate, q_f, x_n, u_unsaturated);
         if (first->set)

@@ -2,8 +2,9 @@
  *
  *   [A(p), B(p)] = sum_i w_i(p) [A_i, B_i]                    weights of altitude and velocity p (eq. 11, eq. 12)
  *   x_n(k+1) = A(p) x_n(k) + B(p) u_n(k) + d_r(k)             nominal state (eq. 20, eq. 46)
- *   u_n = K_g x_n,  g the smallest ellipsoid with x_n' P_g x_n <= 1           nested gains (eq. 32 to eq. 35)
+ *   u_n = K_g x_n,  g the smallest ellipsoid with x_n' P_g x_n <= 1           nested gains (eq. 21)
  *
+ * w_i are the tau_i of eq. 11; K_g and P_g = Q^-1 of eq. 33 are those of the design (eq. 32 to eq. 35).
  * d_r is the defect of the reference (hsv.control.reference_trajectory), p the measured altitude and velocity, clamped
  * to the envelope. Interpolated gains: K = a K_g + (1 - a) K_(g+1) with x_n' (a P_g + (1 - a) P_(g+1)) x_n = 1, so
  * that u_n is continuous (Wan and Kothare, Automatica 39, 2003).

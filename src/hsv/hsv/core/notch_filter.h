@@ -1,4 +1,4 @@
-/* Notch filter on the pitch rate (paper eq. 37 to eq. 39): second-order sections in series,
+/* Notch filter on the pitch rate (paper eq. 38, eq. 39; q_f is its q', s its x_q): second-order sections in series,
  *
  *   q_f(k) = C s(k) + D q(k),   s(k+1) = A s(k) + B q(k),
  *

@@ -62,12 +62,12 @@ static inline void gather_vehicle(const hsv_vehicle *p, int i, Vehicle *vehicle)
         lane(((plain *)vehicle)[j], i) = ((const double *)p)[j];
 }
 
-static inline void take_lane(const real *from, int count, int i, double *to)
+static inline void read_lane(const real *from, int count, int i, double *to)
 {
     for (int j = 0; j < count; j++) to[j] = lane(from[j], i);
 }
 
-static inline void give_lane(const double *from, int count, int i, real *to)
+static inline void write_lane(const double *from, int count, int i, real *to)
 {
     for (int j = 0; j < count; j++) lane(to[j], i) = from[j];
 }
@@ -81,10 +81,10 @@ static inline void advance_moving(hsv_flight *const *flights, const Vehicle *veh
         if (moving[i]) {
             hsv_plant_memory *memory = flights[i]->plant_memory;
             double own[INPUTS];
-            take_lane(command, INPUTS, i, own);
+            read_lane(command, INPUTS, i, own);
             hsv_move_effectors(&flights[i]->plant->actuators, memory->actuators, &flights[i]->plant_faults->effector, k,
                                substep, length, own, lane(x[ALPHA], i), memory->effector);
-            give_lane(memory->effector, INPUTS, i, effector);
+            write_lane(memory->effector, INPUTS, i, effector);
         }
     advance(x, effector, vehicle, conditions, all(length * flights[0]->plant->actuators.substep), 1);
 }
@@ -103,13 +103,13 @@ static inline void advance_plants(hsv_flight *const *flights, const Vehicle *veh
         hsv_plant_memory *memory = flights[i]->plant_memory;
         if (!calm) {
             double own[STATES];
-            take_lane(x, STATES, i, own);
+            read_lane(x, STATES, i, own);
             hsv_plant_conditions(flights[i]->plant, memory, flights[i]->plant_faults, k, own, lane(actuator[FUEL], i));
-            give_lane(memory->conditions, CONDITIONS, i, held);
+            write_lane(memory->conditions, CONDITIONS, i, held);
         }
         const int64_t acting = hsv_begin_faults(&flights[i]->plant_faults->effector, k, flights[i]->plant->seed);
         number += moving[i] = acting > 0 || !first->actuators.ideal || late != 0.0;
-        give_lane(memory->command, INPUTS, i, before);
+        write_lane(memory->command, INPUTS, i, before);
     }
     const real *conditions = calm ? NULL : held;
     memcpy(passed, x, sizeof passed);
@@ -127,9 +127,9 @@ static inline void advance_plants(hsv_flight *const *flights, const Vehicle *veh
         }
     for (int i = 0; i < LANES; i++) {
         hsv_plant_memory *memory = flights[i]->plant_memory;
-        take_lane(actuator, INPUTS, i, memory->command);
+        read_lane(actuator, INPUTS, i, memory->command);
         if (moving[i]) continue;
-        take_lane(effector, INPUTS, i, memory->effector);
+        read_lane(effector, INPUTS, i, memory->effector);
         for (int j = 0; j < INPUTS; j++)
             memory->actuators[2 * j] = memory->effector[j], memory->actuators[2 * j + 1] = 0.0;
         for (int j = 0; j < STATES; j++) lane(x[j], i) = lane(passed[j], i);

@@ -83,8 +83,8 @@ void hsv_measure(const hsv_sensors *sensors, hsv_sensor_memory *memory, hsv_faul
 {
     const int64_t failing = hsv_begin_faults(faults, k, seed);
     double pitch_error = 0.0;
-    for (int i = STATES - 1; i >= 0;
-         i--) { /* the error of the pitch angle is known before that of the angle of attack */
+    /* From the last state to the first: the angle of attack needs the error of the pitch angle. */
+    for (int i = STATES - 1; i >= 0; i--) {
         measurement[i] = x[i];
         if (!sensors->on[i]) continue;
         double error = sensor_error(sensors, &memory[i], i, k, seed);

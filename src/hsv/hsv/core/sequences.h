@@ -5,7 +5,7 @@
 #include "notch_filter.h"
 #include "vehicle.h"
 
-/* Write [A(p), B(p)] (eq. 11), flattened (9, 11); return whether p is inside the envelope. */
+/* Write [A(p), B(p)] (eq. 12), flattened (9, 11); return whether p is inside the envelope. */
 int hsv_schedule(const hsv_polytope *polytope, double altitude, double velocity, double *S)
 {
     double weights[MAX_VERTICES], entries[MAX_SIZE];

@@ -29,7 +29,7 @@ static inline int64_t active_gain(const hsv_tube *tube, int64_t k)
  * of the elevator, 1 where it is not estimated.
  *
  * The filter of the plan starts from the state s of the filter in the loop, which is exact where x = x_r + x_n; it is
- * stepped where the law needs it or is monitored, and where there is a filter in the loop. The integral stands still
+ * stepped if the loop has a notch filter and either the law or its monitor needs it. The integral stands still
  * while an input is limited. Where the sum is not finite, the input is that of the reference: an actuator gets a number
  * whatever happens.
  */

@@ -10,9 +10,9 @@
  * with k_i = 1 + psi_i^2 / I_yy (eq. 1); without inertial coupling, psi_1 = psi_2 = 0, it is the decoupled model
  * (eq. 4). Forces and moment are the curve fits of Parker et al. (2007) (eq. 2, eq. 3):
  *
- *   L = q S C_L(alpha, delta_e), D = q S C_D(alpha, delta_e), M = z_T T + q S c C_M(alpha, delta_e),
- *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each coefficient affine in the equivalence ratio phi,
- *   N_i(alpha, delta_e), dynamic pressure q = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
+ *   L = q_bar S C_L(alpha, delta_e), D = q_bar S C_D(alpha, delta_e), M = z_T T + q_bar S c C_M(alpha, delta_e),
+ *   T = C_T3 alpha^3 + C_T2 alpha^2 + C_T1 alpha + C_T0, each affine in the equivalence ratio phi (beta_1 ... beta_8),
+ *   N_i(alpha, delta_e), dynamic pressure q_bar = rho V^2 / 2, density rho = rho_0 exp(-(h - h_0) / h_s).
  *
  * The paper prints the thrust term of the moment and the density's exponent otherwise; see docs/errata.md.
  *

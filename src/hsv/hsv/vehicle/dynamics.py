@@ -57,7 +57,13 @@ def forces(
             thrust, lift and drag, increment of the pitching moment coefficient; None: still air, a working engine.
     """
     found = ffi.new("double[6]")
-    lib.hsv_forces(doubles(vector(x)), doubles(vector(u)), vehicle_struct(p).pointer, _conditions(conditions), found)
+    lib.hsv_forces(
+        doubles(vector(x), N_STATES),
+        doubles(vector(u), N_INPUTS),
+        vehicle_struct(p).pointer,
+        _conditions(conditions),
+        found,
+    )
     lift, drag, thrust, moment, pressure, _ = found
     return lift, drag, thrust, moment, pressure
 
@@ -80,10 +86,17 @@ def derivative(x: Any, u: Any, p: VehicleParameters, conditions: np.ndarray | No
     struct = vehicle_struct(p).pointer
     if np.iscomplexobj(x) or np.iscomplexobj(u):
         z, v, rates = np.array(x, complex), np.array(u, complex), np.empty(N_STATES, complex)
-        lib.hsv_complex_derivative(*(doubles(each.view(float)) for each in (z, v)), struct, doubles(rates.view(float)))
+        lib.hsv_complex_derivative(
+            doubles(z.view(float), 2 * N_STATES),
+            doubles(v.view(float), 2 * N_INPUTS),
+            struct,
+            doubles(rates.view(float)),
+        )
         return rates
     out = np.empty(N_STATES)
-    lib.hsv_derivative(doubles(vector(x)), doubles(vector(u)), struct, _conditions(conditions), doubles(out))
+    lib.hsv_derivative(
+        doubles(vector(x), N_STATES), doubles(vector(u), N_INPUTS), struct, _conditions(conditions), doubles(out)
+    )
     return out
 
 
@@ -93,7 +106,9 @@ def jacobian(x: np.ndarray, u: np.ndarray, p: VehicleParameters) -> tuple[np.nda
     Exact to rounding: the step is so small that its square vanishes; nothing is subtracted, truncated or cancelled.
     """
     A, B = np.empty((N_STATES, N_STATES)), np.empty((N_STATES, N_INPUTS))
-    lib.hsv_jacobian(doubles(vector(x)), doubles(vector(u)), vehicle_struct(p).pointer, doubles(A), doubles(B))
+    lib.hsv_jacobian(
+        doubles(vector(x), N_STATES), doubles(vector(u), N_INPUTS), vehicle_struct(p).pointer, doubles(A), doubles(B)
+    )
     return A, B
 
 
@@ -111,10 +126,15 @@ def advance(
     """
     new = np.array(x, float)
     lib.hsv_advance(
-        doubles(new), doubles(vector(u)), vehicle_struct(p).pointer, _conditions(conditions), period, substeps
+        doubles(new, N_STATES),
+        doubles(vector(u), N_INPUTS),
+        vehicle_struct(p).pointer,
+        _conditions(conditions),
+        period,
+        substeps,
     )
     return new
 
 
 def _conditions(conditions: np.ndarray | None) -> Any:
-    return ffi.NULL if conditions is None else doubles(vector(conditions))
+    return ffi.NULL if conditions is None else doubles(vector(conditions), lib.CONDITIONS)

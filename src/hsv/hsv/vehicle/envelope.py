@@ -12,4 +12,4 @@ FOOT = 0.3048
 
 def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
     """Return whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
-    return bool(lib.hsv_in_model_range(doubles(vector(x)), angle_limit))
+    return bool(lib.hsv_in_model_range(doubles(vector(x), 9), angle_limit))

@@ -33,7 +33,7 @@ from hsv.vehicle.atmosphere import (
     atmosphere_data,
     atmosphere_state,
 )
-from hsv.vehicle.dynamics import N_STATES, forces
+from hsv.vehicle.dynamics import N_INPUTS, N_STATES, forces
 from hsv.vehicle.envelope import in_model_range
 from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
 from hsv.vehicle.parameters import COEFFICIENT_UNITS, VehicleParameters
@@ -279,7 +279,7 @@ class Plant:
             self._know(PlantFaults.of(known, self.period, self._faults))
             self._active = active
         memory, faults = self._remembered.pointer, self._known.pointer
-        given = doubles(vector(actuator)), doubles(self._state)
+        given = doubles(vector(actuator), N_INPUTS), doubles(self._state)
         lib.hsv_advance_plant(self.data.pointer, memory, faults, self._step, *given)
         self._step += 1
         return self._result()
