@@ -60,11 +60,16 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 	python3 -m pytest -n 2 -m portability $(ARGS) && exit "$$missing"
 
 # Of the packages that a flight is made of and of those that record it, by the tests that mirror them, in one process each:
-# some minutes.
-coverage: setup ## set up, then measure how much of the flight's packages their own tests run; fails below the floor
+# some minutes. Then gcov counts the lines of the core's headers that the golden flights and vectors run.
+coverage: setup ## set up, then measure how much of the flight's packages and core their own tests run; fails below the floor
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto --cov --cov-report=term:skip-covered \
 		-m "not (graph or long or fuzz or full_ros or portability or viewer or reference)" \
 		tests/test_*.py tests/{airframe,control,faults,lpv,recording,simulation,vehicle} $(ARGS)
+	@source ./env.sh && cd src/hsv && rm -rf build/coverage && HSV_CFLAGS="-O0 --coverage" \
+		python3 setup.py -q build --build-base build/coverage --build-lib build/coverage/library
+	@source ./env.sh && HSV_CORE=sse2 PYTHONPATH="$$PWD/src/hsv/build/coverage/library" python3 -m pytest -p no:cacheprovider \
+		-m "not (long or fuzz)" tests/core/test_vectors.py tests/core/test_binding.py tests/simulation/test_golden_flights.py
+	@cd src/hsv && find build/coverage -name scalar.gcda -exec gcov -n {} + | grep -A 1 "'hsv/core/.*\.h'"
 
 lint: setup ## set up, then check style and types
 	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy

@@ -182,7 +182,7 @@ def test_numbers_of_another_length_are_refused():
         lambda: level(five[:, :2], np.zeros(5)),
         lambda: components("case1", duration=1.0).plant.step(np.zeros(1)),
     ):
-        with pytest.raises(ValueError, match="array of shape .* expected"):
+        with pytest.raises(ValueError, match=r"array of shape .* expected"):
             call()
 
 
