@@ -1,6 +1,6 @@
 /* The numeric core as Python sees it. cffi reads what stands between the two marks, so that the layout of a struct is
- * declared once; hsv.core fills structs by the names of their fields and checks every array against the shape in the
- * comment beside it, from which the counts follow. SI units and radians. */
+ * declared once. hsv.core fills structs by the names of their fields. The comment beside an array gives its shape;
+ * hsv.core checks it and sets the fields that count elements. SI units and radians. */
 #pragma once
 #include <stdint.h>
 /* begin */
