@@ -1,4 +1,4 @@
-"""Controllers of one's own over DDS: a class, a compiled kernel, and a node that knows the messages alone."""
+"""Controllers of one's own over DDS: a class, a function in C, and a node that knows the messages alone."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ from hsv.replay.attached import complete_steps
 pytestmark = pytest.mark.graph
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-SCENARIOS = {"compiled": "compiled/compiled.toml", "lqr": "lqr/lqr.toml", "node": "node/regulator.toml"}
-WRONG = Path(__file__).parents[1] / "support" / "wrong_controller.py"
+SCENARIOS = {"lqr": "lqr/lqr.toml", "node": "node/regulator.toml"}
+SUPPORT = Path(__file__).parents[1] / "support"
+WRONG = SUPPORT / "wrong_controller.py"
 WRONG_STEP = 100
 SHORT = 'extends = "{example}"\nfault = []\nduration = "{duration} s"\n{more}\n'
 
@@ -39,8 +40,8 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     subprocess.run(words, cwd=folder, check=True, capture_output=True)
     prefix = folder / "install" / "hsv_example_node"
     [site] = prefix.glob("lib/python3*/site-packages")
-    # Class and kernel are named by their place: nothing is installed into the environment of the tests.
-    modules = (site, EXAMPLES / "lqr", EXAMPLES / "compiled")
+    # Class and function in C are named by their place: nothing is installed into the environment of the tests.
+    modules = (site, EXAMPLES / "lqr", SUPPORT)
     return {
         "AMENT_PREFIX_PATH": os.pathsep.join((str(prefix), os.environ["AMENT_PREFIX_PATH"])),
         "PYTHONPATH": os.pathsep.join((*map(str, modules), os.environ.get("PYTHONPATH", ""))),
@@ -70,12 +71,9 @@ def flown(processes: Processes, path: Path, name: str, *words: str) -> Bag:
     return Bag(processes.folder / name)
 
 
-@pytest.mark.parametrize(
-    ("example", "place"),
-    [long("lqr", "hsv_lqr:Lqr"), ("compiled", "hsv_scheduled:Scheduled")],
-)
-def test_a_class_and_a_kernel_fly_as_in_process(processes: Processes, example: str, place: str) -> None:
-    path = scenario(processes.folder, example, f'controller = "{place}"')
+@pytest.mark.parametrize("place", [long("hsv_lqr:Lqr"), "lqr_in_c:LqrInC"])
+def test_a_class_and_a_function_in_c_fly_as_in_process(processes: Processes, place: str) -> None:
+    path = scenario(processes.folder, "lqr", f'controller = "{place}"')
     simulated = processes.run("hsv", "simulate", path)
     assert simulated.returncode == 0, simulated.stdout
     [fingerprint] = [word for word in simulated.stdout.split() if word.startswith("v1:")]
