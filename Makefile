@@ -64,15 +64,15 @@ test-portability: setup ## set up, then fly on emulated processors, another Pyth
 coverage: setup ## set up, then measure how much of the flight's packages and core their own tests run; fails below the floor
 	@$(IN_ENVIRONMENT) python3 -m pytest -n auto --cov --cov-report=term:skip-covered \
 		-m "not (graph or long or fuzz or full_ros or portability or viewer or reference)" \
-		tests/test_*.py tests/{airframe,control,faults,lpv,recording,simulation,vehicle} $(ARGS)
+		tests/{base,core,model,control,flight,bags} $(ARGS)
 	@source ./env.sh && cd src/hsv && rm -rf build/coverage && HSV_CFLAGS="-O0 --coverage" \
 		python3 setup.py -q build --build-base build/coverage --build-lib build/coverage/library
 	@source ./env.sh && HSV_CORE=sse2 PYTHONPATH="$$PWD/src/hsv/build/coverage/library" python3 -m pytest -p no:cacheprovider \
-		-m "not (long or fuzz)" tests/core/test_vectors.py tests/core/test_binding.py tests/simulation/test_golden_flights.py
+		-m "not (long or fuzz)" tests/core/test_vectors.py tests/core/test_binding.py tests/flight/test_golden_flights.py
 	@cd src/hsv && find build/coverage -name scalar.gcda -exec gcov -n {} + | grep -A 1 "'hsv/core/.*\.h'"
 
-lint: setup ## set up, then check style and types
-	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy
+lint: setup ## set up, then check style, types and the direction of imports
+	@source ./env.sh && ruff check $(PYTHON_SOURCES) && ruff format --check --quiet $(PYTHON_SOURCES) && mypy && lint-imports --no-logo --verbose
 
 references: lint ## run all tests, then fly the reference bags of bags/reference anew: all or none
 	@source ./env.sh && python3 -m pytest -n auto -m "not (reference or long or fuzz or full_ros or portability or graph)" && \

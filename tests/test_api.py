@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import hsv
+from hsv.base.errors import ScenarioError
 from hsv.control.design_parameters import digest
-from hsv.errors import ScenarioError
-from hsv.simulation.assembly import design_parameters
-from hsv.simulation.fingerprint import as_published
+from hsv.flight.assembly import design_parameters
+from hsv.flight.fingerprint import as_published
 
 SHORT = {"duration": "6 s", "fault[0].start": "3 s"}
 

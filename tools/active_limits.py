@@ -10,14 +10,14 @@ import argparse
 from typing import Any
 
 from hsv.control.effectiveness import EffectivenessMode, effectiveness_along
-from hsv.design.region import corners
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Components, fly
-from hsv.simulation.scenario import load_scenario
-from hsv.simulation.side_by_side import fly_perturbed
-from hsv.study.limits.study import least_survived
-from hsv.vehicle.plant import FlightStatus
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.corners import corners
+from hsv.flight.scenario import load_scenario
+from hsv.flight.side_by_side import fly_perturbed
+from hsv.model.plant import FlightStatus
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.limits.study import least_survived
 
 DEPTHS = (0.9, 0.6, 0.55, 0.525, 0.5, 0.47, 0.46, 0.45, 0.44)
 

@@ -18,11 +18,11 @@ from typing import NoReturn
 
 import psutil
 
-from hsv.campaign.campaign import MOST_SAMPLES, Campaign, plan
-from hsv.campaign.executors import make_executor
-from hsv.campaign.run import run_campaign
-from hsv.campaign.store import ResultStore
-from hsv.errors import HsvError
+from hsv.base.errors import HsvError
+from hsv.flight.campaign.campaign import MOST_SAMPLES, Campaign, plan
+from hsv.flight.campaign.executors import make_executor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.store import ResultStore
 
 MIB = 2.0**20
 

@@ -21,8 +21,8 @@ from hsv.design.tube_problem import channel_model
 from hsv.design.verification.checks import Subject
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
-from hsv.simulation.flight import Flight
-from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
+from hsv.flight.flight import Flight
+from hsv.model.dynamics import N_RIGID, STATE_NAMES
 
 DESIGNS = ("baseline", "tight", "derived")
 SPLIT = ("angle_of_attack_rate", "pitch_acceleration")

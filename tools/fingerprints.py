@@ -8,10 +8,10 @@ import tomli_w
 
 import hsv
 from hsv.control.design_file import find_design, read_design
-from hsv.simulation import fingerprint
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario, scenario_names
+from hsv.flight import fingerprint
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario, scenario_names
 
 HEADER = """# Fingerprints of the shipped scenarios with the shipped designs. Made by tools/fingerprints.py.
 """
@@ -26,7 +26,7 @@ def main() -> None:
             design = read_design(find_design(scenario.design))
             flight = fly(assemble_flight(scenario, design))
             table[name] = {"design_hash": design.digest, "fingerprint": flight.fingerprint}
-    path = Path(hsv.__file__).parent / "simulation" / fingerprint.TABLE
+    path = Path(hsv.__file__).parent / "flight" / fingerprint.TABLE
     path.write_text(HEADER + tomli_w.dumps(table), encoding="utf-8")
     print(f"{path.name}: {len(table)} scenarios")
 

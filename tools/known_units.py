@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from hsv.units import square_by_pint
+from hsv.base.units import square_by_pint
 
-TABLE = Path(__file__).parents[1] / "src" / "hsv" / "hsv" / "known_units.json"
+TABLE = Path(__file__).parents[1] / "src" / "hsv" / "hsv" / "base" / "known_units.json"
 
 LENGTHS = ("m", "km", "mm", "ft", "kft")
 TIMES = ("s", "ms", "min", "h")

@@ -15,10 +15,10 @@ from typing import Any
 
 from mcap.reader import make_reader
 
-from hsv.graph.description import ROSOUT
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Topic
-from hsv.recording.writer import BagWriter
+from hsv.bags.description import ROSOUT
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Topic
+from hsv.bags.writer import BagWriter
 
 ROOT = Path(__file__).resolve().parents[1]
 REFERENCES = ROOT / "bags" / "reference"

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.graph.description import DIAGNOSTICS
-from hsv.recording.reader import Bag
+from hsv.bags.description import DIAGNOSTICS
+from hsv.bags.reader import Bag
 
 SCENARIOS = ("case1", "case1_smooth", "case1_governed", "case1_qp", "case1_active", "case2")
 

@@ -41,18 +41,15 @@ setup(
         "hsv": [
             "py.typed",
             "**/*.toml",
-            "known_units.json",
+            "base/known_units.json",
             "bench/*.c",
-            "campaign/template/*",
+            "control/*.c",
             "control/include/*.h",
             "core/*.[ch]",
             "designs/*",
-            "export/*.c",
-            "live/template/*",
-            "recording/layouts/*",
-            "recording/report/plotly/*",
-            "recording/report/template/*",
-            "resilience/template/*",
+            "pages/**/template/*",
+            "pages/layouts/*",
+            "pages/report/plotly/*",
         ]
     },
     data_files=[

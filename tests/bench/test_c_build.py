@@ -3,12 +3,12 @@ import shutil
 import pytest
 from flights import components
 
+from hsv.base.errors import RunError
 from hsv.bench.c_build import c_flight, compiled
 from hsv.bench.controllers import laws_in_c
 from hsv.bench.in_process import against_c
-from hsv.errors import RunError
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.fingerprint import fingerprint
+from hsv.flight.closed_loop import fly
+from hsv.flight.fingerprint import fingerprint
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
 

@@ -5,12 +5,12 @@ import math
 import pytest
 from ros_domain import own_domain
 
+from hsv.base.errors import RunError
 from hsv.bench.graph import graph_lap
 from hsv.bench.in_process import against_scipy
 from hsv.bench.ring import ring_lap
 from hsv.bench.startup import against_imports
 from hsv.bench.writing import against_mcap
-from hsv.errors import RunError
 
 
 def test_scipy_arrives_at_the_same_state():

@@ -2,9 +2,9 @@
 
 import pytest
 
+from hsv.base.errors import QuantityError
 from hsv.bench.figure import Figure
 from hsv.bench.page import HISTORY, TABLE, Page
-from hsv.errors import QuantityError
 
 
 def measured(name, ours):

@@ -4,9 +4,9 @@ import json
 
 import pytest
 
+from hsv.base.errors import QuantityError
 from hsv.bench.figure import Figure
 from hsv.bench.record import as_json, changes, not_measured, read_run
-from hsv.errors import QuantityError
 
 
 def ratio(*ours):

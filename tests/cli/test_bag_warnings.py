@@ -12,11 +12,11 @@ from changed_bags import changed_bag
 from flown_bags import flown_bag
 from mcap.reader import make_reader
 
-from hsv.recording.flight import flight_data, labels
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Topic
-from hsv.recording.writer import BagWriter
-from hsv.simulation.metrics import flight_metrics
+from hsv.bags.flight import flight_data, labels
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Topic
+from hsv.bags.writer import BagWriter
+from hsv.flight.metrics import flight_metrics
 
 Hsv = Callable[..., Any]
 

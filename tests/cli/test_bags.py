@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from flown_bags import flown_bag, parameters, write_bag
 
-from hsv.graph.description import TOPICS
-from hsv.graph.parameter_sections import ParameterSections
-from hsv.recording.metadata import FILE_NAME
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
+from hsv.bags.description import TOPICS
+from hsv.bags.metadata import FILE_NAME
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
 
 Hsv = Callable[..., Any]
 

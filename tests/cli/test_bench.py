@@ -2,8 +2,8 @@ import json
 
 import pytest
 
+from hsv.base.errors import RunError
 from hsv.bench.figure import Figure
-from hsv.errors import RunError
 
 
 def test_bench_measures_the_groups_it_is_asked_for(hsv):

@@ -1,12 +1,12 @@
 import pytest
-
 from hsv.cli.claims import _print_claims, _print_ranking
+
+from hsv.base.units import UnitSystem
 from hsv.cli.output import console
-from hsv.study.claims.catalogue import GROUPS
-from hsv.study.claims.claim import Judged
-from hsv.study.claims.finding import Finding, Reading
-from hsv.study.claims.ranking import CONTROLLERS, METRICS, Rank
-from hsv.units import UnitSystem
+from hsv_paper.claims.catalogue import GROUPS
+from hsv_paper.claims.claim import Judged
+from hsv_paper.claims.finding import Finding, Reading
+from hsv_paper.claims.ranking import CONTROLLERS, METRICS, Rank
 
 FINDING = Finding((Reading("first", 0.5, "1", at_most=1.0), Reading("second", 2.0, "1", at_most=1.0)), "It is so.")
 

@@ -13,8 +13,8 @@ from hsv.cli.all_commands import app
 from hsv.cli.main import EXIT_CODES
 from hsv.cli.output import UNIT_KEYS
 from hsv.control.design_file import find_design
-from hsv.simulation.metrics import METRICS
-from hsv.simulation.scenario import scenario_names, scenario_text
+from hsv.flight.metrics import METRICS
+from hsv.flight.scenario import scenario_names, scenario_text
 
 COMMANDS = sorted(command.callback.__name__.replace("_", "-") for command in app.registered_commands)
 PRINT_NO_NUMBERS = {"cluster", "include", "play"}

@@ -12,9 +12,9 @@ from damaged_bags import Original, damaged, found_in, original
 from mcap.reader import make_reader
 from rosbags.rosbag2 import Reader
 
-from hsv.errors import RecordingError
-from hsv.recording.bag_warnings import bag_warnings
-from hsv.recording.reader import Bag
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.reader import Bag
+from hsv.base.errors import RecordingError
 
 Hsv = Callable[..., Any]
 REFERENCES = Path(__file__).parents[2] / "bags" / "reference"

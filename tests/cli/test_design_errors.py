@@ -3,7 +3,7 @@
 import pytest
 
 from hsv.control.design_file import find_design
-from hsv.simulation.scenario import scenario_text
+from hsv.flight.scenario import scenario_text
 
 
 @pytest.fixture

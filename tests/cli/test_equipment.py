@@ -1,6 +1,6 @@
 import pytest
 
-from hsv.simulation.scenario import parse_scenario, scenario_text
+from hsv.flight.scenario import parse_scenario, scenario_text
 
 SETS = ["elevator_50", "elevator_150", "elevator_20", "elevator_first_order_20", "fuel_10"]
 SETS += ["ideal", "fine", "ghv", "inertial"]

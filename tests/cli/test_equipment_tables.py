@@ -2,7 +2,7 @@
 
 import pytest
 
-from hsv.simulation.scenario import parse_scenario
+from hsv.flight.scenario import parse_scenario
 
 FLIGHT = """
 title = "a flight with equipment"

@@ -3,7 +3,7 @@ import dataclasses
 import pytest
 
 from hsv.control.design_file import find_design, read_design, write_design
-from hsv.export.controller import NUMBERS, controller_files, step_bounds
+from hsv.control.export import NUMBERS, controller_files, step_bounds
 
 BASELINE = read_design(find_design("baseline"))
 

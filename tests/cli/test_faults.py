@@ -1,7 +1,7 @@
 import pytest
 
-from hsv.faults.injector import FaultInjector
-from hsv.faults.table import FAULT_KINDS, read_fault
+from hsv.model.faults.injector import FaultInjector
+from hsv.model.faults.table import FAULT_KINDS, read_fault
 
 
 def test_every_type_of_fault_is_listed(hsv):

@@ -11,8 +11,8 @@ import pytest
 from changed_bags import changed_bag
 from flown_bags import flown_bag
 
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Topic
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Topic
 
 Hsv = Callable[..., Any]
 COMMAND, FORCES = "/hsv/command", "/hsv/forces"

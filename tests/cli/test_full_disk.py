@@ -10,9 +10,9 @@ from full_disk import files_no_larger_than
 from node_processes import short_scenario
 from recorded_flight import record_flight
 
+from hsv.base.errors import ParameterError
 from hsv.cli.targets import writing
-from hsv.design.certificate import write_certificate
-from hsv.errors import ParameterError
+from hsv.control.certificate import write_certificate
 
 FULL = Path("/dev/full")
 

@@ -2,9 +2,9 @@ import json
 
 import pytest
 
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 
 
 def test_the_file_that_it_writes_flies_the_reference_inside_the_inputs(hsv, tmp_path):

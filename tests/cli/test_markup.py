@@ -12,11 +12,11 @@ import pytest
 from flown_bags import flown_bag
 from rich.console import Console
 
+from hsv.bags.metadata import FILE_NAME
+from hsv.base.units import UnitSystem
 from hsv.cli import output
 from hsv.cli.progress import flight, stages
 from hsv.cli.summary import print_section
-from hsv.recording.metadata import FILE_NAME
-from hsv.units import UnitSystem
 
 NAME = "run[old] [/x] :bug:"
 

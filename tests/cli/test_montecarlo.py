@@ -3,8 +3,8 @@ import json
 import pytest
 from node_processes import short_scenario
 
+from hsv.base.parameters import Parameter, check_all
 from hsv.control.design_file import find_design
-from hsv.parameters import Parameter, check_all
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from hsv_msgs.msg import Run
 
-from hsv.recording.former import INTERFACE_VERSION
+from hsv.bags.former import INTERFACE_VERSION
 
 OLD = Path(__file__).parents[1] / "recording" / "old_bags" / "case1_4e00631"
 

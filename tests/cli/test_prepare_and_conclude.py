@@ -11,9 +11,9 @@ import pytest
 import yaml
 from recorded_flight import record_flight
 
-from hsv.graph.description import COMPOSED, EXIT_DIVERGED, graph
-from hsv.recording.reader import Bag
-from hsv.recording.recover import recover
+from hsv.bags.description import COMPOSED, EXIT_DIVERGED, graph
+from hsv.bags.reader import Bag
+from hsv.bags.recover import recover
 
 Hsv = Callable[..., Any]
 

@@ -15,7 +15,7 @@ from mcap.writer import CompressionType
 from rosbag2_bags import converted, recorded
 from rosbags.rosbag2 import CompressionMode
 
-from hsv.recording.reader import Bag
+from hsv.bags.reader import Bag
 
 Hsv = Callable[..., Any]
 REFERENCE = Path(__file__).parents[2] / "bags" / "reference" / "case1"

@@ -7,11 +7,11 @@ import math
 import pytest
 from rich.text import Text
 
+from hsv.base.units import UnitSystem, in_system, significant
 from hsv.cli.output import console
-from hsv.simulation.limits import verdict_sentence, verdicts
-from hsv.simulation.metrics import METRICS, Group
-from hsv.simulation.scenario import load_scenario
-from hsv.units import UnitSystem, in_system, significant
+from hsv.flight.limits import verdict_sentence, verdicts
+from hsv.flight.metrics import METRICS, Group
+from hsv.flight.scenario import load_scenario
 
 DECAY = {"elastic_decay_time": 67.1, "altitude_overshoot": 0.04}
 

@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hsv.cli.claims import _print_ranking
 from node_processes import short_scenario
 
+from hsv.base.units import UnitSystem
 from hsv.bench.figure import Figure
 from hsv.cli.bench import _print as print_figures
 from hsv.cli.certify import HALF_WIDTHS
-from hsv.cli.claims import _print_ranking
 from hsv.cli.design import _steps
 from hsv.cli.output import console, quantity_table
 from hsv.design.verification.verifier import load_subject
-from hsv.study.claims.ranking import CONTROLLERS, METRICS, Rank
-from hsv.units import UnitSystem
+from hsv_paper.claims.ranking import CONTROLLERS, METRICS, Rank
 
 DESIGNS = Path(__file__).parents[2] / "offline_design"
 

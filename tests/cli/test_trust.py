@@ -9,8 +9,8 @@ from changed_bags import changed_bag
 from pyarrow import parquet
 from recorded_flight import record_flight
 
-from hsv.campaign.table import CAMPAIGN, DIGEST
-from hsv.vehicle.vehicle import vehicle_text
+from hsv.flight.campaign.table import CAMPAIGN, DIGEST
+from hsv.model.vehicle import vehicle_text
 
 MODULE = """
 from pathlib import Path

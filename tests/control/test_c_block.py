@@ -5,10 +5,10 @@ import ctypes
 import pytest
 from c_libraries import build_probe
 
+from hsv.base.errors import ParameterError
 from hsv.control.c_block import load_block
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
-from hsv.errors import ParameterError
-from hsv.signals import FILTER_STATE
+from hsv.model.signals import FILTER_STATE
 
 
 def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):

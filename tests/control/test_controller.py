@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
+from hsv.base.errors import ControllerError, ParameterError
 from hsv.control.controller import (
     CONTROLLER_INPUTS,
     STEP_FUNCTION,
@@ -15,8 +16,7 @@ from hsv.control.controller import (
     StepKernel,
     flat_input,
 )
-from hsv.errors import ControllerError, ParameterError
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.vehicle import load_vehicle
 
 VEHICLE = load_vehicle().decoupled
 LOW, HIGH = VEHICLE.input_minimum, VEHICLE.input_maximum

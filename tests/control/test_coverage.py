@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.coverage import commanded, uncovered_faults, uncovered_hardware
 from hsv.control.design_file import find_design, read_design
 from hsv.control.tube_law import TubeStatusCode
-from hsv.errors import DesignError
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.blocks import steps
-from hsv.simulation.coverage import uncovered_of
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.blocks import steps
+from hsv.flight.coverage import uncovered_of
+from hsv.flight.scenario import load_scenario
 
 BASELINE, REALISTIC = (read_design(find_design(name)) for name in ("baseline", "realistic"))
 ELEVATOR = "elevator_deflection"

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from flights import components, step_by_step
 
+from hsv.base.errors import ParameterError, ScenarioError
 from hsv.control.effectiveness import (
     EffectivenessMode,
     effectiveness_along,
@@ -12,15 +13,14 @@ from hsv.control.effectiveness import (
 )
 from hsv.control.tube_law import tube_memory
 from hsv.core import doubles, lib, records, vector
-from hsv.design.region import corners
-from hsv.errors import ParameterError, ScenarioError
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
-from hsv.simulation.side_by_side import fly_perturbed
-from hsv.vehicle.dynamics import PITCH_RATE, advance
-from hsv.vehicle.plant import FlightStatus
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.corners import corners
+from hsv.flight.scenario import load_scenario
+from hsv.flight.side_by_side import fly_perturbed
+from hsv.model.dynamics import PITCH_RATE, advance
+from hsv.model.plant import FlightStatus
+from hsv.model.vehicle import load_vehicle
 
 FAULT = 5000
 """Step of the fault of Case 1."""

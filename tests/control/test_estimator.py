@@ -6,16 +6,16 @@ from core_calls import measure
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_are
 
+from hsv.base.errors import ParameterError
 from hsv.control.estimator import Estimator, EstimatorData, estimator_data
 from hsv.control.estimator_parameters import PROCESS_PARAMETERS
 from hsv.core import doubles, lib
-from hsv.errors import ParameterError
-from hsv.faults.laws import fault_rows
-from hsv.faults.table import SENSOR
-from hsv.sensors import sensor_data, sensor_state
-from hsv.vehicle.dynamics import advance, jacobian
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.dynamics import advance, jacobian
+from hsv.model.faults.laws import fault_rows
+from hsv.model.faults.table import SENSOR
+from hsv.model.sensors import sensor_data, sensor_state
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 T = 0.02
 VEHICLE = load_vehicle().coupled()

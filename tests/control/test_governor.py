@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import GovernorError
 from hsv.cli.command import command
 from hsv.cli.govern import govern as govern_command
 from hsv.control import governor
@@ -23,9 +24,8 @@ from hsv.control.governor import (
 )
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import Corner, ReferenceTrajectory
-from hsv.errors import GovernorError
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 ROOT = Path(__file__).parents[2]
 DESIGN = read_design(find_design("baseline"))

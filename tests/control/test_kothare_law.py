@@ -5,13 +5,13 @@ import pytest
 
 from hsv.control.design_file import find_design, read_design
 from hsv.control.kothare_law import SOLVE_STEPS, KothareLaw
+from hsv.control.nominal_gain import nominal_gain
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
+from hsv.control.nominal_problem import NominalProblem
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.design.nominal import nominal_gain
-from hsv.design.nominal_problem import NominalProblem
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 DESIGN = read_design(find_design("baseline"))
 DATA = nominal_data(DESIGN)

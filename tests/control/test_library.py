@@ -6,8 +6,8 @@ import shutil
 import pytest
 from c_libraries import PROBE, build_probe
 
+from hsv.base.errors import ParameterError
 from hsv.control.library import inside, library_digest, library_record, seen_from
-from hsv.errors import ParameterError
 
 
 def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hsv.base.errors import ParameterError
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.kothare_law import KothareLaw
 from hsv.control.nominal_law import FamilyLaw
 from hsv.control.nominal_trajectory import NominalStatus, NominalTrajectory
 from hsv.control.qp_law import QpLaw
-from hsv.errors import ParameterError
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 VALUES = read_parameters(find_design("baseline"))
 DESIGN = read_design(find_design("baseline"))

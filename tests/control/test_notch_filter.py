@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hsv.base.errors import ParameterError
 from hsv.control.notch_filter import (
     MAX_SECTIONS,
     NOTCH_PARAMETERS,
@@ -14,7 +15,6 @@ from hsv.control.notch_filter import (
     notch_response,
     series,
 )
-from hsv.errors import ParameterError
 
 PERIOD = 0.02
 BASELINE = NotchSection(15.0, 0.02, 15.0, 0.5)

@@ -1,9 +1,9 @@
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
-from hsv.errors import DesignError
 
 VALUES = read_parameters(find_design("baseline"))
 

@@ -7,14 +7,14 @@ from numpy.testing import assert_allclose
 from scipy import sparse
 from scipy.linalg import solve_discrete_are
 
+from hsv.base.errors import DesignError, ParameterError
 from hsv.control.design_file import find_design, read_design, read_parameters
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.qp_law import BLOCKS, NEAR_BLOCKS, QpLaw
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.errors import DesignError, ParameterError
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 PATH = find_design("baseline")
 VALUES, DESIGN = read_parameters(PATH), read_design(PATH)

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from hsv.base.errors import ParameterError, TrimError
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
-from hsv.errors import ParameterError, TrimError
-from hsv.vehicle.dynamics import advance, derivative
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.dynamics import advance, derivative
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 VEHICLE, PERIOD = load_vehicle().decoupled, 0.02
 LOW, HIGH = (26060.4, 2407.92), (26243.28, 2484.12)

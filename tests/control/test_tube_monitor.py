@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError, SignalError
 from hsv.control.controller import ControllerInput
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design
@@ -12,7 +13,6 @@ from hsv.control.nominal_law import level
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.tube_law import TubeLaw, TubeStatusCode
 from hsv.control.tube_set import TubeSet
-from hsv.errors import DesignError, SignalError
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from hsv.design.inputs import read_inputs
 from hsv.design.model import polytopic_model
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 

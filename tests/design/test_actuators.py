@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.inputs import ActuatorInputs, parse_inputs
 from hsv.design.region import Region, record
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.errors import DesignError
-from hsv.lpv.actuated import respond
+from hsv.model.lpv.actuated import respond
 
 NAMES = ("fuel_10", "elevator_50")
 

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.adjustable import design_adjustable
 from hsv.design.common_lyapunov import common_lyapunov
 from hsv.design.error_system import error_system, union
 from hsv.design.factor_range import certified_loops, relaxed_bound, room_at_one
 from hsv.design.inputs import read_inputs, with_tau
-from hsv.design.region import corners, incomplete_share, region_parameters
+from hsv.design.region import incomplete_share, region_parameters
 from hsv.design.sets.ellipsoid_set import vertex_residuals
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube_problem import channel_model, tube_problem
@@ -23,8 +24,8 @@ from hsv.design.verification.checks import gathered
 from hsv.design.verification.factor_range import factor_checks
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject, verify
-from hsv.errors import DesignError
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.corners import corners
+from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 

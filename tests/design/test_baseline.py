@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains
-from hsv.errors import DesignError
 
 
 def test_the_design_passes_the_check_of_the_nodes(design):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hsv.control.design_file import find_design, read_design
-from hsv.design.region import corners
-from hsv.study.linear_loop import sampled_loop
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.corners import corners
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.linear_loop import sampled_loop
 
 WORST = 764
 """Index of the corner with the least moment of inertia, the largest mass and the strongest elevator."""

@@ -6,9 +6,10 @@ from numpy.testing import assert_allclose
 
 from hsv.design.disturbance import DisturbanceSet, inflated
 from hsv.design.error_system import tube_errors
-from hsv.design.region import Region, corners, fraction, record
+from hsv.design.region import Region, record
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.corners import corners, fraction
+from hsv.model.vehicle import load_vehicle
 
 
 @pytest.fixture(scope="module")

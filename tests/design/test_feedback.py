@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError
 from hsv.design.baseline import disturbance_columns
 from hsv.design.feedback import feedback_gain
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.errors import DesignError
 
 FOOT = 0.3048
 

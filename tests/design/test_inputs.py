@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.base.errors import DesignError
 from hsv.design.inputs import parse_inputs, read_inputs
-from hsv.errors import DesignError
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 

@@ -3,13 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import read_inputs
 from hsv.design.model import design_model, polytopic_model
-from hsv.errors import DesignError
-from hsv.lpv.hull import smallest_weight
-from hsv.vehicle.extended import Filter, from_true_rate
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.extended import Filter, from_true_rate
+from hsv.model.lpv.hull import smallest_weight
+from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
 

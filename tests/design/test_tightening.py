@@ -3,11 +3,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design_file import find_design, read_design
 from hsv.design.baseline import _literal
 from hsv.design.tightening import check_plan, tighten
-from hsv.errors import DesignError
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.model.vehicle import load_vehicle
 
 LIMITS = load_vehicle().decoupled
 

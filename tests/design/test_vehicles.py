@@ -4,18 +4,18 @@ import json
 
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design_file import read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.design.region import corners, fraction
 from hsv.design.verification.verifier import load_subject, verify
-from hsv.errors import DesignError
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.blocks import steps
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.plant import FlightStatus
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.blocks import steps
+from hsv.flight.closed_loop import fly
+from hsv.flight.corners import corners, fraction
+from hsv.flight.scenario import load_scenario
+from hsv.model.plant import FlightStatus
+from hsv.model.vehicle import load_vehicle
 
 VEHICLE = """extends = "stiffened"
 [rigid_body]

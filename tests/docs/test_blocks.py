@@ -10,13 +10,13 @@ from node_processes import Processes
 from page_blocks import PAGES, ROOT, Block, blocks, indented
 from ros_domain import own_environment
 
-from hsv.simulation.scenario import load_scenario, scenario_at_means, scenario_table, scenario_text
+from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_table, scenario_text
 
 WHOLE = {
     **{page: "tests/docs/test_tutorial.py" for page in PAGES if page.startswith("docs/tutorial/")},
     **{page: "tests/examples/test_own_controllers.py" for page in PAGES if page.startswith("examples/")},
     "docs/c_controllers.md": "tests/examples/test_own_controllers.py",
-    "docs/export.md": "tests/export/test_controller.py",
+    "docs/export.md": "tests/control/test_export.py",
     "docs/core.md": "tests/docs/test_code_blocks.py",
     "docs/explanation/notch.md": "tests/docs/test_code_blocks.py",
     "docs/hardware.md": "tests/docs/test_code_blocks.py",
@@ -40,7 +40,7 @@ HERE = {
         "hsv run case1 --bag BAG --no-report",
         "cp offline_design/baseline.yaml new.yaml",
         "cp offline_design/baseline.yaml my.yaml",
-        "cp src/hsv/hsv/simulation/scenarios/case1.toml my.toml",
+        "cp src/hsv/hsv/flight/scenarios/case1.toml my.toml",
     ),
     "offline_design/README.md": (),
 }
@@ -72,7 +72,7 @@ ELSEWHERE = {
     ("docs/benchmarks.md", "hsv bench --only controllers"): "tests/cli/test_bench.py",
     ("docs/benchmarks.md", "hsv bench --only montecarlo"): "tests/cli/test_bench.py",
     ("docs/benchmarks.md", "hsv bench --json > before.json"): "tests/cli/test_bench.py",
-    ("docs/figures/index.md", "hsv figures --out docs/figures"): "tests/study/test_figures.py",
+    ("docs/figures/index.md", "hsv-paper figures --out docs/figures"): "tests/hsv_paper/test_figures.py",
     ("docs/installation.md", "$ python3 -m venv venv"): "tests/packaging/test_wheel.py",
     ("docs/installation.md", "from launch import LaunchDescription"): "tests/graph/test_full_installation.py",
     ("docs/live.md", "hsv run case1 --live"): "tests/graph/test_live.py",
@@ -98,11 +98,11 @@ NOT_RUN = {
     ("README.md", "flowchart LR"): "a diagram",
     ("docs/benchmarks.md", "python3 tools/step_times.py"): "takes minutes; see tests/graph/test_active_law.py",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
-    ("src/hsv/hsv/recording/report/plotly/README.md", NPM): "how a file of the repository was fetched",
+    ("src/hsv/hsv/pages/report/plotly/README.md", NPM): "how a file of the repository was fetched",
     (
         "docs/montecarlo.md",
         "hsv cluster worker-1 me@worker-2*8",
-    ): "needs other machines; tests/campaign/test_cluster.py",
+    ): "needs other machines; tests/flight/campaign/test_cluster.py",
     ("docs/montecarlo.md", ".venv/bin/dask scheduler"): "needs other machines",
     ("docs/montecarlo.md", HELM): "needs Kubernetes",
 }

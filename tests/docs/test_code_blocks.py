@@ -10,7 +10,7 @@ import matplotlib
 import page_blocks
 import pytest
 
-from hsv.faults.table import FAULT_KINDS, read_fault
+from hsv.model.faults.table import FAULT_KINDS, read_fault
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = ["python.md", "vehicle.md", "hardware.md"]

@@ -18,9 +18,9 @@ from printed_commands import printed
 from pyarrow import parquet
 from ros_domain import own_environment
 
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -166,9 +166,9 @@ def test_the_example_in_c_is_built_flown_and_compared_as_its_page_says(checkout,
 
 COMPILED = """
 import json, sys
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 parts = assemble_flight(load_scenario(sys.argv[1], {"controller": "hsv_scheduled:Scheduled"}))
 print(json.dumps([parts.controller.kernel.parameters[2:].tolist(), fly(parts).fingerprint]))
 """

@@ -18,24 +18,24 @@ from hypothesis import strategies as st
 from mutations import Mutated, flipped, mutated
 from node_processes import short_scenario
 
-from hsv.campaign.campaign import plan
-from hsv.campaign.executors import SerialExecutor
-from hsv.campaign.run import run_campaign
-from hsv.campaign.store import ResultStore
-from hsv.campaign.summary import Results, limits, shares, worst_flights
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.description import TOPICS
+from hsv.bags.info import describe
+from hsv.bags.reader import Bag
+from hsv.bags.recover import recover
+from hsv.base.errors import CampaignError, HsvError
+from hsv.base.units import parse_quantity
+from hsv.control.certificate import certificate_path
 from hsv.control.design_file import find_design, read_design
-from hsv.design.certificate import certificate_path
 from hsv.design.verification.preflight import preflight
-from hsv.errors import CampaignError, HsvError
-from hsv.graph.description import TOPICS
-from hsv.recording.bag_warnings import bag_warnings
-from hsv.recording.info import describe
-from hsv.recording.reader import Bag
-from hsv.recording.recover import recover
-from hsv.simulation.coverage import uncovered_of
-from hsv.simulation.scenario import load_scenario, scenario_names, scenario_text
-from hsv.units import parse_quantity
-from hsv.vehicle.vehicle import load_vehicle, vehicle_names, vehicle_text
+from hsv.flight.campaign.campaign import plan
+from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.store import ResultStore
+from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
+from hsv.flight.coverage import uncovered_of
+from hsv.flight.scenario import load_scenario, scenario_names, scenario_text
+from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_text
 
 QUICK, LONG = 100, 10_000
 

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from node_processes import Processes, short_scenario
 
-from hsv.recording.flight import flight_fingerprint
-from hsv.recording.reader import Bag
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.bags.flight import flight_fingerprint
+from hsv.bags.reader import Bag
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 
 pytestmark = pytest.mark.graph
 

@@ -15,13 +15,13 @@ from node_processes import Processes, recorded_steps
 from ros_domain import own_domain
 from waiting import exit_code_of, output_of, used, wait_until
 
+from hsv.bags.description import graph
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import flown_parameters
+from hsv.bags.replay.engine import replay, rerun
+from hsv.bags.replay.processes import processes_of
 from hsv.control.design_file import find_design
-from hsv.graph.description import graph
 from hsv.graph.exclusive import is_published
-from hsv.recording.reader import Bag
-from hsv.replay.attached import flown_parameters
-from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes_of
 
 pytestmark = pytest.mark.graph
 

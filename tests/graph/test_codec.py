@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 
-from hsv.errors import RunError
-from hsv.graph.description import OTHER_TOPICS, TOPICS
+from hsv.bags.description import OTHER_TOPICS, TOPICS
+from hsv.base.errors import RunError
 from hsv_node.codec import codec
 from hsv_node.messages import message_class
 

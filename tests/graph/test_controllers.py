@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from node_processes import Processes, short_scenario
 
+from hsv.bags.flight import input_columns, state_columns
+from hsv.bags.reader import Bag
 from hsv.control.tube_law import TubeStatusCode
-from hsv.recording.flight import input_columns, state_columns
-from hsv.recording.reader import Bag
-from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.history import History
-from hsv.simulation.scenario import load_scenario, scenario_text
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.closed_loop import fly
+from hsv.flight.history import History
+from hsv.flight.scenario import load_scenario, scenario_text
 
 pytestmark = pytest.mark.graph
 

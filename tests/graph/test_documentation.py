@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hsv.graph.description import RECORDER, TOPICS, graph
+from hsv.bags.description import RECORDER, TOPICS, graph
 from hsv.graph.reference import reference
 
 ROOT = Path(__file__).parents[2]

@@ -66,7 +66,7 @@ from contextlib import contextmanager
 from pathlib import Path
 import json
 import hsv_bringup.client, hsv_node.main
-from hsv.errors import ParameterError
+from hsv.base.errors import ParameterError
 from hsv_bringup.client import OneLineParser, run_client
 from hsv_bringup.flow_executor import BatchExecutor, FlowExecutor
 from hsv_node.main import EventsExecutor, run_node

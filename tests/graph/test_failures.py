@@ -14,9 +14,9 @@ from marking import long
 from node_processes import Processes, children, fly_until, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
-from hsv.graph.description import PLANT, RECORDER, graph
+from hsv.bags.description import PLANT, RECORDER, graph
+from hsv.bags.reader import Bag
 from hsv.graph.standstill import HUNG_AFTER
-from hsv.recording.reader import Bag
 
 pytestmark = pytest.mark.graph
 

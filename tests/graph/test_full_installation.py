@@ -19,8 +19,8 @@ from node_processes import Processes, children, recorded_steps, short_scenario
 from printed_commands import ROOT, the_printed
 from waiting import exit_code_of, output_of, wait_until
 
-from hsv.graph.description import RECORDER, graph
-from hsv.recording.reader import Bag
+from hsv.bags.description import RECORDER, graph
+from hsv.bags.reader import Bag
 
 pytestmark = pytest.mark.full_ros
 

@@ -18,8 +18,8 @@ from node_processes import Processes, children, short_scenario
 from rosbags.rosbag2 import Reader
 from waiting import output_of, wait_until
 
-from hsv.graph.description import TOPICS
-from hsv.recording.reader import Bag
+from hsv.bags.description import TOPICS
+from hsv.bags.reader import Bag
 from hsv_plant.plant import MAX_AHEAD
 
 pytestmark = pytest.mark.graph

@@ -6,8 +6,8 @@ import os
 
 import pytest
 
-from hsv.errors import ParameterError, RunError
-from hsv.graph.description import COMPOSED, ROOT, TUBE_MPC, NodeDescription
+from hsv.bags.description import COMPOSED, ROOT, TUBE_MPC, NodeDescription
+from hsv.base.errors import ParameterError, RunError
 from hsv.graph.exclusive import claim_topic
 from hsv.graph.launcher import Launcher
 

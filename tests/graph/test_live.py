@@ -13,12 +13,12 @@ from live_clients import FoxgloveClient, PageClient, addresses, assert_as_record
 from node_processes import Processes, children, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
-from hsv.live.columns import columns
-from hsv.recording.flight import flight_fingerprint
-from hsv.recording.reader import Bag
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.bags.flight import flight_fingerprint
+from hsv.bags.reader import Bag
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+from hsv.pages.live.columns import columns
 
 pytestmark = pytest.mark.graph
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from node_processes import Processes, short_scenario
 
-from hsv.graph.description import TOPICS
-from hsv.recording.flight import flight_data, input_columns, state_columns
-from hsv.recording.reader import Bag
-from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.bags.description import TOPICS
+from hsv.bags.flight import flight_data, input_columns, state_columns
+from hsv.bags.reader import Bag
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 
 pytestmark = pytest.mark.graph
 

@@ -16,15 +16,15 @@ from injected_fault import FUEL, last_line
 from node_processes import Processes, recorded_steps, short_scenario
 from waiting import output_of, wait_until
 
-from hsv.graph.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, RECORDER, TUBE_MPC, NodeDescription, graph
+from hsv.bags.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, RECORDER, TUBE_MPC, NodeDescription, graph
+from hsv.bags.flight import flight_fingerprint, state_columns
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 from hsv.graph.launcher import parameter_arguments
 from hsv.graph.preparation import prepare
-from hsv.recording.flight import flight_fingerprint, state_columns
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps
-from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
 
 pytestmark = pytest.mark.graph
 

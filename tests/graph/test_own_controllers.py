@@ -17,9 +17,9 @@ from node_processes import Processes
 from ros_domain import own_environment
 from waiting import exit_code_of, output_of, wait_until
 
-from hsv.recording.flight import flight_fingerprint
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps
+from hsv.bags.flight import flight_fingerprint
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps
 
 pytestmark = pytest.mark.graph
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hsv.graph.parameter_sections import ParameterSections, disagreements
+from hsv.bags.parameter_sections import ParameterSections, disagreements
 
 NODES = {
     "plant": {"period": 0.02, "duration": 12.0, "controller": "tube_mpc"},

@@ -13,10 +13,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from ros_domain import own_domain
 
-from hsv.errors import ParameterError
-from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.parameters import Parameter
 from hsv_node.parameters import declare
 
 pytestmark = pytest.mark.graph

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from hsv.bags.parameter_sections import ParameterSections
 from hsv.graph import placement
 from hsv.graph.exclusive import claim_processor, claim_topic
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.placement import CHAIN, share_processor
 from hsv.graph.preparation import prepare
 

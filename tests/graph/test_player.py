@@ -12,9 +12,9 @@ from node_processes import Processes
 from ros_domain import own_domain
 from waiting import wait_until
 
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Topic
 from hsv.graph.exclusive import claim_topic
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Topic
 
 pytestmark = pytest.mark.graph
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from hsv.base.errors import RecordingError
 from hsv.control.design_file import find_design, read_design
-from hsv.errors import RecordingError
+from hsv.flight.fingerprint import as_published
+from hsv.flight.scenario import parse_scenario, with_controller
 from hsv.graph.preparation import prepare
-from hsv.simulation.fingerprint import as_published
-from hsv.simulation.scenario import parse_scenario, with_controller
 
 
 def test_the_bag_is_made_here_so_that_a_second_run_of_its_name_is_refused(tmp_path: Path) -> None:

@@ -12,15 +12,15 @@ from node_processes import Processes, fly_until
 from real_hardware import ELEVATOR, scenario_file
 from waiting import output_of
 
-from hsv.recording.flight import input_columns, state_columns
-from hsv.recording.info import describe
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps, flown_parameters
-from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes_of
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
+from hsv.bags.flight import input_columns, state_columns
+from hsv.bags.info import describe
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps, flown_parameters
+from hsv.bags.replay.engine import replay, rerun
+from hsv.bags.replay.processes import processes_of
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
 
 pytestmark = pytest.mark.graph
 

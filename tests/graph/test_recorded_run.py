@@ -14,12 +14,12 @@ from bag_readers import READERS, Messages, assert_equal, ours
 from node_processes import Processes, short_scenario
 from waiting import exit_code_of
 
+from hsv.bags.description import TOPICS
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import flown_parameters
+from hsv.bags.replay.engine import replay, rerun
+from hsv.bags.replay.processes import processes_of
 from hsv.control.design_file import find_design, read_parameters
-from hsv.graph.description import TOPICS
-from hsv.recording.reader import Bag
-from hsv.replay.attached import flown_parameters
-from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes_of
 
 pytestmark = pytest.mark.graph
 
@@ -69,7 +69,7 @@ HASHES = textwrap.dedent(
     """
     import json, sys
     import rclpy
-    from hsv.recording.reader import Bag
+    from hsv.bags.reader import Bag
     from hsv_node.messages import message_class
 
     rclpy.init()
@@ -100,8 +100,8 @@ SUBSCRIBE = textwrap.dedent(
     import sys
     import rclpy
     from rclpy.experimental import EventsExecutor
-    from hsv.graph.description import TOPICS
-    from hsv.recording.reader import Bag
+    from hsv.bags.description import TOPICS
+    from hsv.bags.reader import Bag
     from hsv_node.messages import message_class
     from hsv_node.qos import STEP
     from std_srvs.srv import Trigger

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from hsv.base.units import UnitSystem
 from hsv.graph.snapshot import Snapshot
-from hsv.units import UnitSystem
 
 SNAPSHOT = Snapshot(120.5, 26200.0, -1.234, 0.0596, ("elevator_deflection loss_of_effectiveness",))
 

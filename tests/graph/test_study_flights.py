@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.recording.reader import Bag
-from hsv.study.flights import Flights
+from hsv.bags.reader import Bag
+from hsv_paper.flights import Flights
 
 pytestmark = pytest.mark.graph
 

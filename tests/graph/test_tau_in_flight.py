@@ -13,11 +13,11 @@ from injected_fault import last_line
 from node_processes import Processes, fly_until, recorded_steps, short_scenario
 from waiting import output_of
 
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps, flown_parameters
+from hsv.bags.replay.engine import replay, rerun
+from hsv.bags.replay.processes import processes_of
 from hsv.control.design_file import find_design, read_design, write_design
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps, flown_parameters
-from hsv.replay.engine import replay, rerun
-from hsv.replay.processes import processes_of
 
 pytestmark = pytest.mark.graph
 

@@ -16,17 +16,17 @@ from rclpy.serialization import serialize_message
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
+from hsv.bags import description
+from hsv.bags.description import TOPICS, WIRE_ALIGNMENT
+from hsv.bags.exchange import Head, filler, reader
+from hsv.bags.fields import blank
+from hsv.base.errors import RunError, SignalError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
-from hsv.errors import RunError, SignalError
-from hsv.faults.schedule import ActiveFault
-from hsv.faults.table import Fault
-from hsv.graph import description
-from hsv.graph.description import TOPICS, WIRE_ALIGNMENT
-from hsv.graph.exchange import Head, filler, reader
-from hsv.recording.fields import blank
-from hsv.simulation.blocks import Signals
-from hsv.vehicle.plant import FlightStatus
+from hsv.flight.blocks import Signals
+from hsv.model.faults.schedule import ActiveFault
+from hsv.model.faults.table import Fault
+from hsv.model.plant import FlightStatus
 from hsv_node.codec import codec
 from hsv_node.messages import type_name
 from hsv_node.wire import giver, taker

@@ -10,8 +10,8 @@ import pytest
 from marking import long
 from node_processes import Processes, short_scenario
 
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps
 
 pytestmark = pytest.mark.graph
 

@@ -14,7 +14,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from hsv.cli.extras import EXTRAS, missing_extra
-from hsv.simulation.scenario import scenario_names
+from hsv.flight.scenario import scenario_names
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "hsv" / "hsv"
@@ -129,7 +129,7 @@ def test_a_module_of_no_extra_is_not_explained_away() -> None:
 
 
 def test_every_shipped_scenario_has_its_design_in_the_package() -> None:
-    from hsv.simulation.scenario import load_scenario
+    from hsv.flight.scenario import load_scenario
 
     designs = {path.stem for path in (SOURCES / "designs").glob("*.yaml")}
     assert {load_scenario(name).design for name in scenario_names()} - {None, ""} <= designs

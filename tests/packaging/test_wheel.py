@@ -87,7 +87,7 @@ def environment(tmp_path: Path) -> Callable[..., Path]:
 
 def fly(folder: Path, cwd: Path) -> None:
     """Fly Case 1 and check that it is the published flight."""
-    table = tomllib.loads((ROOT / "src/hsv/hsv/simulation/fingerprints.toml").read_text(encoding="utf-8"))
+    table = tomllib.loads((ROOT / "src/hsv/hsv/flight/fingerprints.toml").read_text(encoding="utf-8"))
     flown = json.loads(checked(folder / "hsv", "simulate", "case1", "--json", cwd=cwd))
     assert flown["fingerprint"] == table["case1"]["fingerprint"]
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from flights import components
 
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.metrics import flight_metrics
-from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.plant import FlightStatus
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.scenario import load_scenario
+from hsv.model.plant import FlightStatus
 
 FOOT = 0.3048
 DEGREE = math.pi / 180

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hsv.units import factor
-from hsv.vehicle.dynamics import jacobian
-from hsv.vehicle.modes import modes
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import load_vehicle
+from hsv.base.units import factor
+from hsv.model.dynamics import jacobian
+from hsv.model.modes import modes
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
 
 LIMITS = load_vehicle().decoupled
 

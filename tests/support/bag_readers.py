@@ -16,8 +16,8 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
-from hsv.recording.fields import as_dict
-from hsv.recording.reader import Bag
+from hsv.bags.fields import as_dict
+from hsv.bags.reader import Bag
 
 NPM = Path(__file__).parents[1] / "viewers" / "npm"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Topic
-from hsv.recording.writer import BagWriter
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Topic
+from hsv.bags.writer import BagWriter
 
 Messages = list[tuple[int, bytes]]
 """Times in nanoseconds, and CDR."""

@@ -99,5 +99,5 @@ def damaged(source: Original, target: Path, seed: int) -> tuple[str, bytes]:
 
 
 def found_in(bag: object) -> Messages:
-    """Return the messages that ``bag``, a :class:`hsv.recording.reader.Bag`, has found."""
+    """Return the messages that ``bag``, a :class:`hsv.bags.reader.Bag`, has found."""
     return Counter((topic, data) for topic in bag.topics for _, data in bag.messages(topic))  # type: ignore[attr-defined]

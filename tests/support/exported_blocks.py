@@ -11,11 +11,11 @@ import numpy as np
 from hsv.control.c_block import load_block
 from hsv.control.controller import STEP_FUNCTION, Controller, ControllerInput, ControllerResult, flat_input
 from hsv.control.design import ControlDesign
+from hsv.control.export import SOURCE, controller_files
 from hsv.control.nominal_trajectory import NominalResult
 from hsv.control.notch_filter import NotchResult
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.export.controller import SOURCE, controller_files
-from hsv.simulation.closed_loop import Components
+from hsv.flight.closed_loop import Components
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-ffp-contract=off")
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from hsv.core import instruction_set
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.metrics import flight_metrics
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.scenario import load_scenario
 
 try:
     from numpy._core._multiarray_umath import __cpu_dispatch__, __cpu_features__

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.blocks import steps
-from hsv.simulation.closed_loop import Components
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.blocks import steps
+from hsv.flight.closed_loop import Components
+from hsv.flight.scenario import load_scenario
 
 
 def components(scenario: str = "case1", **changes: Any) -> Components:

@@ -9,17 +9,17 @@ from typing import Any
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from hsv.faults.injector import FaultInjector
-from hsv.graph.description import TOPICS, resolved
-from hsv.graph.parameter_sections import ParameterSections
-from hsv.recording.definitions import definition, type_hash
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.track import Track
-from hsv.recording.writer import BagWriter
-from hsv.replay.attached import controller_of
-from hsv.replay.engine import fly
-from hsv.simulation.assembly import flight_parameters
-from hsv.simulation.scenario import load_scenario
+from hsv.bags.definitions import definition, type_hash
+from hsv.bags.description import TOPICS, resolved
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.bags.replay.attached import controller_of
+from hsv.bags.replay.engine import fly
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.track import Track
+from hsv.bags.writer import BagWriter
+from hsv.flight.assembly import flight_parameters
+from hsv.flight.scenario import load_scenario
+from hsv.model.faults.injector import FaultInjector
 
 InFlight = Mapping[int, Callable[[FaultInjector], object]]
 """By step: what is done to the fault injector before it."""

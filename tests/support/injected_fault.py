@@ -12,8 +12,8 @@ import pytest
 from node_processes import Processes, recorded_steps
 from waiting import exit_code_of, wait_until
 
-from hsv.recording.reader import Bag
-from hsv.replay.attached import complete_steps
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import complete_steps
 
 LONG = ["-p", "duration:=600.0", "-p", "real_time_factor:=2.0"]
 """Parameters of a flight that does not end before the commands, however slow the machine: it is interrupted."""

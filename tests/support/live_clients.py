@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from websocket import WebSocket, WebSocketException, create_connection
 
-from hsv.graph.description import TOPICS, resolved
-from hsv.recording.reader import Bag
+from hsv.bags.description import TOPICS, resolved
+from hsv.bags.reader import Bag
 
 _MESSAGE = struct.Struct("<BIQ")
 """Of foxglove.sdk.v1: 1 for message data, number of the subscription, log time (ns); the message follows."""

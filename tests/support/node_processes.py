@@ -10,8 +10,8 @@ from typing import IO
 
 from waiting import output_of, parents, wait_until
 
-from hsv.errors import RecordingError
-from hsv.recording.reader import Bag
+from hsv.bags.reader import Bag
+from hsv.base.errors import RecordingError
 
 SHORT = """
 title = "a short Case 1"

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from hsv.control.design_file import find_design, read_design
-from hsv.simulation.fingerprint import as_published
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.fingerprint import as_published
+from hsv.flight.scenario import load_scenario
 from portability import Environment, own
 
 ROOT = Path(__file__).resolve().parents[2]

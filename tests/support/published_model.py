@@ -1,4 +1,4 @@
-"""The published model once more, written from the papers in their own units: a second opinion on ``hsv.vehicle``.
+"""The published model once more, written from the papers in their own units: a second opinion on ``hsv.model``.
 
 Parker et al., J. Guid. Control Dyn. 30(3), 2007 (numbers); equations (1)-(3) of the paper. ft, slug, lbf, s, rad, in
 extended precision. The pitch acceleration is found first here, the elastic ones from it: another order than in the

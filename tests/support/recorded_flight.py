@@ -8,16 +8,16 @@ from typing import Any
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from hsv.bags.description import STATE, TOPICS, resolved
+from hsv.bags.fields import blank
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.bags.reader import Bag
+from hsv.bags.replay.engine import fly
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
 from hsv.control.design_file import find_design, find_file
-from hsv.graph.description import STATE, TOPICS, resolved
-from hsv.graph.parameter_sections import ParameterSections
-from hsv.recording.fields import blank
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
-from hsv.replay.engine import fly
-from hsv.simulation.assembly import flight_parameters
-from hsv.simulation.scenario import parse_scenario, scenario_text
+from hsv.flight.assembly import flight_parameters
+from hsv.flight.scenario import parse_scenario, scenario_text
 
 MESSAGES = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_msgs" / "msg"
 LOG, DIAGNOSTICS = "rcl_interfaces/msg/Log", "diagnostic_msgs/msg/DiagnosticArray"

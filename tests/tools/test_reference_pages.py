@@ -62,7 +62,7 @@ def test_every_package_and_module_of_the_library_is_on_its_page():
     there = {f"hsv.{module.name}" for module in pkgutil.iter_modules(hsv.__path__)} - {"hsv.api"}
     assert {*listed} == there and len(listed) == len(there)
     assert "hsv.design.sets.ellipsoid" in reference_pages.modules_of("hsv.design")
-    assert reference_pages.modules_of("hsv.units") == []
+    assert reference_pages.modules_of("hsv.base.units") == []
 
 
 def test_links_of_pages_lead_to_pages():

@@ -3,11 +3,11 @@
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from hsv.lpv.discretisation import zero_order_hold
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import PITCH_RATE, jacobian
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.base.parameters import Parameter, check_all
+from hsv.model.dynamics import PITCH_RATE, jacobian
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
 
 RIGID = 5  # altitude, velocity, angle of attack, pitch angle, pitch rate
 STATE_SCALE = np.array([100.0, 20.0, 0.01, 0.01, 0.05])  # m, m/s, rad, rad, rad/s: deviations that weigh equally

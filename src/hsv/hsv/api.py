@@ -15,13 +15,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly as fly_components
-from hsv.simulation.flight import Flight
-from hsv.simulation.metrics import METRICS
-from hsv.simulation.scenario import Scenario
-from hsv.simulation.scenario import load_scenario as load
-from hsv.units import UnitSystem, unit_system
+from hsv.base.units import UnitSystem, unit_system
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly as fly_components
+from hsv.flight.flight import Flight
+from hsv.flight.metrics import METRICS
+from hsv.flight.scenario import Scenario
+from hsv.flight.scenario import load_scenario as load
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,7 +79,7 @@ def plot(flights: Flight | Mapping[str, Flight], *, units: str = UnitSystem.metr
         QuantityError: ``units`` are none of these.
     """
     # Drawing takes a second to import, and a script may do without.
-    from hsv.recording.plots import flight_figure
+    from hsv.pages.plots import flight_figure
 
     shown = {"flight": flights} if isinstance(flights, Flight) else flights
     return flight_figure({label: flight.data() for label, flight in shown.items()}, unit_system(units))

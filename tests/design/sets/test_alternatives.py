@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, paper_system
 from hsv.design.sets.box import box, infeasibility
@@ -8,7 +9,6 @@ from hsv.design.sets.compare import compare_sets
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.modal import modal_box
 from hsv.design.sets.zonotope import zonotope
-from hsv.errors import DesignError
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design_file import find_design
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem
@@ -16,8 +17,7 @@ from hsv.design.sets.star_norms import StarNorms, output_rows
 from hsv.design.verification.checks import gathered
 from hsv.design.verification.invariant_set import certified_set, counter_example_checks, set_checks
 from hsv.design.verification.verifier import load_subject
-from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.model.dynamics import N_RIGID
 
 
 def problem_of(vertices, columns, lower, upper):

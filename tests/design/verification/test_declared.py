@@ -4,11 +4,11 @@ from numpy.testing import assert_allclose
 
 from hsv.design.verification.declared import REACH, declared, declared_actuators, described, sensors
 from hsv.design.verification.plan import Plan
-from hsv.sensors import sensor_data
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import N_RIGID
+from hsv.model.sensors import sensor_data
 
 
 @pytest.mark.long

@@ -2,18 +2,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from hsv.core.noise import LARGEST
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.region import record
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.declared import declared
 from hsv.design.verification.effects import Measured, air, delayed, with_models
-from hsv.noise import LARGEST
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE, advance
-from hsv.vehicle.trim import trim
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import N_RIGID, N_STATES, PITCH_RATE, advance
+from hsv.model.trim import trim
 
 
 @pytest.mark.parametrize("state", range(N_RIGID))

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design
 from hsv.design.results import DESIGNS
 from hsv.design.verification.quick import QUICK
 from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size
 from hsv.design.verification.verifier import RECOMPUTED, load_subject
-from hsv.errors import DesignError
 
 ARRAYS = {
     "model.a": (lambda design: design.polytope.A, "polytopic model"),

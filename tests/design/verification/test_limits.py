@@ -6,10 +6,10 @@ from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.design.verification.verdict import Verdict
-from hsv.lpv.actuated import actuator_system
-from hsv.vehicle.actuators import SUBSTEPS
-from hsv.vehicle.dynamics import INPUT_NAMES
-from hsv.vehicle.trim import trim
+from hsv.model.actuators import SUBSTEPS
+from hsv.model.dynamics import INPUT_NAMES
+from hsv.model.lpv.actuated import actuator_system
+from hsv.model.trim import trim
 
 
 def test_no_error_in_the_set_moves_actuators_farther_or_faster(realistic):

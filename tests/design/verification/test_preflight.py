@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
+from hsv.control.certificate import certificate_path, read_certificate, write_certificate
 from hsv.control.design import ControlDesign
 from hsv.control.design_file import find_design, read_design, read_parameters
-from hsv.design.certificate import certificate_path, read_certificate, write_certificate
 from hsv.design.verification.preflight import preflight
-from hsv.errors import DesignError
 
 
 @pytest.fixture(scope="module")

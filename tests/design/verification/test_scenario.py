@@ -1,8 +1,8 @@
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.design.verification.scenario import bounding_corners, scenario_checks
-from hsv.errors import DesignError
-from hsv.simulation.scenario import load_scenario, parse_scenario, scenario_text
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 
 
 def test_a_flight_of_the_declared_region_keeps_to_the_certificate(subject):

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
+from hsv.base.errors import DesignError
 from hsv.control.design_file import find_design
 from hsv.design.verification import verdict
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
-from hsv.errors import DesignError
 
 
 def test_where_no_set_is_found_the_reason_is_that_of_the_search(subject, monkeypatch):

@@ -4,11 +4,11 @@ import json
 
 import pytest
 
+from hsv.base.errors import DesignError
+from hsv.control.certificate import read_certificate, write_certificate
 from hsv.control.design import ControlDesign
-from hsv.design.certificate import read_certificate, write_certificate
 from hsv.design.verification.checks import require
 from hsv.design.verification.verifier import verify
-from hsv.errors import DesignError
 
 
 def failures(checks):

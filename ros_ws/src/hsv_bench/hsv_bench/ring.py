@@ -16,7 +16,7 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 
-from hsv.graph import description
+from hsv.bags import description
 from hsv_bench.ring_node import Recorder, RingNode
 
 LOOPS = ("events", "wait_set", "ordered")

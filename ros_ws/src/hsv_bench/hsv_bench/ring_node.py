@@ -9,10 +9,10 @@ from typing import Any
 
 from rclpy.node import Node
 
-from hsv.graph import description
-from hsv.recording.definitions import definition, type_hash
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
+from hsv.bags import description
+from hsv.bags.definitions import definition, type_hash
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
 from hsv_node.messages import message_class
 from hsv_node.qos import STEP
 

@@ -15,11 +15,11 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from hsv.airframe.geometry import airframe
-from hsv.airframe.pose import LEVEL, Sample, Transform, composed, transforms
-from hsv.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, label, solids
-from hsv.graph.description import ACTUATOR, MARKERS, STATE
-from hsv.parameters import Parameter
+from hsv.bags.description import ACTUATOR, MARKERS, STATE
+from hsv.base.parameters import Parameter
+from hsv.model.airframe.geometry import airframe
+from hsv.model.airframe.pose import LEVEL, Sample, Transform, composed, transforms
+from hsv.model.airframe.solids import LABEL_COLOUR, LABEL_HEIGHT, LABEL_SIZE, Colour, label, solids
 from hsv_node.main import run_node
 from hsv_node.parameters import declare
 from hsv_node.process import ProcessNode

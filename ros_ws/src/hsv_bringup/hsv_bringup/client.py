@@ -15,11 +15,11 @@ from hsv_msgs.msg import Run
 from rclpy.node import Node
 from rclpy.utilities import remove_ros_args
 
-from hsv.errors import HsvError, RunError
-from hsv.graph.description import PLANT, NodeDescription
+from hsv.bags.description import PLANT, NodeDescription
+from hsv.base.errors import HsvError, RunError
+from hsv.base.json_text import json_text
 from hsv.graph.exclusive import is_published
 from hsv.graph.standstill import Standstill
-from hsv.json_text import json_text
 from hsv_node import roles
 from hsv_node.ending import ends_with
 from hsv_node.main import take_signals

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from hsv.graph.description import controller_node
+from hsv.bags.description import controller_node
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_bringup.recorder import RecorderNode
 from hsv_ctrl.controller import ControllerNode

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from hsv_msgs.msg import Actuator, Fault
 from hsv_msgs.srv import ClearFault, InjectFault
 
-from hsv.errors import ParameterError, RunError
-from hsv.faults.injector import read_parameters
-from hsv.graph.description import FAULT_INJECTOR
-from hsv.graph.exchange import fault_in
+from hsv.bags.description import FAULT_INJECTOR
+from hsv.bags.exchange import fault_in
+from hsv.base.errors import ParameterError, RunError
+from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 from hsv_node.qos import STEP
 

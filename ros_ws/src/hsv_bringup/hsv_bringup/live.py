@@ -22,7 +22,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.task import Future
 
-from hsv.graph.description import (
+from hsv.bags.description import (
     CONTROLLER,
     DIAGNOSTICS,
     LAST_STATE,
@@ -36,15 +36,15 @@ from hsv.graph.description import (
     TOPICS,
     NodeDescription,
 )
-from hsv.graph.infrastructure_parameters import LIVE_PARAMETERS
+from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS
 from hsv.graph.settable import SETTABLE, step_in
 from hsv.graph.standstill import Standstill
-from hsv.live.commands import Change, Command, Inject
-from hsv.live.foxglove_server import FoxgloveServer
-from hsv.live.hub import Hub
-from hsv.live.server import Answer, PageServer
-from hsv.recording.report.panels import INPUTS
-from hsv.recording.viewers import LAYOUTS, VIEWERS
+from hsv.pages.live.commands import Change, Command, Inject
+from hsv.pages.live.foxglove_server import FoxgloveServer
+from hsv.pages.live.hub import Hub
+from hsv.pages.live.server import Answer, PageServer
+from hsv.pages.report.panels import INPUTS
+from hsv.pages.viewers import LAYOUTS, VIEWERS
 from hsv_bringup.client import ABSENT_AFTER, SILENT_AFTER
 from hsv_bringup.flow_executor import FlowExecutor
 from hsv_node.main import run_node

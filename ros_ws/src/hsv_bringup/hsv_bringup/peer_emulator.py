@@ -12,15 +12,15 @@ import rclpy
 from hsv_msgs.msg import Ready, Run
 from rclpy.node import Node
 
-from hsv.graph import description
-from hsv.graph.description import NodeDescription
-from hsv.graph.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
+from hsv.bags import description
+from hsv.bags.definitions import definition, type_hash
+from hsv.bags.description import NodeDescription
+from hsv.bags.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import broken_off, complete_steps
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
 from hsv.graph.standstill import Standstill
-from hsv.recording.definitions import definition, type_hash
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
-from hsv.replay.attached import broken_off, complete_steps
 from hsv_node.lockstep import LockstepNode
 from hsv_node.main import run_node
 from hsv_node.messages import message_class

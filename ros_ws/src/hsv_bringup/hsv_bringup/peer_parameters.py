@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from rclpy.task import Future
 
-from hsv.graph.description import COMPOSED
+from hsv.bags.description import COMPOSED
 from hsv.graph.standstill import Standstill, processor_time_of
 
 GIVE_UP_AFTER = 10.0

@@ -15,10 +15,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.utilities import remove_ros_args
 from std_srvs.srv import Trigger
 
-from hsv.errors import ParameterError, RecordingError
-from hsv.graph.description import CLOCK, PLANT, RECORDER, TOPICS
-from hsv.recording.reader import Bag
-from hsv.recording.topic import Qos
+from hsv.bags.description import CLOCK, PLANT, RECORDER, TOPICS
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Qos
+from hsv.base.errors import ParameterError, RecordingError
 from hsv_node.lockstep import SAID_EVERY
 from hsv_node.main import run_node
 from hsv_node.messages import message_class

@@ -13,8 +13,8 @@ from typing import Any
 
 from hsv_msgs.msg import RecorderProgress, Run, VehicleState
 
-from hsv.errors import ParameterError
-from hsv.graph.description import (
+from hsv.bags.definitions import definition, type_hash
+from hsv.bags.description import (
     ACTUATOR,
     LATCHED_TOPICS,
     NOMINAL,
@@ -30,13 +30,13 @@ from hsv.graph.description import (
     graph,
     step_topics,
 )
-from hsv.graph.infrastructure_parameters import RECORDER_PARAMETERS
+from hsv.bags.infrastructure_parameters import RECORDER_PARAMETERS
+from hsv.bags.roles import naming
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
+from hsv.base.errors import ParameterError
+from hsv.core.noise import SEED_PARAMETER
 from hsv.graph.snapshot import Snapshot
-from hsv.noise import SEED_PARAMETER
-from hsv.recording.definitions import definition, type_hash
-from hsv.recording.roles import naming
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
 from hsv_bringup.flow_executor import BatchExecutor
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
 from hsv_node.codec import codec
@@ -143,8 +143,8 @@ class RecorderNode(PeerNode):
             )
             return
         # Not at the top: the components' tables take their time, and a prepared run does without.
+        from hsv.bags.parameter_sections import disagreements
         from hsv.control.design_parameters import digest
-        from hsv.graph.parameter_sections import disagreements
         from hsv.graph.preparation import provenance, recorded_files
 
         for words in disagreements(values):

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from hsv_msgs.srv import SetCommand
 
-from hsv.errors import ParameterError
-from hsv.graph.description import NOMINAL_TRAJECTORY
+from hsv.bags.description import NOMINAL_TRAJECTORY
+from hsv.base.errors import ParameterError
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 
 

@@ -9,7 +9,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter as RosParameter
 
-from hsv.errors import ParameterError
+from hsv.base.errors import ParameterError
 from hsv.graph.settable import find, parse, step_in
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
 

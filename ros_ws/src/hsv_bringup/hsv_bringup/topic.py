@@ -10,13 +10,13 @@ from typing import Any
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 
-from hsv.errors import ParameterError, RecordingError, RunError
-from hsv.graph.description import TOPICS, graph
-from hsv.recording.definitions import definition
-from hsv.recording.export import table
-from hsv.recording.track import Track
-from hsv.recording.typestore import message_types
-from hsv.recording.units import units_of
+from hsv.bags.definitions import definition
+from hsv.bags.description import TOPICS, graph
+from hsv.bags.export import table
+from hsv.bags.track import Track
+from hsv.bags.typestore import message_types
+from hsv.bags.units import units_of
+from hsv.base.errors import ParameterError, RecordingError, RunError
 from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
 from hsv_node.messages import message_class
 from hsv_node.roles import node_in_role

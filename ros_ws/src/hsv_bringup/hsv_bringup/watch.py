@@ -11,10 +11,10 @@ from typing import Any
 
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
-from hsv.errors import RunError
-from hsv.graph.description import ACTUATOR, NOMINAL, STATE, TOPICS, TUBE_STATUS
+from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TOPICS, TUBE_STATUS
+from hsv.base.errors import RunError
+from hsv.base.units import unit_system
 from hsv.graph.snapshot import Snapshot
-from hsv.units import unit_system
 from hsv_bringup.client import GraphClient, OneLineParser, answer, run_client
 from hsv_node.messages import message_class
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hsv.bags.description import CONTROLLER, CONTROLLERS
+from hsv.base.errors import ParameterError
 from hsv.control.controllers import NODE, build_controller, controller_class
-from hsv.errors import ParameterError
-from hsv.graph.description import CONTROLLER, CONTROLLERS
+from hsv.flight.blocks import Signals
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.simulation.blocks import Signals
 from hsv_ctrl.design import declare_design
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from hsv_msgs.msg import Reference, Run
 from hsv_msgs.srv import SetCommand
 
+from hsv.bags.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
+from hsv.bags.exchange import stamp_of
+from hsv.base.errors import HsvError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.errors import HsvError
-from hsv.graph.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
-from hsv.graph.exchange import stamp_of
-from hsv.simulation.blocks import Signals
+from hsv.flight.blocks import Signals
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hsv.bags.description import NOTCH_FILTER
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
-from hsv.graph.description import NOTCH_FILTER
-from hsv.simulation.blocks import Signals
+from hsv.flight.blocks import Signals
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle

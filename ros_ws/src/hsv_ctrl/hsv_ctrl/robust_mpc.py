@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hsv.bags.description import ROBUST_MPC
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS, RobustMpc
-from hsv.graph.description import ROBUST_MPC
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from hsv_msgs.msg import Run
 
+from hsv.bags.description import NodeDescription
+from hsv.base.errors import ParameterError
 from hsv.control.effectiveness import EffectivenessMode
 from hsv.control.tube_law import TubeResult, TubeStatusCode
-from hsv.errors import ParameterError
-from hsv.graph.description import NodeDescription
-from hsv.simulation.blocks import Signals
+from hsv.flight.blocks import Signals
 from hsv_ctrl.step_times import StepTimes
 from hsv_node.block import BlockNode
 from hsv_node.parameters import given

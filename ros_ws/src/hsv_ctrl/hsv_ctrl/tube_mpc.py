@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
+from hsv.bags.description import TUBE_MPC
+from hsv.base.errors import DesignError, ParameterError
+from hsv.control.certificate import CERTIFICATE_PARAMETERS
 from hsv.control.coverage import uncovered_hardware
 from hsv.control.effectiveness import WATCHED_PARAMETERS
 from hsv.control.effectiveness_parameters import EFFECTIVENESS_ENABLED
 from hsv.control.tube_factor import TAU
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
-from hsv.design.certificate import CERTIFICATE_PARAMETERS
 from hsv.design.verification.preflight import preflight
-from hsv.errors import DesignError, ParameterError
-from hsv.graph.description import TUBE_MPC
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node

@@ -8,9 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from hsv.documents import parse_yaml, read_text
-from hsv.errors import ParameterError
-from hsv.graph.description import checked_namespace
+from hsv.bags.description import checked_namespace
+from hsv.base.documents import parse_yaml, read_text
+from hsv.base.errors import ParameterError
 
 _PARAMETERS = "ros__parameters"
 

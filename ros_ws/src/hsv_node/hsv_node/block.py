@@ -8,9 +8,9 @@ from typing import Any
 
 from hsv_msgs.msg import Run
 
-from hsv.errors import RunError, SignalError
-from hsv.graph.description import NodeDescription
-from hsv.simulation.blocks import Signals
+from hsv.bags.description import NodeDescription
+from hsv.base.errors import RunError, SignalError
+from hsv.flight.blocks import Signals
 from hsv_node.lockstep import PeerNode
 from hsv_node.wire import STEP_PLACE, Values, giver, taker
 

@@ -14,8 +14,8 @@ from functools import cache
 from operator import itemgetter
 from typing import Any, Protocol
 
-from hsv.errors import RunError
-from hsv.graph.description import WIRE_ALIGNMENT
+from hsv.bags.description import WIRE_ALIGNMENT
+from hsv.base.errors import RunError
 from hsv_node.messages import message_class
 
 _CODES = {

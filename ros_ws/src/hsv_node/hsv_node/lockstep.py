@@ -14,12 +14,12 @@ from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from hsv.bags import description
+from hsv.bags.description import NodeDescription
+from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.base.errors import RunError, SignalError
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
-from hsv.errors import RunError, SignalError
-from hsv.graph import description
-from hsv.graph.description import NodeDescription
-from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv_node.codec import codec
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown

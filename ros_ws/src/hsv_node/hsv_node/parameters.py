@@ -13,11 +13,11 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from hsv.errors import ParameterError
-from hsv.graph.description import CONTROLLER, CONTROLLERS
-from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
-from hsv.parameters import Parameter
-from hsv.vehicle.vehicle import VEHICLE_PARAMETERS, named_parameters
+from hsv.bags.description import CONTROLLER, CONTROLLERS
+from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter
+from hsv.model.vehicle import VEHICLE_PARAMETERS, named_parameters
 
 
 def declare(node: Node, table: Iterable[Parameter], defaults: Mapping[str, Any] | None = None) -> dict[str, Any]:

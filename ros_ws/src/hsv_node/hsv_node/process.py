@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from rclpy.node import Node
 
-from hsv.errors import RunError
+from hsv.base.errors import RunError
 from hsv.graph.exclusive import claim_node, claim_topic
 
 

@@ -7,7 +7,7 @@ from itertools import chain
 
 from rclpy.node import Node, NodeNameNonExistentError
 
-from hsv.graph.description import NodeDescription
+from hsv.bags.description import NodeDescription
 
 
 def node_in_role(asking: Node, role: NodeDescription) -> tuple[str, str] | None:

@@ -2,7 +2,7 @@
 
 Here a message is the flat tuple of all that stands in it, in the order of its type, lengths of texts and sequences
 included, as :meth:`hsv_node.codec.Codec.unpack` gives it; no object is made for it. What stands where follows from the
-table :data:`hsv.graph.exchange.HELD`.
+table :data:`hsv.bags.exchange.HELD`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsv.graph.description import CLOCK, TOPICS
-from hsv.graph.exchange import FAULTS, HELD, Head, active_faults, function, taking
+from hsv.bags.description import CLOCK, TOPICS
+from hsv.bags.exchange import FAULTS, HELD, Head, active_faults, function, taking
 from hsv_node.codec import codec
 
 if TYPE_CHECKING:
-    from hsv.simulation.blocks import Signals
+    from hsv.flight.blocks import Signals
 
 Values = tuple[Any, ...]
 """What stands in a message, behind its encapsulation; the header comes first, in every one but the clock's."""
@@ -35,8 +35,8 @@ def head_of(values: Values) -> Head:
 def taker(topic: str) -> Callable[[Values, Signals], None]:
     """Return the function that takes the signals that a block needs from a step topic's message.
 
-    It raises a :class:`hsv.errors.SignalError` where they cannot be made of it, and leaves the signals as they are.
-    Faults that are those of the message before are not read again.
+    It raises a :class:`hsv.base.errors.SignalError` where they cannot be made of it, and leaves the signals as they
+    are. Faults that are those of the message before are not read again.
     """
     kind = codec(TOPICS[topic])
     names: dict[str, Any] = {"head": Head._make}

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
-from hsv.errors import ParameterError
-from hsv.faults.injector import FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
-from hsv.graph.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
-from hsv.graph.exchange import fault_in, stamp_of
-from hsv.links import command_link
-from hsv.simulation.blocks import Signals
-from hsv.timing import NEVER, first_step
+from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
+from hsv.bags.exchange import fault_in, stamp_of
+from hsv.base.errors import ParameterError
+from hsv.base.timing import NEVER, first_step
+from hsv.flight.blocks import Signals
+from hsv.model.faults.injector import FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
+from hsv.model.links import command_link
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle

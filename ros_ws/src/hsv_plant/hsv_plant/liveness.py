@@ -9,7 +9,7 @@ from rcl_interfaces.srv import ListParameters
 from rclpy.client import Client
 from rclpy.task import Future
 
-from hsv.graph.description import NodeDescription
+from hsv.bags.description import NodeDescription
 from hsv.graph.standstill import Standstill
 from hsv_node.lockstep import LockstepNode
 

@@ -13,8 +13,7 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
 from rclpy.parameter import Parameter as RosParameter
 
-from hsv.errors import SignalError
-from hsv.graph.description import (
+from hsv.bags.description import (
     ACTUATOR,
     EXIT_DIVERGED,
     FAULT_INJECTOR,
@@ -29,12 +28,13 @@ from hsv.graph.description import (
     controller_node,
     peers,
 )
-from hsv.graph.exchange import Head
-from hsv.graph.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
+from hsv.bags.exchange import Head
+from hsv.bags.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
+from hsv.base.errors import SignalError
+from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
-from hsv.simulation.blocks import VEHICLE, Signals
-from hsv.vehicle.dynamics import INPUT_NAMES
-from hsv.vehicle.plant import FlightStatus, Plant
+from hsv.model.dynamics import INPUT_NAMES
+from hsv.model.plant import FlightStatus, Plant
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time

@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 
+from hsv.base.errors import RunError
 from hsv.core import ffi, loop_memory
-from hsv.errors import RunError
-from hsv.simulation.closed_loop import Components, flight_struct
-from hsv.simulation.history import History
+from hsv.flight.closed_loop import Components, flight_struct
+from hsv.flight.history import History
 
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-ffp-contract=off")
 """No contraction: a fused multiply-add rounds once where the core rounds twice."""

@@ -11,15 +11,15 @@ from statistics import median
 
 from hsv.bench.c_build import FLAGS, c_flight
 from hsv.bench.figure import Figure
-from hsv.campaign.campaign import plan
-from hsv.campaign.executors import make_executor
-from hsv.campaign.run import run_campaign
-from hsv.campaign.sample_runner import sample_runner
-from hsv.campaign.store import ResultStore
 from hsv.core import lanes
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.history import History
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.campaign.campaign import plan
+from hsv.flight.campaign.executors import make_executor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.sample_runner import sample_runner
+from hsv.flight.campaign.store import ResultStore
+from hsv.flight.history import History
+from hsv.flight.scenario import load_scenario
 
 
 def over_workers(repeats: int, workers: int, samples: int = 1024) -> list[Figure]:

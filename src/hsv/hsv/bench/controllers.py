@@ -19,12 +19,12 @@ from hsv.bench.c_build import compiled
 from hsv.bench.figure import Figure, interleaved
 from hsv.control.c_block import load_block
 from hsv.control.controller import ControllerInput, ForeignController, StepKernel
+from hsv.control.export import SOURCE, controller_files
 from hsv.control.library import LibraryController
 from hsv.control.tube_law import TubeLaw
-from hsv.export.controller import SOURCE, controller_files
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import Components, fly
-from hsv.simulation.scenario import load_scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.scenario import load_scenario
 
 _FLIGHTS, _DURATION = 40, 2.0
 """Short flights with the input held: the vehicle alone is unstable, and leaves the range of the model after 3.5 s."""

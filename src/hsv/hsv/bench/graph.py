@@ -6,10 +6,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from hsv.bags.parameter_sections import ParameterSections
 from hsv.bench.figure import Figure
 from hsv.bench.ring import ring_lap
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.preparation import prepare
 
 _PERIOD = 0.02

@@ -10,12 +10,12 @@ import numpy as np
 
 from hsv.bench.c_build import FLAGS, c_flight
 from hsv.bench.figure import Figure, interleaved
-from hsv.simulation.assembly import assemble, flight_parameters
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.fingerprint import fingerprint
-from hsv.simulation.scenario import load_scenario
-from hsv.vehicle.dynamics import derivative
-from hsv.vehicle.plant import Plant
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.closed_loop import fly
+from hsv.flight.fingerprint import fingerprint
+from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import derivative
+from hsv.model.plant import Plant
 
 _STEPS = 200
 """Control periods of a comparison with a general integrator, which takes too long for whole flights."""

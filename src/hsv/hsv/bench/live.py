@@ -14,9 +14,9 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
+from hsv.bags.parameter_sections import ParameterSections
 from hsv.bench.figure import Figure
 from hsv.graph.launcher import Launcher, parameter_arguments
-from hsv.graph.parameter_sections import ParameterSections
 from hsv.graph.preparation import prepare
 
 _ADDRESS = re.compile(r"live data: (ws://\S+)")

@@ -8,8 +8,8 @@ import tempfile
 import time
 from pathlib import Path
 
+from hsv.base.errors import RunError
 from hsv.bench.figure import Figure
-from hsv.errors import RunError
 
 
 def design_and_verify() -> list[Figure]:

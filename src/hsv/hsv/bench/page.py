@@ -7,9 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from hsv.base.errors import QuantityError
 from hsv.bench.figure import Figure
 from hsv.bench.machine import hardware
-from hsv.errors import QuantityError
 from hsv.graph.preparation import commit
 
 TABLE = "<!-- table: made by hsv bench -->", "<!-- end of table -->"

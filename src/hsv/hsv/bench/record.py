@@ -9,10 +9,10 @@ from typing import Any
 
 import pydantic
 
+from hsv.base.documents import parse_json, read_text
+from hsv.base.errors import DocumentError, QuantityError
 from hsv.bench.figure import Figure
 from hsv.bench.machine import hardware, machine
-from hsv.documents import parse_json, read_text
-from hsv.errors import DocumentError, QuantityError
 from hsv.graph.preparation import commit
 
 RESOLUTION = 0.05

@@ -6,8 +6,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-from hsv.errors import RunError
-from hsv.graph.description import PLANT, NodeDescription, graph
+from hsv.bags.description import PLANT, NodeDescription, graph
+from hsv.base.errors import RunError
 from hsv.graph.launcher import executable
 
 _RING = NodeDescription("ring", "hsv_bench", "ring", (), ())

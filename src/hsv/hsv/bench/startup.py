@@ -7,8 +7,8 @@ import shutil
 import subprocess
 import sys
 
+from hsv.base.errors import RunError
 from hsv.bench.figure import Figure, interleaved
-from hsv.errors import RunError
 
 _HELP_SHARE, _HELP_REST = 0.5, 0.2
 """Of ``hsv --help``: what it may take of the time in which Python imports numpy, and beside it (s)."""

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
+from hsv.bags.description import CLOCK, COMMAND, NOMINAL, STATE, TUBE_STATUS
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
 from hsv.bench.figure import Figure, interleaved
-from hsv.graph.description import CLOCK, COMMAND, NOMINAL, STATE, TUBE_STATUS
-from hsv.recording.topic import Qos, Topic
-from hsv.recording.writer import BagWriter
 
 _SIZES = {CLOCK: 12, STATE: 104, TUBE_STATUS: 400, NOMINAL: 240, COMMAND: 40}
 """Topics and bytes a message, about those of a step."""

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
+from hsv.base.units import significant
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, errors, folded, print_json
 from hsv.cli.targets import check_target
-from hsv.units import significant
 
 if TYPE_CHECKING:
     from hsv.bench.figure import Figure
@@ -33,12 +33,12 @@ def bench(
 
     Example: hsv bench --only in_process --only mcap
     """
+    from hsv.base.errors import QuantityError, RunError
     from hsv.bench.machine import busy, machine
     from hsv.bench.page import Page
     from hsv.bench.record import as_json, changes, not_measured, read_run
     from hsv.bench.suite import groups
     from hsv.cli.progress import stages
-    from hsv.errors import QuantityError, RunError
 
     if not 0.0 < scale <= 100.0:
         raise QuantityError(f"scale = {scale}: expected above 0, at most 100")

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hsv.campaign.capacity import Capacity
-from hsv.campaign.page import write_page
-from hsv.campaign.summary import (
+from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.cli.output import console, errors, folded, json_system, new_table, print_json
+from hsv.flight.campaign.capacity import Capacity
+from hsv.flight.campaign.summary import (
     CONFIDENCE,
     ENDED,
     Distribution,
@@ -17,11 +18,10 @@ from hsv.campaign.summary import (
     shares,
     worst_flights,
 )
-from hsv.campaign.table import OUTCOMES
-from hsv.cli.output import console, errors, folded, json_system, new_table, print_json
-from hsv.simulation.metrics import in_words, is_share
-from hsv.units import UnitSystem, in_system, significant, unit_in
-from hsv.vehicle.parameters import COEFFICIENT_UNITS
+from hsv.flight.campaign.table import OUTCOMES
+from hsv.flight.metrics import in_words, is_share
+from hsv.model.vehicle_parameters import COEFFICIENT_UNITS
+from hsv.pages.campaign.page import write_page
 
 _LISTED = 5
 """Worst flights that are listed; the page has more."""

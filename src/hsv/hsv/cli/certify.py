@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import console, folded, print_json, quantity_table, report_error
-from hsv.units import UnitSystem
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -76,8 +76,8 @@ def certify(
     from hsv.design.verification.declared import declared, declared_actuators, described
     from hsv.design.verification.verdict import certified_with
     from hsv.design.verification.verifier import load_subject
-    from hsv.simulation.coverage import uncovered_of
-    from hsv.simulation.scenario import load_scenario
+    from hsv.flight.coverage import uncovered_of
+    from hsv.flight.scenario import load_scenario
 
     subject = load_subject(find_design(file))
     models, unbounded = described(

@@ -26,7 +26,7 @@ def check(
     Example: hsv check tube_mpc
     """
     from hsv.cli.progress import stages
-    from hsv.simulation.repeatability import findings, scenario_of
+    from hsv.flight.repeatability import findings, scenario_of
 
     scenario = scenario_of(flown)
     found = []

@@ -35,9 +35,9 @@ def cluster(
 
     Example: hsv cluster worker-1 me@worker-2*8
     """
-    from hsv.campaign.cluster import address_for, read_host, read_hosts, remote_python
-    from hsv.campaign.cluster import cluster as running
-    from hsv.errors import CampaignError
+    from hsv.base.errors import CampaignError
+    from hsv.flight.campaign.cluster import address_for, read_host, read_hosts, remote_python
+    from hsv.flight.campaign.cluster import cluster as running
 
     found = [*map(read_host, hosts or ()), *(read_hosts(hosts_file) if hosts_file else ())]
     if not found:

@@ -27,9 +27,9 @@ def command(
 
     Example: hsv command "86000 ft" "8100 ft/s" --blend "4 s"
     """
-    from hsv.graph.description import SET_COMMAND_CLIENT
+    from hsv.bags.description import SET_COMMAND_CLIENT
+    from hsv.base.units import parse_quantity
     from hsv.graph.launcher import become
-    from hsv.units import parse_quantity
 
     point = parse_quantity(altitude, "m", "altitude"), parse_quantity(velocity, "m/s", "velocity")
     options = [

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.options import BagArgument, JsonOption, ReportOption, UnitsOption
-from hsv.units import UnitSystem
 
 
 def conclude(
@@ -44,14 +44,14 @@ def conclude_flight(bag: Path, *, report: bool, units: UnitSystem, json: bool, w
         RecordingError: The bag holds no flight with its scenario, or the report cannot be written.
         RunError: The flight diverged or was broken off; the summary is printed before.
     """
+    from hsv.bags.flight import flight_data
+    from hsv.bags.info import describe
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import RecordingError
     from hsv.cli.summary import report_flight
-    from hsv.errors import RecordingError
-    from hsv.recording.flight import flight_data
-    from hsv.recording.info import describe
-    from hsv.recording.reader import Bag
-    from hsv.recording.report.page import write_report
-    from hsv.simulation.metrics import flight_metrics
-    from hsv.simulation.scenario import parse_scenario
+    from hsv.flight.metrics import flight_metrics
+    from hsv.flight.scenario import parse_scenario
+    from hsv.pages.report.page import write_report
 
     recorded = Bag(bag)
     if "scenario.toml" not in recorded.attachments:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hsv.base.units import UnitSystem, in_words, significant
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import console, folded, new_table, print_json, quantity_table, report_error
 from hsv.cli.targets import check_target, writing
-from hsv.units import UnitSystem, in_words, significant
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -48,10 +48,10 @@ def design(
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
+    from hsv.base.errors import ParameterError
+    from hsv.control.certificate import certificate_path, write_certificate
     from hsv.control.design_file import write_design
-    from hsv.design.certificate import certificate_path, write_certificate
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
-    from hsv.errors import ParameterError
 
     source = find_inputs(name)
     inputs = read_inputs(source)
@@ -119,7 +119,7 @@ def _check(source: Path, inputs: DesignInputs, json: bool) -> None:
 
 
 def _factors(text: str) -> list[float]:
-    from hsv.errors import DesignError
+    from hsv.base.errors import DesignError
 
     try:
         return [float(part) for part in text.split(",")]
@@ -144,7 +144,7 @@ def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
     import numpy as np
 
     from hsv.control.tube_factor import compact
-    from hsv.vehicle.dynamics import STATE_UNITS
+    from hsv.model.dynamics import STATE_UNITS
 
     feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
     accuracy, model = report["model"]["accuracy"], report["model"]

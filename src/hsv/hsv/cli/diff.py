@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hsv.base.units import significant
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import BagArgument, JsonOption
 from hsv.cli.output import console, folded, new_table, print_json
-from hsv.units import significant
 
 if TYPE_CHECKING:
-    from hsv.recording.compare import Comparison, Difference
+    from hsv.bags.compare import Comparison, Difference
 
 
 def diff(
@@ -28,10 +28,10 @@ def diff(
 
     Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
     """
-    from hsv.errors import ParameterError, RecordingError
-    from hsv.graph.description import TOPICS
-    from hsv.recording.compare import compare
-    from hsv.recording.reader import Bag
+    from hsv.bags.compare import compare
+    from hsv.bags.description import TOPICS
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import ParameterError, RecordingError
 
     if not 0.0 <= tolerance < math.inf:
         raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-from hsv.interruption import take_interrupts
+from hsv.base.interruption import take_interrupts
 
 
 def main() -> None:

@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from hsv.base.units import UnitSystem, in_system
 from hsv.cli.options import ListJsonOption, UnitsOption
 from hsv.cli.output import console, folded, json_system, print_json, print_rows
-from hsv.units import UnitSystem, in_system
 
 
 def equipment(
@@ -21,7 +21,7 @@ def equipment(
 
     Example: hsv equipment elevator_50 --units paper
     """
-    from hsv.errors import ParameterError, did_you_mean
+    from hsv.base.errors import ParameterError, did_you_mean
 
     sets = _sets(json_system(units) if json else units)
     if name and name not in sets:
@@ -39,10 +39,10 @@ def equipment(
 
 def _sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
     """Return the sets by name: the table of a scenario that may name them, their source and numbers."""
-    from hsv.parameters import Parameter
-    from hsv.sensors import SENSOR_SETS
-    from hsv.vehicle.actuators import ACTUATOR_SETS
-    from hsv.vehicle.plant import EQUIPMENT_PARAMETERS
+    from hsv.base.parameters import Parameter
+    from hsv.model.actuators import ACTUATOR_SETS
+    from hsv.model.plant import EQUIPMENT_PARAMETERS
+    from hsv.model.sensors import SENSOR_SETS
 
     declared: dict[str, Parameter] = {parameter.name: parameter for parameter in EQUIPMENT_PARAMETERS}
 

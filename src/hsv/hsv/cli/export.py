@@ -39,10 +39,10 @@ def export(
 
     Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
     """
-    from hsv.errors import ParameterError
-    from hsv.graph.description import TOPICS
-    from hsv.recording import export as tables
-    from hsv.recording.reader import Bag
+    from hsv.bags import export as tables
+    from hsv.bags.description import TOPICS
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import ParameterError
 
     chosen = [form for form, wanted in zip(tables.Format, (csv, parquet, npz), strict=True) if wanted]
     if len(chosen) + scene != 1:
@@ -51,8 +51,8 @@ def export(
     if scene:
         if topic:
             raise ParameterError("topic: expected with a table, --scene holds every topic")
-        from hsv.airframe.geometry import airframe
-        from hsv.recording.scene import scene_path, write_scene
+        from hsv.bags.scene import scene_path, write_scene
+        from hsv.model.airframe.geometry import airframe
 
         most = airframe().largest_exaggeration
         if exaggeration is not None and not 0.0 <= exaggeration <= most:

@@ -21,9 +21,9 @@ def export_controller(
 
     Example: hsv export-controller baseline --out controller
     """
+    from hsv.base.errors import ParameterError
     from hsv.control.design_file import find_design, read_design
-    from hsv.errors import ParameterError
-    from hsv.export.controller import controller_files, step_bounds
+    from hsv.control.export import controller_files, step_bounds
 
     loaded = read_design(find_design(design))
     texts = controller_files(loaded)

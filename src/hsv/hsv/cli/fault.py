@@ -35,8 +35,8 @@ def inject(
 
     Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
     """
-    from hsv.faults.table import read_fault
-    from hsv.units import parse_quantity
+    from hsv.base.units import parse_quantity
+    from hsv.model.faults.table import read_fault
 
     found = read_fault(channel, type, parameters or [])
     options = ["--duration", repr(parse_quantity(duration, "s", "duration"))]
@@ -68,7 +68,7 @@ def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> Non
 
 
 def _ask(*words: str, options: Sequence[str] = (), namespace: str, json: bool) -> None:
-    from hsv.graph.description import FAULT
+    from hsv.bags.description import FAULT
     from hsv.graph.launcher import become
 
     # Behind the dashes stand words, also those that begin with one, as a value below zero.

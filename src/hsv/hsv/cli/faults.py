@@ -6,9 +6,9 @@ from typing import Annotated, Any
 
 import typer
 
+from hsv.base.units import UnitSystem, in_system
 from hsv.cli.options import ListJsonOption, UnitsOption
 from hsv.cli.output import console, folded, json_system, print_json, print_rows
-from hsv.units import UnitSystem, in_system
 
 
 def faults(
@@ -20,8 +20,8 @@ def faults(
 
     Example: hsv faults oscillation --units paper
     """
-    from hsv.errors import ParameterError, did_you_mean
-    from hsv.faults.table import FAULT_KINDS
+    from hsv.base.errors import ParameterError, did_you_mean
+    from hsv.model.faults.table import FAULT_KINDS
 
     if type and type not in FAULT_KINDS:
         raise ParameterError(
@@ -57,7 +57,7 @@ def faults(
 
 
 def _listed(channels: list[str]) -> str:
-    from hsv.vehicle.dynamics import STATE_NAMES
+    from hsv.model.dynamics import STATE_NAMES
 
     return "every state" if channels == list(STATE_NAMES) else ", ".join(channels)
 
@@ -69,7 +69,7 @@ def _row(parameter: str, channel: str, **others: Any) -> dict[str, Any]:
 
 def _parameters(type: str, units: UnitSystem) -> list[dict[str, Any]]:
     """Return a row a parameter, and one a channel where its unit is the channel's."""
-    from hsv.faults.table import FAULT_KINDS, fault_parameters
+    from hsv.model.faults.table import FAULT_KINDS, fault_parameters
 
     rows = []
     channels = FAULT_KINDS[type].channels

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem, in_words
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
 from hsv.cli.output import console, new_table, print_json
 from hsv.cli.targets import check_target, writing
-from hsv.units import UnitSystem, in_words
 
 
 def govern(
@@ -30,10 +30,10 @@ def govern(
 
     Example: hsv govern case1 --blend "2 s" --out governed.toml
     """
-    from hsv.errors import ParameterError
-    from hsv.simulation.governed import governed
-    from hsv.units import parse_quantity
-    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS
+    from hsv.base.errors import ParameterError
+    from hsv.base.units import parse_quantity
+    from hsv.flight.governed import governed
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
 
     if out:
         check_target(out, "out")

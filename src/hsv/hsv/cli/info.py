@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from hsv.base.units import UnitSystem, in_words, significant
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import console, new_table, print_json, to_json
-from hsv.units import UnitSystem, in_words, significant
 
 if TYPE_CHECKING:
-    from hsv.errors import RecordingError
-    from hsv.recording.reader import Bag
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import RecordingError
 
 SHOWN_EXCURSIONS = 5
 """Departures from the tube that are listed one by one."""
@@ -33,7 +33,7 @@ def info(
 
     Example: hsv info bags/case1_20260101T000000Z
     """
-    from hsv.recording.reader import Bag
+    from hsv.bags.reader import Bag
 
     described = []
     for number, opened in enumerate([Bag(bag) for bag in bags]):
@@ -51,12 +51,12 @@ def info(
 
 def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
     """Return what a bag holds, and why its metrics are missing if they are; print it unless as ``json``."""
+    from hsv.bags.bag_warnings import completeness
+    from hsv.bags.flight import flight_data
+    from hsv.bags.info import describe
+    from hsv.base.errors import RecordingError
     from hsv.cli.summary import print_metrics
-    from hsv.errors import RecordingError
-    from hsv.recording.bag_warnings import completeness
-    from hsv.recording.flight import flight_data
-    from hsv.recording.info import describe
-    from hsv.simulation.metrics import METRICS, flight_metrics
+    from hsv.flight.metrics import METRICS, flight_metrics
 
     description = describe(opened)
     problem, remark = None, ""
@@ -78,7 +78,7 @@ def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, An
 
 def _print(description: dict[str, Any], units: UnitSystem) -> None:
     from hsv.cli.summary import print_section
-    from hsv.simulation.fingerprint import published_in_words
+    from hsv.flight.fingerprint import published_in_words
 
     heading = {
         "path": Path(description["path"]),
@@ -112,7 +112,7 @@ def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str,
 
 
 def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
-    from hsv.recording.info import parameters_in_words
+    from hsv.bags.info import parameters_in_words
 
     parameters = parameters_in_words(fault, lambda value, unit: in_words(value, unit, units))
     return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
@@ -120,8 +120,8 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
     """Return lines on what is not ideal, none where all is."""
-    from hsv.recording.report.panels import AIR_PANELS
-    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+    from hsv.pages.report.panels import AIR_PANELS
 
     if equipment is None:
         return {}

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem, in_system, significant
 from hsv.cli.options import (
     AltitudeOption,
     CouplingOption,
@@ -15,12 +16,11 @@ from hsv.cli.options import (
     VelocityOption,
 )
 from hsv.cli.output import console, json_system, new_table, print_json, print_matrix
-from hsv.units import UnitSystem, in_system, significant
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from hsv.vehicle.modes import Mode
+    from hsv.model.modes import Mode
 
 READINGS = ("physical", "printed")
 
@@ -55,14 +55,14 @@ def linearise(
     """
     import numpy as np
 
+    from hsv.base.errors import QuantityError
     from hsv.cli.flight_point import trim_at
     from hsv.control.notch_filter import continuous, default_sections, series
-    from hsv.errors import QuantityError
-    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
-    from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
-    from hsv.vehicle.modes import modes
-    from hsv.vehicle.parameters import MODELS
-    from hsv.vehicle.vehicle import DEFAULT_VEHICLE, load_vehicle
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
+    from hsv.model.extended import Filter, extended_jacobian, extended_state
+    from hsv.model.modes import modes
+    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
+    from hsv.model.vehicle_parameters import MODELS
 
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")

@@ -14,9 +14,9 @@ import typer
 from typer.completion import completion_init
 
 import hsv
+from hsv.base.errors import HsvError, QuantityError, RunError, reason
 from hsv.cli.extras import missing_extra
 from hsv.cli.output import Interrupted, console, report_error
-from hsv.errors import HsvError, RunError, reason
 
 _HELP = ("-h", "--help")
 
@@ -61,9 +61,6 @@ COMMANDS = (
     "export",
     "export-controller",
     "bench",
-    "figures",
-    "claims",
-    "study",
     "resilience",
     "cluster",
     "set",
@@ -75,16 +72,25 @@ COMMANDS = (
 )
 """Names of the commands; each is in a module of this name, with underscores, a function or a group of commands."""
 
+DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."
 
-def application(names: Sequence[str] = COMMANDS, *, listed: bool = False) -> typer.Typer:
-    """Return the command line with commands of these names, whose modules are imported.
+MOVED = {"figures": "hsv-paper figures", "claims": "hsv-paper claims", "study": "hsv-paper sensitivity"}
+"""New names of commands that were renamed."""
+
+
+def application(
+    names: Sequence[str] = COMMANDS, *, prog: str = "hsv", package: str = "hsv.cli", listed: bool = False
+) -> typer.Typer:
+    """Return a command line with commands of these names, whose modules are imported.
 
     Args:
         names: Names of the commands.
+        prog: Name of the command line.
+        package: Package of the commands' modules.
         listed: Whether only names and descriptions are needed, as for ``hsv --help``: options take most of the time.
     """
     app = typer.Typer(
-        name="hsv",
+        name=prog,
         add_completion=False,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
@@ -95,7 +101,7 @@ def application(names: Sequence[str] = COMMANDS, *, listed: bool = False) -> typ
     groups = [app]
     for name in names:
         attribute = name.replace("-", "_")
-        command = getattr(import_module(f"hsv.cli.{attribute}"), attribute)
+        command = getattr(import_module(f"{package}.{attribute}"), attribute)
         if isinstance(command, typer.Typer):
             app.add_typer(command, name=name)
             groups.append(command)
@@ -131,17 +137,33 @@ def options(
 
 
 def main() -> None:
-    """Run the command line; bad input ends with one line and exit code 2, a failed run with exit code 1."""
-    completing = "_HSV_COMPLETE" in os.environ
+    """Run the command ``hsv``."""
+    run("hsv", "hsv.cli", COMMANDS, DESCRIPTION)
+
+
+def run(prog: str, package: str, commands: Sequence[str], description: str) -> None:
+    """Run a command line; bad input ends with one line and exit code 2, a failed run with exit code 1.
+
+    Args:
+        prog: Its name.
+        package: Package of the modules of its commands.
+        commands: Names of its commands.
+        description: One sentence, the first of its help.
+    """
+    completing = f"_{prog.upper()}_COMPLETE" in os.environ
     if completing:
         completion_init()  # a shell asks for the words that may come next
     try:
         # Out of typer's standalone mode, so that a usage error is one line as well.
         words = sys.argv[1:] or ["--help"]
+        if prog == "hsv" and (moved := MOVED.get(words[0])):
+            raise QuantityError(f"hsv {words[0]} is called {moved} now")
         # One command is wanted: the modules of all, and what typer makes of them, take as long as numpy.
         listed = words[0] in _HELP and not completing
-        app = application(words[:1] if words[0] in COMMANDS else COMMANDS, listed=listed)
-        code = app(words, prog_name="hsv", standalone_mode=False)
+        names = words[:1] if words[0] in commands else commands
+        app = application(names, prog=prog, package=package, listed=listed)
+        app.info.help = description
+        code = app(words, prog_name=prog, standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
         if sys.stdout:

@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from hsv.base.units import UnitSystem, significant
 from hsv.cli.options import JsonOption, ScenarioArgument, SchedulerOption, TrustOption, UnitsOption, WorkersOption
 from hsv.cli.output import console, errors, print_json, resumable, to_json
 from hsv.cli.targets import check_target
-from hsv.units import UnitSystem, significant
 
 
 class _FlyByDefault(TyperGroup):
@@ -82,15 +82,15 @@ def fly(
     """
     import time
 
-    from hsv.campaign.campaign import plan
-    from hsv.campaign.capacity import Capacity
-    from hsv.campaign.executors import make_executor
-    from hsv.campaign.run import run_campaign
-    from hsv.campaign.store import ResultStore
-    from hsv.campaign.summary import Results
+    from hsv.base.errors import CampaignError, RunError
     from hsv.cli.campaign_summary import announce, show
     from hsv.cli.progress import flights as flights_bar
-    from hsv.errors import CampaignError, RunError
+    from hsv.flight.campaign.campaign import plan
+    from hsv.flight.campaign.capacity import Capacity
+    from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.campaign.run import run_campaign
+    from hsv.flight.campaign.store import ResultStore
+    from hsv.flight.campaign.summary import Results
     from hsv.graph.preparation import commit
 
     given = {"sampling": sampling, "samples": samples}
@@ -148,8 +148,8 @@ def summary(
 
     Example: hsv montecarlo summary campaigns/case1_corners.parquet --units paper
     """
-    from hsv.campaign.summary import Results
     from hsv.cli.campaign_summary import show
+    from hsv.flight.campaign.summary import Results
 
     show(Results(result, trust=trust), units, json, page)
 
@@ -168,13 +168,13 @@ def replay(
 
     Example: hsv montecarlo replay campaigns/case1_corners.parquet --flight 17 --over-dds
     """
-    from hsv.campaign.replay import replay_in_process, replay_over_dds
-    from hsv.campaign.summary import Results
-    from hsv.campaign.table import OUTCOMES
+    from hsv.base.errors import CampaignError, RunError
     from hsv.cli.campaign_summary import sample_words
     from hsv.cli.output import print_table
     from hsv.cli.progress import stages
-    from hsv.errors import CampaignError, RunError
+    from hsv.flight.campaign.summary import Results
+    from hsv.flight.campaign.table import OUTCOMES
+    from hsv.graph.campaign_replay import replay_in_process, replay_over_dds
 
     if bag and not over_dds:
         raise CampaignError(f"bag = {str(bag)!r}: expected with --over-dds only")
@@ -238,12 +238,12 @@ def scenario(
 
     Example: hsv montecarlo scenario campaigns/case1_corners.parquet --flight 17 > worst.toml
     """
-    from hsv.campaign.replay import require_design
-    from hsv.campaign.summary import Results
+    from hsv.bags.parameter_sections import ParameterSections
+    from hsv.base.errors import CampaignError
     from hsv.cli.targets import writing
     from hsv.control.library import seen_from
-    from hsv.errors import CampaignError
-    from hsv.graph.parameter_sections import ParameterSections
+    from hsv.flight.campaign.summary import Results
+    from hsv.graph.campaign_replay import require_design
 
     results = Results(result, trust=trust)
     if design is None:
@@ -261,7 +261,7 @@ def scenario(
 
 def _factor(text: str) -> tuple[str, tuple[str, str]]:
     """Return field, least and largest value of a factor as it is given."""
-    from hsv.errors import CampaignError
+    from hsv.base.errors import CampaignError
 
     field, _, ends = text.partition("=")
     low, dots, high = ends.partition("..")

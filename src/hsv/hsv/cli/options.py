@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from hsv.errors import ParameterError
-from hsv.units import UnitSystem
+from hsv.base.errors import ParameterError
+from hsv.base.units import UnitSystem
 
 GraphNamespaceOption = Annotated[
     str, typer.Option("--namespace", help="ROS namespace of the graph, such as /veh1; default: none.")

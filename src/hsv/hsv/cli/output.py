@@ -14,8 +14,8 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
-from hsv.json_text import json_text
-from hsv.units import UnitSystem, in_system, significant, unit_in
+from hsv.base.json_text import json_text
+from hsv.base.units import UnitSystem, in_system, significant, unit_in
 
 _UNPRINTABLE = {code: repr(chr(code))[1:-1] for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 """Control characters, with which a title could tell a terminal to do things, and how they are shown."""

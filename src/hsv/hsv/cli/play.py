@@ -25,9 +25,9 @@ def play(
 
     Example: hsv play bags/case1_20260101T000000Z --rate 10 --topic /hsv/state
     """
-    from hsv.graph.description import PLAYER
+    from hsv.bags.description import PLAYER
+    from hsv.bags.reader import Bag
     from hsv.graph.launcher import become
-    from hsv.recording.reader import Bag
 
     print_bag_warnings(Bag(bag))
     words = [str(bag), "--rate", str(rate), "--delay", str(delay)]

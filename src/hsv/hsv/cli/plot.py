@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, UnitsOption
 from hsv.cli.output import print_written
 from hsv.cli.targets import check_target, writing
-from hsv.units import UnitSystem
 
 
 def plot(
@@ -24,11 +24,11 @@ def plot(
 
     Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
     """
-    from hsv.errors import QuantityError
-    from hsv.recording.bag_warnings import bag_warnings
-    from hsv.recording.flight import flight_data, labels
-    from hsv.recording.plots import flight_figure, save_figure
-    from hsv.recording.reader import Bag
+    from hsv.bags.bag_warnings import bag_warnings
+    from hsv.bags.flight import flight_data, labels
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import QuantityError
+    from hsv.pages.plots import flight_figure, save_figure
 
     if out.suffix not in (".png", ".svg", ".pdf"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .png, .svg or .pdf")

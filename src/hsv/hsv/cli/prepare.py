@@ -48,8 +48,8 @@ def prepare(
     import shutil
     import tempfile
 
+    from hsv.bags.description import LANDED, LIVE, ROOT, checked_namespace, graph
     from hsv.cli.targets import check_folder
-    from hsv.graph.description import LANDED, LIVE, ROOT, checked_namespace, graph
     from hsv.graph.launcher import claim_graph
     from hsv.graph.preparation import prepare as prepare_run
 

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from hsv.base.units import UnitSystem
 from hsv.cli.output import errors
 from hsv.graph.snapshot import Snapshot
-from hsv.units import UnitSystem
 
 
 def _bar() -> Progress:

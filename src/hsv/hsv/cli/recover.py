@@ -25,11 +25,11 @@ def recover(
 
     Example: hsv recover bags/case1_20260101T000000Z
     """
-    from hsv.errors import RecordingError
-    from hsv.recording.bag_warnings import loss_in_words
-    from hsv.recording.reader import Bag
-    from hsv.recording.recover import recover as mend
-    from hsv.recording.steps import irregularities, lost_seconds
+    from hsv.bags.bag_warnings import loss_in_words
+    from hsv.bags.reader import Bag
+    from hsv.bags.recover import recover as mend
+    from hsv.bags.steps import irregularities, lost_seconds
+    from hsv.base.errors import RecordingError
 
     recovery = mend(bag, out)
     kept = Bag(recovery.path)

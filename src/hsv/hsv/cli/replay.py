@@ -13,7 +13,7 @@ from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, Suppl
 from hsv.cli.output import console, print_json
 
 if TYPE_CHECKING:
-    from hsv.replay.engine import ProcessComparison
+    from hsv.bags.replay.engine import ProcessComparison
 
 
 def replay(
@@ -37,15 +37,15 @@ def replay(
 
     Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
     """
+    from hsv.bags.description import CONTROLLER, controller_node
+    from hsv.bags.former import require_interface_version
+    from hsv.bags.reader import Bag
+    from hsv.bags.replay import engine
+    from hsv.bags.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
+    from hsv.bags.replay.processes import processes_of
+    from hsv.base.errors import ParameterError, RunError
     from hsv.cli.progress import stages
-    from hsv.errors import ParameterError, RunError
-    from hsv.graph.description import CONTROLLER, controller_node
-    from hsv.recording.former import require_interface_version
-    from hsv.recording.reader import Bag
-    from hsv.replay import engine
-    from hsv.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
-    from hsv.replay.processes import processes_of
-    from hsv.simulation.trust import require_trust
+    from hsv.flight.trust import require_trust
 
     opened = Bag(bag)
     require_interface_version(opened)
@@ -71,7 +71,7 @@ def replay(
     report = []
     with stages() as progress:
         if over_dds:
-            from hsv.replay import over_dds as real
+            from hsv.graph import replay_over_dds as real
 
             compared = (
                 real.rerun(opened, controller, values, progress)

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.bag_warnings import print_bag_warnings
 from hsv.cli.options import JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
 from hsv.cli.output import print_written
 from hsv.cli.targets import check_target
-from hsv.units import UnitSystem
 
 
 def report(
@@ -28,16 +28,16 @@ def report(
 
     Example: hsv report bags/case1_20260101T000000Z bags/case1_no_notch_20260101T000000Z --out comparison.html
     """
-    from hsv.errors import QuantityError
-    from hsv.recording.reader import Bag
-    from hsv.recording.report.page import write_report
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import QuantityError
+    from hsv.pages.report.page import write_report
 
     if out.suffix not in (".html", ".htm"):
         raise QuantityError(f"out = {str(out)!r}: expected a file that ends in .html")
     check_target(out, "out")
     opened = [Bag(bag) for bag in bags]
     if design or scenario:
-        from hsv.replay.attached import supply
+        from hsv.bags.replay.attached import supply
 
         for bag in opened:
             supply(bag, design, scenario)

@@ -13,7 +13,7 @@ from hsv.cli.output import console, errors, print_json, print_matrix, resumable
 from hsv.cli.targets import check_folder
 
 if TYPE_CHECKING:
-    from hsv.resilience.summary import ResilienceResults
+    from hsv.flight.resilience.summary import ResilienceResults
 
 
 def resilience(
@@ -39,16 +39,16 @@ def resilience(
 
     Example: hsv resilience --controllers case1,case1_rmpc --faults elevator_loss,elevator_delay
     """
-    from hsv.campaign.executors import make_executor
+    from hsv.base.errors import RunError
     from hsv.cli.campaign_summary import announce
     from hsv.cli.output import print_titles
     from hsv.cli.progress import flights as flights_bar
-    from hsv.errors import RunError
-    from hsv.resilience.campaign import CONTROLLERS, plan
-    from hsv.resilience.faults import TRIED
-    from hsv.resilience.page import write_results
-    from hsv.resilience.run import CaseStore, run_resilience
-    from hsv.resilience.summary import ResilienceResults, parameter_words
+    from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.resilience.campaign import CONTROLLERS, plan
+    from hsv.flight.resilience.faults import TRIED
+    from hsv.flight.resilience.run import CaseStore, run_resilience
+    from hsv.flight.resilience.summary import ResilienceResults, parameter_words
+    from hsv.pages.resilience.page import write_results
 
     if listed:
         print_titles({name: parameter_words(name) for name in TRIED}, json)
@@ -95,8 +95,8 @@ def _show(results: ResilienceResults) -> None:
 
 
 def _cells(results: ResilienceResults) -> list[dict[str, Any]]:
-    from hsv.resilience.faults import TRIED
-    from hsv.resilience.page import flight_file
+    from hsv.flight.resilience.faults import TRIED
+    from hsv.pages.resilience.page import flight_file
 
     found = []
     for (fault, controller), square in results.squares.items():

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.options import (
     ComposedOption,
     ExternalOption,
@@ -22,7 +23,6 @@ from hsv.cli.options import (
     live_port_of,
 )
 from hsv.cli.output import Interrupted, report_line
-from hsv.units import UnitSystem
 
 
 def run(
@@ -48,9 +48,9 @@ def run(
     """
     import time
 
+    from hsv.bags.description import LIVE, checked_namespace
     from hsv.cli.conclude import conclude_flight
     from hsv.cli.progress import flight as flight_bar
-    from hsv.graph.description import LIVE, checked_namespace
     from hsv.graph.flight import fly_graph
     from hsv.graph.launcher import WARNING
     from hsv.graph.preparation import prepare

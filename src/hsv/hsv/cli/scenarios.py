@@ -21,7 +21,7 @@ def scenarios(
 
     Example: hsv scenarios --show case2_derived
     """
-    from hsv.simulation.scenario import (
+    from hsv.flight.scenario import (
         load_scenario,
         scenario_at_means,
         scenario_names,

@@ -19,7 +19,7 @@ def set(
 
     Example: hsv set tau 0.8
     """
-    from hsv.graph.description import SET_PARAMETER
+    from hsv.bags.description import SET_PARAMETER
     from hsv.graph.launcher import become
 
     become(SET_PARAMETER, ["--prog", "hsv set", *(["--json"] if json else []), "--", name, value], namespace)

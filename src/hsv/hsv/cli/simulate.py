@@ -7,9 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.options import JsonOption, ScenarioArgument, UnitsOption
 from hsv.cli.targets import check_target, writing
-from hsv.units import UnitSystem
 
 
 def simulate(
@@ -29,12 +29,12 @@ def simulate(
     from hsv.cli.summary import report_flight
     from hsv.control.design_file import find_design, read_design
     from hsv.control.design_parameters import digest
-    from hsv.simulation.assembly import assemble_flight, blamed_on
-    from hsv.simulation.closed_loop import fly
-    from hsv.simulation.coverage import uncovered_of
-    from hsv.simulation.metrics import flight_metrics
-    from hsv.simulation.scenario import load_scenario
-    from hsv.vehicle.plant import FlightStatus
+    from hsv.flight.assembly import assemble_flight, blamed_on
+    from hsv.flight.closed_loop import fly
+    from hsv.flight.coverage import uncovered_of
+    from hsv.flight.metrics import flight_metrics
+    from hsv.flight.scenario import load_scenario
+    from hsv.model.plant import FlightStatus
 
     if out:
         check_target(out, "out")

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from rich.text import Text
 
+from hsv.base.errors import RunError
+from hsv.base.units import UnitSystem, in_system, significant
 from hsv.cli.output import console, folded, new_table, print_json, to_json
-from hsv.errors import RunError
-from hsv.simulation.fingerprint import as_published, published_in_words
-from hsv.simulation.limits import Verdict, in_units, not_judged, verdict_sentence, verdicts
-from hsv.simulation.metrics import METRICS, Group
-from hsv.simulation.scenario import Scenario
-from hsv.units import UnitSystem, in_system, significant
+from hsv.flight.fingerprint import as_published, published_in_words
+from hsv.flight.limits import Verdict, in_units, not_judged, verdict_sentence, verdicts
+from hsv.flight.metrics import METRICS, Group
+from hsv.flight.scenario import Scenario
 
 
 def report_flight(

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import mkdtemp
 
-from hsv.errors import ParameterError, reason
+from hsv.base.errors import ParameterError, reason
 
 
 def check_target(path: Path, field: str) -> None:

@@ -22,8 +22,8 @@ def topic(
 
     Example: hsv topic /hsv/state --every 50
     """
-    from hsv.errors import ParameterError
-    from hsv.graph.description import TOPIC
+    from hsv.bags.description import TOPIC
+    from hsv.base.errors import ParameterError
     from hsv.graph.launcher import become
 
     if not name and (once or every > 1):

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from hsv.base.units import UnitSystem
 from hsv.cli.flight_point import AT_REST
 from hsv.cli.options import (
     AltitudeOption,
@@ -16,7 +17,6 @@ from hsv.cli.options import (
     VelocityOption,
 )
 from hsv.cli.output import print_json, print_table, to_json
-from hsv.units import UnitSystem
 
 
 def trim(
@@ -34,8 +34,8 @@ def trim(
     Example: hsv trim --altitude "85000 ft" --velocity "7702.0808 ft/s" --units paper
     """
     from hsv.cli.flight_point import trim_at
-    from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
-    from hsv.vehicle.vehicle import DEFAULT_VEHICLE, load_vehicle
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
+    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
     parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
     result = trim_at(parameters, altitude, velocity, climb_rate, acceleration)

@@ -20,7 +20,7 @@ def vehicles(
 
     Example: hsv vehicles --show stiffened
     """
-    from hsv.vehicle.vehicle import load_vehicle, vehicle_names, vehicle_tables, vehicle_text
+    from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_tables, vehicle_text
 
     if show:
         text = vehicle_text(show)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
+from hsv.base.units import significant
 from hsv.cli.options import JsonOption
 from hsv.cli.output import console, new_table, print_json, report_error
-from hsv.units import significant
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -39,13 +39,13 @@ def verify(
 
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
+    from hsv.base.errors import QuantityError
     from hsv.cli.progress import stages
     from hsv.control.design_file import find_design
     from hsv.design.verification.scenario import bounding_corners, scenario_checks
     from hsv.design.verification.verifier import load_subject
     from hsv.design.verification.verifier import verify as recompute
-    from hsv.errors import QuantityError
-    from hsv.simulation.scenario import load_scenario
+    from hsv.flight.scenario import load_scenario
 
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")

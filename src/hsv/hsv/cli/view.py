@@ -36,10 +36,10 @@ def view(
     """
     import subprocess
 
-    from hsv.errors import RecordingError
-    from hsv.recording.reader import Bag
-    from hsv.recording.scene import scene_of
-    from hsv.recording.viewers import VIEWERS, layout_for
+    from hsv.bags.reader import Bag
+    from hsv.bags.scene import scene_of
+    from hsv.base.errors import RecordingError
+    from hsv.pages.viewers import VIEWERS, layout_for
 
     opened = Bag(bag)
     if len(opened.files) != 1 or opened.path.suffix != ".mcap":

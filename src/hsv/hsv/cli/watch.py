@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from hsv.base.units import UnitSystem
 from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
-from hsv.units import UnitSystem
 
 
 def watch(
@@ -17,7 +17,7 @@ def watch(
 
     Example: hsv watch --units paper
     """
-    from hsv.graph.description import WATCH
+    from hsv.bags.description import WATCH
     from hsv.graph.launcher import become
 
     flags = ["--json"] if json else []

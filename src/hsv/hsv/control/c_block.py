@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from hsv.errors import HsvError, ParameterError
-from hsv.parameters import Parameter
-from hsv.signals import SignalType
-from hsv.units import parse_quantity
+from hsv.base.errors import HsvError, ParameterError
+from hsv.base.parameters import Parameter
+from hsv.base.units import parse_quantity
+from hsv.model.signals import SignalType
 
 ABI_VERSION = 1
 """``HSV_BLOCK_ABI_VERSION`` of the header."""

@@ -29,11 +29,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from hsv import signals
-from hsv.errors import ControllerError, ParameterError, RunError
-from hsv.parameters import Parameter
-from hsv.vehicle.dynamics import INPUT_NAMES, N_INPUTS
-from hsv.vehicle.parameters import VehicleParameters
+from hsv.base.errors import ControllerError, ParameterError, RunError
+from hsv.base.parameters import Parameter
+from hsv.model import signals
+from hsv.model.dynamics import INPUT_NAMES, N_INPUTS
+from hsv.model.vehicle_parameters import VehicleParameters
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign

@@ -16,11 +16,11 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from hsv.base.errors import HsvError, ParameterError, did_you_mean
+from hsv.base.parameters import Parameter, check_all
 from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
 from hsv.control.library import LibraryClass, library_place
-from hsv.errors import HsvError, ParameterError, did_you_mean
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign
@@ -84,7 +84,7 @@ def controller_class(name: str) -> ControllerClass:
     if lacking:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a class of a controller")
     if not all(isinstance(parameter, Parameter) for parameter in found.PARAMETERS):
-        raise ParameterError(f"controller = {name!r}: PARAMETERS: expected hsv.parameters.Parameter, each")
+        raise ParameterError(f"controller = {name!r}: PARAMETERS: expected hsv.base.parameters.Parameter, each")
     return found
 
 

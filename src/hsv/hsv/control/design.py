@@ -8,21 +8,21 @@ from typing import Any, Self
 
 import numpy as np
 
+from hsv.base.errors import DesignError, ParameterError
+from hsv.base.parameters import check_all
 from hsv.control.design_parameters import DESIGN_PARAMETERS, brings_design, digest, positive, samples, shaped
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_factor import TAU, TAU_MINIMUM, certified, compact, rigid_factors
 from hsv.control.tube_set import TubeSet
-from hsv.errors import DesignError, ParameterError
-from hsv.lpv.polytope import Polytope, axis_weights
-from hsv.parameters import check_all
-from hsv.vehicle.actuators import ACTUATOR_SETS
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.lpv.polytope import Polytope, axis_weights
 
 
 @dataclass(frozen=True)
 class ControlDesign:
-    """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.vehicle.dynamics`.
+    """The numbers a Tube-MPC controller flies with, SI, state order as in :mod:`hsv.model.dynamics`.
 
     ``feedback_gain`` F (2, 9); ``nominal_gains`` K (g, 2, 9) and ``nominal_ellipsoids`` P (g, 5, 5), x' P x <= 1 on the
     rigid states, outermost first; the nominal cost's ``nominal_state_scale`` (5) and ``nominal_input_scale`` (2), and

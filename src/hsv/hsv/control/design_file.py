@@ -9,10 +9,10 @@ from typing import Any
 
 import yaml
 
+from hsv.base.documents import parse_yaml, read_text
+from hsv.base.errors import DesignError, DocumentError, did_you_mean
 from hsv.control.design import ControlDesign
 from hsv.control.design_parameters import DESIGN_PARAMETERS
-from hsv.documents import parse_yaml, read_text
-from hsv.errors import DesignError, DocumentError, did_you_mean
 
 _SHIPPED = Path(__file__).parents[1] / "designs"
 """In a checkout a link to ``offline_design``, in an installed package a folder of its own."""

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
+from hsv.base.parameters import Parameter
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.tube_factor import TAU, TAU_MINIMUM
-from hsv.errors import DesignError
-from hsv.lpv.polytope import INTERPOLATIONS
-from hsv.parameters import Parameter
+from hsv.model.lpv.polytope import INTERPOLATIONS
 
 DESIGN_PARAMETERS = (
     Parameter("design.name", "", "name of the design"),

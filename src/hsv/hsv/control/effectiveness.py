@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsv.base.parameters import check_all
 from hsv.control.effectiveness_parameters import EFFECTIVENESS_ENABLED, EFFECTIVENESS_PARAMETERS
 from hsv.core import Data, doubles, dtype, lib, records, vector
-from hsv.parameters import check_all
-from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
-from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.vehicle import VEHICLE_PARAMETERS, Vehicle
+from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.model.vehicle import VEHICLE_PARAMETERS, Vehicle
+from hsv.model.vehicle_parameters import VehicleParameters
 
 WATCHED_PARAMETERS = (*INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
 """What the estimator must know of the flight: the nominal vehicle, and the trim in which it starts."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hsv.parameters import Parameter
+from hsv.base.parameters import Parameter
 
 EFFECTIVENESS_ENABLED = Parameter(
     "effectiveness.enabled", False, "true: the elevator command is divided by its estimated effectiveness"

@@ -18,6 +18,8 @@ from typing import Self
 
 import numpy as np
 
+from hsv.base.errors import DesignError, ParameterError
+from hsv.base.parameters import check_all
 from hsv.control.estimator_parameters import (
     ESTIMATOR_ENABLED,
     ESTIMATOR_PARAMETERS,
@@ -25,14 +27,12 @@ from hsv.control.estimator_parameters import (
     PROCESS_PARAMETERS,
 )
 from hsv.core import Data, doubles, lib, vector
-from hsv.errors import DesignError, ParameterError
-from hsv.parameters import check_all
-from hsv.sensors import SENSOR_PARAMETERS, sensor_data
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, jacobian
-from hsv.vehicle.initial import INITIAL_PARAMETERS, initial_trim
-from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.trim import Trim
-from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, jacobian
+from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.model.sensors import SENSOR_PARAMETERS, sensor_data
+from hsv.model.trim import Trim
+from hsv.model.vehicle import VEHICLE_PARAMETERS
+from hsv.model.vehicle_parameters import VehicleParameters
 
 N_ESTIMATED = N_STATES + N_INPUTS
 """The states and an offset of each input."""

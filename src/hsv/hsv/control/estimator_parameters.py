@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from hsv.parameters import Parameter
-from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS, N_RIGID, STATE_NAMES, STATE_UNITS
+from hsv.base.parameters import Parameter
+from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, N_RIGID, STATE_NAMES, STATE_UNITS
 
 ESTIMATOR_ENABLED = Parameter(
     "estimator.enabled", False, "true: the controller receives an estimate instead of the measurement"

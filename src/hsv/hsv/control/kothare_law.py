@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus, level
-from hsv.design.nominal_problem import NominalProblem
-from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.control.nominal_problem import NominalProblem
+from hsv.model.dynamics import N_RIGID
 
 SOLVE_STEPS = 100
 """Steps from the start of a solve to the step at which its gain takes effect."""
@@ -39,7 +39,7 @@ class KothareLaw:
 
     def __init__(self, design: ControlDesign, data: NominalData) -> None:
         # Modelling and solver take a second to import: only this law pays for them.
-        from hsv.design.nominal import nominal_gain
+        from hsv.control.nominal_gain import nominal_gain
 
         self._nominal_gain = nominal_gain
         polytope = design.polytope

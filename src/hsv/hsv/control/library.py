@@ -15,6 +15,9 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.documents import read_bytes
+from hsv.base.errors import ControllerError, DocumentError, HsvError, ParameterError, ProcessError, reason
+from hsv.base.parameters import check_all
 from hsv.control.c_block import CBlock
 from hsv.control.controller import (
     CONTROLLER_INPUTS,
@@ -26,12 +29,9 @@ from hsv.control.controller import (
 )
 from hsv.control.library_process import LibraryUser, library_user
 from hsv.control.notch_filter import NotchFilter
-from hsv.documents import read_bytes
-from hsv.errors import ControllerError, DocumentError, HsvError, ParameterError, ProcessError, reason
-from hsv.parameters import check_all
-from hsv.signals import SignalType
-from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.signals import SignalType
+from hsv.model.vehicle import Vehicle
+from hsv.model.vehicle_parameters import VehicleParameters
 
 
 def library_place(controller: str) -> tuple[Path, str] | None:

@@ -1,7 +1,7 @@
 """The child process that a shared library is loaded and flown in: its crash is only its own.
 
 One child serves one library file and many flights; it is started when it is first asked, and anew where the file has
-changed. After a crash it goes on as if it had just been started. What it runs is :mod:`hsv.simulation.library_child`,
+changed. After a crash it goes on as if it had just been started. What it runs is :mod:`hsv.flight.library_child`,
 where a library is used in the same way, without another child.
 """
 
@@ -23,8 +23,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from hsv.base.errors import ProcessError
 from hsv.control.c_block import CBlock
-from hsv.errors import ProcessError
 
 NO_PROGRESS = 20.0
 """Time, s, after which a step, or loading, that does not come to its end is given up."""
@@ -80,7 +80,7 @@ class LibraryProcess:
     def request(
         self, name: str, *arguments: Any, kept: Mapping[str, Any] | None = None, begun: Callable[[], int] = lambda: 1
     ) -> Any:
-        """Return the reply of the child to a request, see :class:`hsv.simulation.library_child.LoadedLibrary`.
+        """Return the reply of the child to a request, see :class:`hsv.flight.library_child.LoadedLibrary`.
 
         Args:
             name: Name of the request.
@@ -142,7 +142,7 @@ class LibraryProcess:
         descriptors = (theirs.fileno(), self._memory.descriptor)
         # What the library prints must not get between the numbers of a command.
         self._child = subprocess.Popen(
-            [sys.executable, "-P", "-m", "hsv.simulation.library_child", self._path, *map(str, descriptors)],
+            [sys.executable, "-P", "-m", "hsv.flight.library_child", self._path, *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
             stdout=2,
             pass_fds=descriptors,

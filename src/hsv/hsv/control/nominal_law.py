@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from hsv.core import Data, doubles, ffi, lib, vector
-from hsv.lpv.polytope import PolytopeData
-from hsv.vehicle.dynamics import N_STATES
+from hsv.model.dynamics import N_STATES
+from hsv.model.lpv.polytope import PolytopeData
 
 MEMBERSHIP_TOLERANCE = 1e-6
 """Relative slack of x' P x <= 1, as in ``core/nominal.h``: the first deviation lies on the outermost boundary."""

@@ -7,17 +7,17 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.core import doubles, lib
-from hsv.errors import ParameterError
-from hsv.lpv.polytope import AxisWeights, PolytopeData
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.actuators import ACTUATOR_PARAMETERS
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
-from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
+from hsv.model.actuators import ACTUATOR_PARAMETERS
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.lpv.polytope import AxisWeights, PolytopeData
+from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 LAWS = ("family", "kothare_online", "qp")
 

@@ -9,14 +9,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
 from hsv.control.estimator import Estimator
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.core import Data, doubles, lib
-from hsv.elementary import tangent
-from hsv.elimination import solve
-from hsv.errors import ParameterError
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import PITCH_RATE
+from hsv.core.elementary import tangent
+from hsv.core.elimination import solve
+from hsv.model.dynamics import PITCH_RATE
 
 MAX_SECTIONS = 4
 

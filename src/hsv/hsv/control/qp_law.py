@@ -11,11 +11,11 @@ import numpy as np
 import piqp
 from scipy.linalg import solve_discrete_are
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_RIGID, PITCH_RATE
+from hsv.model.dynamics import N_RIGID, PITCH_RATE
 
 BLOCKS = 30
 """Blocks of the horizon, c constant in each."""

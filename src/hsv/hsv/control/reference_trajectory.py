@@ -27,13 +27,13 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
 from hsv.core import Data, doubles, lib, vector
-from hsv.errors import ParameterError
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_INPUTS, N_STATES, vehicle_struct
-from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.dynamics import N_INPUTS, N_STATES, vehicle_struct
+from hsv.model.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
+from hsv.model.vehicle import Vehicle
+from hsv.model.vehicle_parameters import VehicleParameters
 
 TRIMS = ("climbing", "static")
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hsv.errors import ParameterError
-from hsv.parameters import Parameter, check_all
-from hsv.timing import first_step
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.base.timing import first_step
+from hsv.model.dynamics import N_RIGID
 
 FACTORS = "one value, or one for each rigid state"
 

@@ -16,6 +16,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import SignalError
+from hsv.base.parameters import Parameter, check_all
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import ControlDesign
@@ -37,11 +39,9 @@ from hsv.control.notch_filter import (
 )
 from hsv.control.tube_factor import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
 from hsv.core import Data, doubles, dtype, lib, records, vector
-from hsv.errors import SignalError
-from hsv.parameters import Parameter, check_all
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
-from hsv.vehicle.parameters import VehicleParameters
-from hsv.vehicle.vehicle import COUPLING_PARAMETER
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.vehicle import COUPLING_PARAMETER
+from hsv.model.vehicle_parameters import VehicleParameters
 
 
 class TubeStatusCode(IntEnum):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.vehicle.dynamics import N_RIGID, STATE_NAMES
+from hsv.model.dynamics import N_RIGID, STATE_NAMES
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from hsv.base.errors import ParameterError
 from hsv.core._core import ffi, lib
-from hsv.errors import ParameterError
 
 __all__ = [
     "Callback",

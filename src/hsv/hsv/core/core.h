@@ -7,7 +7,7 @@
 typedef double number;
 /* Numbers of states (the first of which are those of the rigid body), inputs, and conditions of air and engine; most
  * sections of the notch filter, most steps of a delay; integrated states; columns of a history, see
- * hsv.simulation.history; entries of the scheduled model that are summed at a time. */
+ * hsv.flight.history; entries of the scheduled model that are summed at a time. */
 enum { STATES = 9, INPUTS = 2, RIGID = 5, CONDITIONS = 7, MAX_SECTIONS = 4, MAX_DELAY = 50, INTEGRATED = 2 };
 enum { HISTORY = 25, AUXILIARY = 3, SUMS = 12 };
 enum { ALTITUDE, VELOCITY, ALPHA, PITCH, PITCH_RATE, ETA_1, ETA_1_RATE, ETA_2, ETA_2_RATE };

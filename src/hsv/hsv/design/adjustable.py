@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
+from hsv.base.progress import Progress
 from hsv.control.design import ControlDesign
+from hsv.control.nominal_gain import nominal_gain
 from hsv.design.baseline import (
     DesignResult,
     design_gains,
@@ -23,14 +26,11 @@ from hsv.design.common_lyapunov import CommonLyapunov, common_lyapunov
 from hsv.design.factor_range import certified_loops, relaxed_bound, room_at_one
 from hsv.design.full_state import full_state_report
 from hsv.design.inputs import AdjustableInputs, DesignInputs
-from hsv.design.nominal import nominal_gain
 from hsv.design.region import Region, incomplete_share
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import channel_model
-from hsv.errors import DesignError
-from hsv.progress import Progress
-from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.trim import trim
+from hsv.model.dynamics import N_RIGID
+from hsv.model.trim import trim
 
 
 @dataclass(frozen=True)

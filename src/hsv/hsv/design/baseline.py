@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
+from hsv.base.progress import Progress
 from hsv.control.design import ControlDesign
+from hsv.control.nominal_gain import NominalGain, nested_gains
+from hsv.control.nominal_problem import NominalProblem, step_deviation
 from hsv.control.notch_filter import NotchSection
+from hsv.control.optimisation.lmi import spectral_radii
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs
-from hsv.design.lmi import spectral_radii
 from hsv.design.model import DesignModel, design_model
-from hsv.design.nominal import NominalGain, nested_gains
-from hsv.design.nominal_problem import NominalProblem, step_deviation
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import design_tube
-from hsv.errors import DesignError
-from hsv.lpv.discretisation import zero_order_hold
-from hsv.lpv.grid import linearise
-from hsv.lpv.polytope import Polytope
-from hsv.progress import Progress
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, N_STATES
-from hsv.vehicle.trim import trim
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.grid import linearise
+from hsv.model.lpv.polytope import Polytope
+from hsv.model.trim import trim
 
 
 @dataclass(frozen=True)

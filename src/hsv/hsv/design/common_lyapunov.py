@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
-from hsv.design.centring import Unknown, minimise
-from hsv.design.lmi import SolverReport, spectral_radii
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.centring import Unknown, minimise
+from hsv.control.optimisation.lmi import SolverReport, spectral_radii
+from hsv.control.optimisation.rounding import rounded_matrix
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.rounding import rounded_matrix
-from hsv.errors import DesignError
 
 _CONDITION = 1e3
 """Bound on the condition number of N, whitened, without which the largest margin is not attained."""

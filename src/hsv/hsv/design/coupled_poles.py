@@ -6,11 +6,11 @@ import numpy as np
 
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import continuous, series
-from hsv.lpv.discretisation import zero_order_hold
-from hsv.vehicle.dynamics import N_RIGID, N_STATES
-from hsv.vehicle.extended import Filter, extended_jacobian, extended_state
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.dynamics import N_RIGID, N_STATES
+from hsv.model.extended import Filter, extended_jacobian, extended_state
+from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
 
 
 def largest_real_parts(

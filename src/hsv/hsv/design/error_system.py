@@ -20,10 +20,10 @@ import numpy as np
 
 from hsv.control.notch_filter import NotchData, with_notch
 from hsv.core import doubles, lib, vector
-from hsv.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
-from hsv.lpv.polytope import Polytope
-from hsv.vehicle.actuators import ActuatorSet
-from hsv.vehicle.dynamics import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
+from hsv.model.actuators import ActuatorSet
+from hsv.model.dynamics import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
+from hsv.model.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
+from hsv.model.lpv.polytope import Polytope
 
 
 @dataclass(frozen=True)

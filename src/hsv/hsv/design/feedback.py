@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from hsv.design.centring import Unknown, minimise
-from hsv.design.lmi import SolverReport, spectral_radii
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.centring import Unknown, minimise
+from hsv.control.optimisation.lmi import SolverReport, spectral_radii
+from hsv.control.optimisation.rounding import GAIN_DIGITS, rounded, rounded_matrix
+from hsv.control.optimisation.scaling import Whitening, lqr_whitening
 from hsv.design.lyapunov import lyapunov_residuals
-from hsv.design.rounding import GAIN_DIGITS, rounded, rounded_matrix
-from hsv.design.scaling import Whitening, lqr_whitening
-from hsv.errors import DesignError
 
 METHODS = ("guaranteed_cost", "feasibility")
 

@@ -18,14 +18,14 @@ from pydantic import (
     model_validator,
 )
 
+from hsv.base.documents import parse_toml, read_text
+from hsv.base.errors import DesignError, DocumentError, QuantityError
+from hsv.base.inheritance import follow_extends, is_path
+from hsv.base.units import parse_quantity
 from hsv.control.design_file import find_file
-from hsv.documents import parse_toml, read_text
-from hsv.errors import DesignError, DocumentError, QuantityError
-from hsv.inheritance import follow_extends, is_path
-from hsv.units import parse_quantity
-from hsv.vehicle.actuators import ACTUATOR_SETS
-from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.vehicle import Vehicle, load_vehicle
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.dynamics import N_RIGID
+from hsv.model.vehicle import Vehicle, load_vehicle
 
 _SI = "SI"
 """Validation context of tables that hold plain numbers in SI, as a certificate does."""
@@ -130,7 +130,7 @@ class TensorProductInputs(_Table):
     """Vertices by the tensor-product model transformation: ranks by ``tolerance``, relative, over the scales."""
 
     functions: Literal["singular", "polynomial"] = "singular"
-    """Functions that span the model at these ranks, see :func:`hsv.lpv.tensor_product.tensor_product`."""
+    """Functions that span the model at these ranks, see :func:`hsv.model.lpv.tensor_product.tensor_product`."""
     tolerance: Number = Field(gt=0.0, lt=1.0)
     altitude_samples: int = Field(ge=5, le=100)
     velocity_samples: int = Field(ge=5, le=100)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.design.lmi import smallest_eigenvalues
-from hsv.errors import DesignError
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.lmi import smallest_eigenvalues
 
 
 def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.ndarray:

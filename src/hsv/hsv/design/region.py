@@ -6,70 +6,28 @@ step from the design's start to its target, the fault; parameters nominal and at
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from scipy.linalg import hadamard
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import ChannelModel, Extremes, Record, Signals
 from hsv.design.inputs import DesignInputs
-from hsv.errors import DesignError
-from hsv.simulation.assembly import assemble
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.flight import Flight
-from hsv.simulation.side_by_side import fly_perturbed
-from hsv.vehicle.actuators import ACTUATOR_SETS
-from hsv.vehicle.plant import FlightStatus
+from hsv.flight.assembly import assemble
+from hsv.flight.closed_loop import fly
+from hsv.flight.corners import Corner, corners, fraction, screening_corners
+from hsv.flight.flight import Flight
+from hsv.flight.side_by_side import fly_perturbed
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.plant import FlightStatus
 
-Corner = Mapping[str, float]
 Result = TypeVar("Result")
 
 _NO_STOP = 1e3
 """Stop of an actuator that leaves those of the vehicle; they hold beside."""
-
-_FRACTIONED = 10
-"""Uncertain parameters from which on a quarter of the corners is enough to measure disturbances."""
-
-
-def corners(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle (no change) and all corners of ``share`` of the parameter bounds, in a fixed order.
-
-    ``bounds``: relative ones of the uncertain parameters, :attr:`hsv.vehicle.vehicle.Vehicle.uncertainty`.
-    """
-    signs = itertools.product((-1.0, 1.0), repeat=len(bounds))
-    return [
-        {},
-        *({name: s * share * bound for s, (name, bound) in zip(row, bounds.items(), strict=True)} for row in signs),
-    ]
-
-
-def fraction(bounds: Mapping[str, float], share: float = 1.0) -> list[dict[str, float]]:
-    """Return the nominal vehicle and a quarter of the corners, in a fixed order; of fewer than ten parameters all.
-
-    A regular fraction of resolution VI: two of ten signs are products of five others, so that every three parameters
-    still meet in all their combinations.
-    """
-    names = list(bounds)
-    nominal, *rows = corners(bounds, share)
-    if len(names) < _FRACTIONED:
-        return [nominal, *rows]
-    signs = np.array([[np.sign(row[name]) for name in names] for row in rows])
-    kept = (signs[:, 8] == signs[:, :5].prod(axis=1)) & (signs[:, 9] == signs[:, [0, 1, 5, 6, 7]].prod(axis=1))
-    return [nominal, *(row for row, keep in zip(rows, kept, strict=True) if keep)]
-
-
-def screening_corners(bounds: Mapping[str, float], share: float = 1.0) -> list[Corner]:
-    """Return the nominal vehicle and 32 corners of ``share`` of the bounds of at most 15 parameters, in a fixed order.
-
-    A Hadamard matrix of 16 runs and its mirror image: any three parameters meet in all their combinations.
-    """
-    runs = hadamard(16)[:, 1 : 1 + len(bounds)]
-    rows = share * np.vstack((runs, -runs)) * np.array(list(bounds.values()))
-    return [{}, *(dict(zip(bounds, map(float, row), strict=True)) for row in rows)]
 
 
 def incomplete_share(inputs: DesignInputs) -> float:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from hsv.base.units import to_paper
+from hsv.control.certificate import certificate_path, read_certificate
 from hsv.control.design_file import find_design
-from hsv.design.certificate import certificate_path, read_certificate
-from hsv.units import to_paper
 
 DESIGNS = (
     "baseline",

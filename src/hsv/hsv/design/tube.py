@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.progress import Progress
 from hsv.control.design import ControlDesign
 from hsv.control.plan_bounds import PlanBounds
 from hsv.control.tube_set import TubeSet
@@ -25,10 +26,9 @@ from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem
-from hsv.progress import Progress
-from hsv.simulation.flight import Flight
-from hsv.simulation.metrics import flight_metrics
-from hsv.vehicle.dynamics import PITCH_RATE
+from hsv.flight.flight import Flight
+from hsv.flight.metrics import flight_metrics
+from hsv.model.dynamics import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
 """Size and seed of the sampling evidence."""

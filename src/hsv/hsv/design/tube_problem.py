@@ -9,10 +9,10 @@ from hsv.control.notch_filter import discretise
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
 from hsv.design.error_system import error_system, union
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.lpv.actuated import sampled_actuators
-from hsv.vehicle.actuators import ACTUATOR_SETS, ActuatorSet
-from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.actuators import ACTUATOR_SETS, ActuatorSet
+from hsv.model.dynamics import N_RIGID
+from hsv.model.lpv.actuated import sampled_actuators
+from hsv.model.vehicle import Vehicle
 
 
 def channel_model(design: ControlDesign, vehicle: Vehicle) -> ChannelModel:

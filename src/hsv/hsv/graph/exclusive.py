@@ -11,7 +11,7 @@ import hashlib
 import os
 import socket
 
-from hsv.errors import ParameterError
+from hsv.base.errors import ParameterError
 
 _LONGEST_NAME = 100
 """Bytes; the system takes 107."""

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from hsv.errors import RecordingError, RunError
-from hsv.graph.description import ROOT, TOPICS
+from hsv.bags.description import ROOT, TOPICS
+from hsv.base.errors import RecordingError, RunError
 from hsv.graph.launcher import Launcher, parameter_arguments
 from hsv.graph.preparation import PreparedRun
 from hsv.graph.snapshot import Snapshot
@@ -26,7 +26,7 @@ def fly_graph(
 
     Args:
         prepared: Prepared run, from :func:`hsv.graph.preparation.prepare`.
-        namespace: Namespace of all nodes, as :func:`hsv.graph.description.checked_namespace` returns it.
+        namespace: Namespace of all nodes, as :func:`hsv.bags.description.checked_namespace` returns it.
         on_step: Called with the steps the plant reports.
         on_line: Called with node and text of every other line that a node writes.
         on_snapshot: Called with what the recorder tells of the flight.
@@ -70,7 +70,7 @@ def close_bag(bag: Path, failures: Sequence[str] = ()) -> None:
 
 
 def _remove_without_steps(bag: Path) -> None:
-    from hsv.recording.reader import Bag
+    from hsv.bags.reader import Bag
 
     if not bag.is_dir():
         return
@@ -80,8 +80,8 @@ def _remove_without_steps(bag: Path) -> None:
 
 
 def _mend(bag: Path) -> None:
-    from hsv.recording.metadata import FILE_NAME
-    from hsv.recording.recover import finalise
+    from hsv.bags.metadata import FILE_NAME
+    from hsv.bags.recover import finalise
 
     with suppress(OSError):
         bag.rmdir()  # where no recorder has come to write anything

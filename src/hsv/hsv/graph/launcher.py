@@ -16,8 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
-from hsv.errors import RunError
-from hsv.graph.description import (
+from hsv.bags.description import (
     COMPOSED,
     LANDED,
     LIVE,
@@ -29,11 +28,12 @@ from hsv.graph.description import (
     graph,
     resolved,
 )
+from hsv.base.errors import RunError
+from hsv.base.interruption import end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.placement import CHAIN, share_processor
 from hsv.graph.snapshot import Snapshot
 from hsv.graph.standstill import HUNG_AFTER, Standstill, processor_time
-from hsv.interruption import end_with_parent, uninterrupted
 
 GRACE = 20.0
 """Seconds between asking a process to end and forcing it; only :data:`HUNG_AFTER` where it does nothing at all."""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from hsv.bags.description import LIVE, RECORDER, ROBUST_MPC, TUBE_MPC
+from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
+from hsv.base.parameters import Parameter
+from hsv.control.certificate import CERTIFICATE_PARAMETERS
 from hsv.control.controllers import controller_class
 from hsv.control.design_parameters import DESIGN_PARAMETERS
-from hsv.design.certificate import CERTIFICATE_PARAMETERS
-from hsv.graph.description import LIVE, RECORDER, ROBUST_MPC, TUBE_MPC
-from hsv.graph.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
-from hsv.parameters import Parameter
-from hsv.simulation.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
+from hsv.flight.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
 
 
 def _designed(own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
@@ -36,4 +36,4 @@ NODE_PARAMETERS: dict[str, tuple[Parameter, ...]] = {
     LIVE.name: LIVE_PARAMETERS,
 }
 """Parameter tables by node, without that of a controller of one's own. Every node also declares
-:data:`hsv.graph.infrastructure_parameters.LOCKSTEP_PARAMETERS`."""
+:data:`hsv.bags.infrastructure_parameters.LOCKSTEP_PARAMETERS`."""

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 
-from hsv.graph.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, TUBE_MPC
+from hsv.bags.description import FAULT_INJECTOR, NOTCH_FILTER, PLANT, TUBE_MPC
 from hsv.graph.exclusive import claim_processor
 
 CHAIN = (NOTCH_FILTER.name, TUBE_MPC.name, FAULT_INJECTOR.name, PLANT.name)

@@ -11,20 +11,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
+from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.base.errors import ParameterError, QuantityError, RecordingError, RunError
+from hsv.control.certificate import attached_certificate, design_files, find_certificate
 from hsv.control.controllers import NODE
 from hsv.control.design_file import find_design, read_design
 from hsv.control.design_parameters import DESIGN_PARAMETERS, NO_DESIGN, digest
 from hsv.control.library import library_digest, library_record
-from hsv.design.certificate import certificate_path, find_certificate
-from hsv.documents import read_text
-from hsv.errors import ParameterError, QuantityError, RecordingError, RunError
-from hsv.graph.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, controller_node, graph
-from hsv.graph.infrastructure_parameters import STEP_TIMEOUT
+from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
+from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller
+from hsv.graph.addresses import ports
 from hsv.graph.launcher import executable
-from hsv.graph.parameter_sections import ParameterSections
-from hsv.live.addresses import ports
-from hsv.simulation.assembly import assemble_flight, blamed_on, own_parameters
-from hsv.simulation.scenario import Scenario, parse_scenario, scenario_text, with_controller
 
 _NO_DESIGN = ParameterSections({"design.name": NO_DESIGN})
 
@@ -68,7 +67,7 @@ def prepare(
 
     Args:
         scenario_name: Name or path of the scenario.
-        text: The scenario, as :func:`hsv.simulation.scenario.scenario_text` returns it; empty: that of this name.
+        text: The scenario, as :func:`hsv.flight.scenario.scenario_text` returns it; empty: that of this name.
         bags: Folder of the bag if ``bag`` is not given; it is named by scenario and time.
         bag: Bag to record to, a new directory.
         real_time_factor: Simulated over wall time; 0: as fast as possible; ``None``: 0, with a live view 1.
@@ -207,16 +206,7 @@ def recorded_files(values: Mapping[str, Mapping[str, Any]], flown: Mapping[str, 
         "scenario.yaml": sections.only(sections.names - design).to_yaml(),
     }
     certificate = find_certificate(flown.get("design.name", ""), flown.get("design.certificate", ""))
-    return files | _certificate(certificate)
-
-
-def design_files(design: Path) -> dict[str, str]:
-    """Return the attachments of a bag that belong to its design, by name: parameters and certificate."""
-    return {"design.yaml": read_text(design)} | _certificate(certificate_path(design))
-
-
-def _certificate(path: Path | None) -> dict[str, str]:
-    return {"certificate.json": read_text(path)} if path and path.is_file() else {}
+    return files | attached_certificate(certificate)
 
 
 def _new_directory(candidates: Sequence[Path]) -> Path:

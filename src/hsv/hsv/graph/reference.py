@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hsv.bags.description import CARRIED
+from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.base.parameters import Parameter
 from hsv.control.design_parameters import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
-from hsv.graph.description import CARRIED
-from hsv.graph.infrastructure_parameters import LOCKSTEP_PARAMETERS
+from hsv.flight.blocks import LOOP
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.parameters import Parameter
-from hsv.signals import VARYING
-from hsv.simulation.blocks import LOOP
-from hsv.vehicle.vehicle import VEHICLE_PARAMETERS
+from hsv.model.signals import VARYING
+from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 _HEADER = """# Parameters of the nodes
 Made by `python -m hsv.graph.reference > docs/parameters.md` from the tables that the nodes declare. All values are in

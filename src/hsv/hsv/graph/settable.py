@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
-from hsv.errors import ParameterError
-from hsv.graph.description import NodeDescription, graph
+from hsv.bags.description import NodeDescription, graph
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter
+from hsv.base.units import parse_quantity
 from hsv.graph.node_parameters import NODE_PARAMETERS
-from hsv.parameters import Parameter
-from hsv.units import parse_quantity
 
 SETTABLE: dict[str, tuple[NodeDescription, Parameter]] = {
     parameter.name: (node, parameter)

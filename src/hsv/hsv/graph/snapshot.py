@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from typing import Any, Self
 
-from hsv.units import UnitSystem, in_system, significant
+from hsv.base.units import UnitSystem, in_system, significant
 
 _MARK = "flight "
 """Prefix of a line between processes."""

@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
-from hsv.design.lmi import spectral_radii
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.lmi import spectral_radii
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
-from hsv.errors import DesignError
 
 
 @dataclass(frozen=True)

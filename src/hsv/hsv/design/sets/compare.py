@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import paper_system
@@ -22,8 +23,7 @@ from hsv.design.sets.modal import modal_box
 from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import tighten
-from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.model.dynamics import N_RIGID
 
 
 @dataclass(frozen=True)

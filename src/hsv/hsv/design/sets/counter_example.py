@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from hsv.design.lmi import spectral_radii
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.lmi import spectral_radii
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.star_norms import output_rows
-from hsv.errors import DesignError
 
 _NEGLIGIBLE = 1e-6
 """Share of a row's sum below which the rest of its response, of steps far back, is left out."""

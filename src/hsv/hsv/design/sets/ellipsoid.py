@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
-from hsv.design.centring import Unknown, minimise
-from hsv.design.rounding import MATRIX_DIGITS, rounded, rounded_matrix
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.centring import Unknown, minimise
+from hsv.control.optimisation.rounding import MATRIX_DIGITS, rounded, rounded_matrix
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.errors import DesignError
 
 _INFLATION = 1.002
 """Factor on Q, so that the set is invariant for gains, too, that are tuned in their sixth digit."""

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.threads import over_threads
 from hsv.core import doubles, lib
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
-from hsv.threads import over_threads
 
 KINDS = ("iid", "held", "switching", "adversarial")
 """Sequence j is of kind j mod 4."""

@@ -7,12 +7,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.linalg import cholesky
 
-from hsv.design.centring import Unknown, minimise
-from hsv.design.lmi import spectral_radii
-from hsv.design.rounding import rounded_matrix
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.centring import Unknown, minimise
+from hsv.control.optimisation.lmi import spectral_radii
+from hsv.control.optimisation.rounding import rounded_matrix
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.star_norms import StarNorms, output_rows
-from hsv.errors import DesignError
 
 _INFLATION = 1.002
 """Factor on Q, so that it is invariant as rounded, too."""

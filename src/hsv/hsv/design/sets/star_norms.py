@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from hsv.design.lmi import smallest_eigenvalues
+from hsv.base.errors import DesignError
+from hsv.control.optimisation.lmi import smallest_eigenvalues
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.errors import DesignError
-from hsv.vehicle.dynamics import N_RIGID
+from hsv.model.dynamics import N_RIGID
 
 
 def output_rows(problem: TubeProblem) -> np.ndarray:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linprog
 
+from hsv.base.errors import DesignError
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
-from hsv.errors import DesignError
 
 _ROUNDS = 10000
 _MARGIN = 1e-6

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size
-from hsv.errors import DesignError
-from hsv.vehicle.vehicle import Vehicle, load_vehicle
+from hsv.model.vehicle import Vehicle, load_vehicle
 
 if TYPE_CHECKING:
     from hsv.design.inputs import DesignInputs

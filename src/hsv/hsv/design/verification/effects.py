@@ -19,15 +19,15 @@ from hsv.design.disturbance import CHANNELS, DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.verification.plan import Plan
-from hsv.lpv.discretisation import zero_order_hold
-from hsv.lpv.grid import linearise
-from hsv.sensors import ALPHA, PITCH
-from hsv.vehicle.dynamics import N_RIGID, N_STATES, PITCH_RATE, derivative
-from hsv.vehicle.trim import trim
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.dynamics import N_RIGID, N_STATES, PITCH_RATE, derivative
+from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.grid import linearise
+from hsv.model.sensors import ALPHA, PITCH
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
 
 _WIND_FORWARD, _WIND_UP, _DENSITY = 0, 1, 2
-"""Indices into the conditions that :func:`hsv.vehicle.dynamics.forces` takes."""
+"""Indices into the conditions that :func:`hsv.model.dynamics.forces` takes."""
 
 N_SCHEDULING = 2
 """The nominal model is scheduled by the first states, altitude and velocity."""

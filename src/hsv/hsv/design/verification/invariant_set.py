@@ -14,8 +14,8 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_resi
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.checks import Check, Subject, above, at_most, required, same, same_parameter
-from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.vehicle import Vehicle
+from hsv.model.dynamics import N_RIGID
+from hsv.model.vehicle import Vehicle
 
 
 def certified_set(subject: Subject) -> EllipsoidSet:

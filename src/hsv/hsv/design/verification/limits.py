@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.units import UnitSystem, in_system
 from hsv.control.design import ControlDesign
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.tube_problem import known_actuators
 from hsv.design.verification.plan import Plan
-from hsv.units import UnitSystem, in_system
-from hsv.vehicle.actuators import SUBSTEPS, ActuatorSet, actuator_map
-from hsv.vehicle.dynamics import INPUT_NAMES, INPUT_UNITS
-from hsv.vehicle.trim import trim
+from hsv.model.actuators import SUBSTEPS, ActuatorSet, actuator_map
+from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+from hsv.model.trim import trim
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, incomplete_share, measure, record
 from hsv.design.tube_problem import channel_model, known_actuators
 from hsv.design.verification.checks import Subject
-from hsv.lpv.actuated import respond, sampled_actuators
-from hsv.vehicle.dynamics import N_RIGID
-from hsv.vehicle.trim import trim
+from hsv.model.dynamics import N_RIGID
+from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.trim import trim
 
 _ACCELERATED, _REMAINING = [1, 2, 4], [0, 3]
 """Rigid states that the held accelerations explain, and those in which something remains."""

@@ -6,17 +6,18 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from hsv.design.region import Corner, fraction, incomplete_share
+from hsv.base.errors import DesignError
+from hsv.design.region import incomplete_share
 from hsv.design.tightening import TightenedInputs
 from hsv.design.tube import FlightEvidence, flight_evidence
 from hsv.design.tube_problem import channel_model
 from hsv.design.verification.checks import Check, Subject, above, at_most
 from hsv.design.verification.invariant_set import certified_set, lag_feedback
 from hsv.design.verification.tolerances import ROUNDING
-from hsv.errors import DesignError
-from hsv.simulation.assembly import assemble_flight
-from hsv.simulation.closed_loop import fly
-from hsv.simulation.scenario import Scenario
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.corners import Corner, fraction
+from hsv.flight.scenario import Scenario
 
 
 def bounding_corners(subject: Subject) -> list[Corner]:

@@ -14,6 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.errors import DesignError
+from hsv.base.progress import Progress
+from hsv.base.units import UnitSystem, in_words
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, widened
 from hsv.design.region import Region, incomplete_share, record
@@ -27,11 +30,8 @@ from hsv.design.verification.effects import N_SCHEDULING, Measured, Model, with_
 from hsv.design.verification.invariant_set import lag_feedback
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
-from hsv.errors import DesignError
-from hsv.progress import Progress
-from hsv.units import UnitSystem, in_words
-from hsv.vehicle.actuators import ACTUATOR_SETS, IDEAL
-from hsv.vehicle.dynamics import (
+from hsv.model.actuators import ACTUATOR_SETS, IDEAL
+from hsv.model.dynamics import (
     INPUT_NAMES,
     INPUT_UNITS,
     N_RIGID,

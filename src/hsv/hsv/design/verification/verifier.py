@@ -5,15 +5,15 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
+from hsv.base.progress import Progress
+from hsv.control.certificate import certificate_path, read_certificate
 from hsv.control.design_file import read_design
-from hsv.design.certificate import certificate_path, read_certificate
 from hsv.design.verification.adjustable import adjustable_checks
 from hsv.design.verification.checks import Check, Subject, gathered
 from hsv.design.verification.flights import flight_checks, sequence_checks
 from hsv.design.verification.invariant_set import counter_example_checks
 from hsv.design.verification.model import model_checks
 from hsv.design.verification.quick import QUICK, Part
-from hsv.progress import Progress
 
 RECOMPUTED: dict[str, Part] = {
     "polytopic model": model_checks,

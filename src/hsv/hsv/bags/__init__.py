@@ -1,0 +1,1 @@
+"""Topics, and bags: writing, reading, repair, comparison and replay in one process."""

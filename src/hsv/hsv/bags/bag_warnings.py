@@ -1,0 +1,64 @@
+"""Warnings about readable but incomplete bags, for every page, plot, table and line that is made of one."""
+
+from __future__ import annotations
+
+from hsv.bags.description import MEASUREMENT, TUBE_MPC, step_topics
+from hsv.bags.files import being_recorded
+from hsv.bags.former import FAULT_STATUS
+from hsv.bags.reader import Bag, Loss
+from hsv.bags.steps import complete_stamps, expected_stamps, irregularities
+from hsv.base.errors import RecordingError
+
+_NAMED = 3
+"""Files and damages that are named; of more, how many there are."""
+
+
+def bag_warnings(bag: Bag) -> list[str]:
+    """Return the warnings of a bag in words: damage, a missing end, missing topics, missing steps of a topic."""
+    words = loss_in_words(bag.loss)
+    if any(map(being_recorded, bag.files)):
+        words.append(f"is still being recorded, {bag.span[1] * 1e-9:.2f} s so far: the end of its recorder closes it")
+    elif not bag.complete and not bag.loss.files:
+        words.append(f"truncated after {bag.span[1] * 1e-9:.2f} s, hsv recover completes it")
+    elif bag.loss:
+        words.append("hsv recover makes a whole bag of the rest")
+    if missing := [bag.name_of(topic) for topic in _expected(bag) if topic not in bag.roles]:
+        words.append(f"no topic {', '.join(missing)}")
+    try:
+        words += irregularities(bag)
+    except RecordingError as error:
+        words.append(str(error).removeprefix(f"{bag.path}: "))
+    return words
+
+
+def _expected(bag: Bag) -> list[str]:
+    """Return the step topics that a bag should hold: which of them depends on its controller, and on its age."""
+    topics = step_topics(bag.custom_data.get("controller", TUBE_MPC.name))
+    return [topic for topic in topics if not (topic == MEASUREMENT and FAULT_STATUS in bag.roles)]
+
+
+def loss_in_words(loss: Loss) -> list[str]:
+    """Return which files are missing in a bag, where it is damaged, and how much of it cannot be read."""
+    words = [f"lacks its file {name}" for name in loss.files[:_NAMED]]
+    if (more := len(loss.files) - _NAMED) > 0:
+        words.append(f"lacks {more} more of its files")
+    if loss.damages:
+        places = "; ".join(f"{path.name}: {damage}" for path, damage in loss.damages[:_NAMED])
+        more = len(loss.damages) - _NAMED
+        words.append(f"damaged ({places}{f'; and {more} more places' if more > 0 else ''})")
+    lost = [f"{n} {what}" for n, what in ((loss.messages, "messages"), (loss.attachments, "attachments")) if n]
+    if lost:
+        words.append(f"{'' if loss.counted else 'at least '}{' and '.join(lost)} lost")
+    elif loss:
+        words.append("no message lost" if loss.counted else "an unknown number of messages lost")
+    return words
+
+
+def completeness(bag: Bag) -> str:
+    """Return of how many of its steps a bag has every topic, in words; empty if of all.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    complete, expected = len(complete_stamps(bag)), len(expected_stamps(bag))
+    return f"{complete} of {expected} steps" if complete < expected else ""

@@ -1,0 +1,164 @@
+"""Writing the topics of a bag as tables: CSV, Parquet or npz, with field names and units in the header."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterable, Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.reader import Bag
+from hsv.bags.units import Units, units_of
+from hsv.base.errors import RecordingError, reason
+
+INCOMPLETE = "incomplete"
+"""Name of the file that lists what is missing in the exported bag."""
+
+
+class Format(StrEnum):
+    """Export formats of a bag."""
+
+    csv = "csv"
+    parquet = "parquet"
+    npz = "npz"
+
+
+def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[Path]:
+    """Write ``topics``, by name or role; return the files written.
+
+    CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
+    ``elastic_rate[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
+    per field, ``hsv_state.elastic_rate [kg^0.5 m/s]``.
+
+    Raises:
+        RecordingError: A topic is missing, or the target exists or cannot be written.
+    """
+    if target.exists():
+        raise RecordingError(
+            f"out = {str(target)!r}: exists already, expected a new {'file' if form == 'npz' else 'folder'}"
+        )
+    npz = form is Format.npz
+    topics = [bag.name_of(topic) for topic in topics]
+    lacking = "; ".join(bag_warnings(bag))
+    contents: dict[str, Any] = (
+        _arrays(bag, topics) if npz else {topic: table(bag.columns(topic), _units(bag, topic)) for topic in topics}
+    )
+    try:
+        (target.parent if npz else target).mkdir(parents=True, exist_ok=npz)
+    except OSError as error:
+        raise _refused(target, error) from error
+    try:
+        if npz:
+            with target.open("wb") as stream:
+                said: dict[str, Any] = {INCOMPLETE: np.array(lacking)} if lacking else {}
+                np.savez_compressed(stream, **contents, **said)
+            return [target]
+        write = _write_csv if form is Format.csv else _write_parquet
+        written = [write(target / f"{_file_stem(topic)}.{form}", table) for topic, table in contents.items()]
+        if lacking:
+            written.append(target / f"{INCOMPLETE}.txt")
+            written[-1].write_text(f"{bag.path}: {lacking}\n", encoding="utf-8")
+        return written
+    except BaseException as error:
+        # Half an export would be in the way of the next one.
+        shutil.rmtree(target, ignore_errors=True)
+        target.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise _refused(target, error) from error
+        raise
+
+
+def _refused(target: Path, error: OSError) -> RecordingError:
+    return RecordingError(f"out = {str(target)!r}: cannot be written: {reason(error)}")
+
+
+def _arrays(bag: Bag, topics: Iterable[str]) -> dict[str, Any]:
+    return {f"{_file_stem(topic)}.{name}": array for topic in topics for name, array in _fields(bag, topic).items()}
+
+
+def _file_stem(topic: str) -> str:
+    return topic.strip("/").replace("/", "_")
+
+
+def _fields(bag: Bag, topic: str) -> dict[str, NDArray[Any]]:
+    """Return one array per field, units in the names; what has no common length as JSON."""
+    units = _units(bag, topic)
+    fields = {}
+    for name, column in bag.columns(topic).items():
+        named = [units[name].of(i) for i in range(column.shape[1] if column.ndim > 1 else 1)]
+        named = named[:1] if len(set(named)) == 1 else named
+        array = column if column.dtype != object else np.array([_text(value) for value in column], np.str_)
+        fields[_headed(name, ", ".join(named) if any(named) else "")] = array
+    return fields
+
+
+def table(columns: Mapping[str, NDArray[Any]], units: Mapping[str, Units]) -> dict[str, NDArray[Any]]:
+    """Return one column per number, with its unit in its name; sequences as wide as the longest, the rest empty.
+
+    Args:
+        columns: The fields of messages, as :mod:`hsv.bags.columns` has them.
+        units: Unit of every field, from :func:`hsv.bags.units.units_of`.
+    """
+    table: dict[str, NDArray[Any]] = {}
+    for name, column in columns.items():
+        if column.dtype == object and len(column) and all(_is_numbers(value) for value in column):
+            column = _padded(column)
+        if column.ndim > 1:
+            for index in range(column.shape[1]):
+                table[_headed(f"{name}[{index}]", units[name].of(index))] = column[:, index]
+        elif column.dtype == object:
+            table[_headed(name, units[name].of())] = np.array([_text(value) for value in column], object)
+        else:
+            table[_headed(name, units[name].of())] = column
+    return table
+
+
+def _units(bag: Bag, topic: str) -> dict[str, Units]:
+    return units_of(bag.definition(topic), bag.types.fielddefs, bag.topics[topic].type)
+
+
+def _headed(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _is_numbers(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "fiub"
+
+
+def _padded(column: NDArray[Any]) -> NDArray[np.float64]:
+    wide = np.full((len(column), max(len(value) for value in column)), np.nan)
+    for row, value in zip(wide, column, strict=True):
+        row[: len(value)] = value
+    return wide
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, str):
+        return value
+    return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
+
+
+def _arrow(table: dict[str, NDArray[Any]]) -> Any:
+    import pyarrow
+
+    return pyarrow.table({name: pyarrow.array(column) for name, column in table.items()})
+
+
+def _write_csv(path: Path, table: dict[str, NDArray[Any]]) -> Path:
+    from pyarrow import csv
+
+    csv.write_csv(_arrow(table), path)
+    return path
+
+
+def _write_parquet(path: Path, table: dict[str, NDArray[Any]]) -> Path:
+    from pyarrow import parquet
+
+    parquet.write_table(_arrow(table), path)
+    return path

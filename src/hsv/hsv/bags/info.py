@@ -1,0 +1,201 @@
+"""Contents of a bag, as plain data for JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.description import ACTUATOR, STATE, TUBE_MPC, TUBE_STATUS
+from hsv.bags.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
+from hsv.bags.flight import flight_fingerprint, input_columns
+from hsv.bags.former import fault_parameters, fault_topic, saturation_topic
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.bags.reader import Bag
+from hsv.bags.steps import complete_stamps, cut_off, joined
+from hsv.base.documents import parse_json
+from hsv.base.errors import HsvError, ParameterError, RecordingError
+from hsv.control.coverage import uncovered
+from hsv.control.design import design_of
+from hsv.flight.fingerprint import as_published
+from hsv.flight.scenario import Scenario, parse_scenario
+from hsv.model.dynamics import INPUT_NAMES
+from hsv.model.faults.table import FAULT_KINDS, SENSOR
+from hsv.model.faults.table import fault_parameters as parameters_of
+
+
+def describe(bag: Bag) -> dict[str, Any]:
+    """Return the contents and events of a bag; a caller may add to it, such as metrics.
+
+    Returns:
+        ``path``, ``folder``, ``complete``, ``warnings`` (in words), ``start_s``, ``duration_s``, ``messages``,
+        ``topics``, ``custom_data``, ``fingerprint`` (None if steps are missing), ``as_published`` (None if there is
+        nothing to compare it with), ``attachments``, ``ending`` (finished, diverged or broken off), ``faults`` (one
+        entry per interval of a channel), ``equipment`` (what of sensors, links, effectors and air is not ideal, SI),
+        ``saturation``, ``tube`` and ``not_covered`` (what of the flight the certificate of its design does not cover,
+        in words); the last six are None without the topic that tells, and the last without parameters. Times are
+        simulated, in seconds; ``end_s`` of what lasts until the end of the bag is None.
+    """
+    start, end = bag.span
+    fingerprint = _fingerprint(bag)
+    topics = [_topic(bag, name) for name in sorted(bag.topics)]
+    faults = _faults(bag) if fault_topic(bag) in bag.roles else None
+    return {
+        "path": str(bag.path),
+        "folder": str(bag.folder),
+        "complete": bag.complete,
+        "warnings": bag_warnings(bag),
+        "start_s": start / 1e9,
+        "duration_s": (end - start) / 1e9,
+        "messages": sum(topic["messages"] for topic in topics),
+        "topics": topics,
+        "custom_data": bag.custom_data,
+        "fingerprint": fingerprint,
+        "as_published": as_published(fingerprint, _scenario(bag), bag.custom_data.get("design_hash", "")),
+        "attachments": [
+            {"name": name, "media_type": bag.media_types[name], "size_bytes": len(data)}
+            for name, data in sorted(bag.attachments.items())
+        ],
+        "ending": ending(bag) if STATE in bag.roles else None,
+        "faults": faults,
+        "equipment": _equipment(bag) if STATE in bag.roles else None,
+        "saturation": _saturation(bag) if saturation_topic(bag) in bag.roles else None,
+        "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
+        "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
+    }
+
+
+def _fingerprint(bag: Bag) -> str | None:
+    try:
+        return flight_fingerprint(bag)
+    except RecordingError:
+        return None
+
+
+def _scenario(bag: Bag) -> Scenario | None:
+    """Return the scenario attached to ``bag``, ``None`` without one that this version can read."""
+    try:
+        return parse_scenario(bag.text("scenario.toml"), bag.custom_data.get("scenario", ""))
+    except HsvError:
+        return None
+
+
+def _topic(bag: Bag, name: str) -> dict[str, Any]:
+    topic, times = bag.topics[name], bag.times(name)
+    span = int(times.max() - times.min()) if len(times) else 0
+    rate = (len(times) - 1) / (span / 1e9) if span else None
+    return {"name": name, "type": topic.type, "messages": topic.count, "rate_hz": rate}
+
+
+def ending(bag: Bag) -> str:
+    """Return how the flight in ``bag`` ended: ``finished``, ``diverged`` or ``broken off``.
+
+    Raises:
+        RecordingError: A topic is missing or does not fit its definition.
+    """
+    status = bag.columns(STATE)["status"]
+    if cut_off(bag) and len(status) and bag.times(STATE)[-1] not in complete_stamps(bag):
+        return "broken off"  # the last state may be there, but not what was made of it
+    endings = {bag.constant(STATE, "FINISHED"): "finished", bag.constant(STATE, "DIVERGED"): "diverged"}
+    return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
+
+
+def _faults(bag: Bag) -> list[dict[str, Any]]:
+    columns = bag.columns(fault_topic(bag))
+    active = [[(f["channel"], f["type"], *fault_parameters(f).items()) for f in faults] for faults in columns["active"]]
+    intervals = []
+    for key in sorted({fault for faults in active for fault in faults}):
+        channel, kind, *parameters = key
+        entry = {"channel": channel, "type": kind, "parameters": dict(parameters)}
+        acting = np.array([key in faults for faults in active])
+        if kind in FAULT_KINDS and FAULT_KINDS[kind].side == SENSOR:
+            # Listed in a step are those of sensors in the next, and in the first step those that are there from it on.
+            acting = np.concatenate((acting[:1], acting[:-1]))
+        intervals += [entry | interval for interval in _intervals(columns["header.stamp"], acting)]
+    return sorted(intervals, key=lambda interval: interval["start_s"])
+
+
+def parameters_in_words(fault: dict[str, Any], written: Callable[[float, str], str]) -> str:
+    """Return the parameters of a described fault: the quantity of a single one, names and quantities of several.
+
+    Args:
+        fault: Description of the fault.
+        written: Writes a number with its SI unit, which is empty where it has none or the fault is of no known type.
+    """
+    given = fault["parameters"]
+    try:
+        known = {parameter.name: parameter for parameter in parameters_of(fault["channel"], fault["type"])}
+    except ParameterError:
+        known = {}
+    words = []
+    for name, value in given.items():
+        if name in known and known[name].unit == "rad/s":
+            quantity = f"{value:g} rad/s"  # a frequency, in every system of units
+        else:
+            quantity = written(value, known[name].of(fault["channel"]).unit if name in known else "")
+        words.append(f"{name} {quantity}" if len(given) > 1 else quantity)
+    return ", ".join(words)
+
+
+def _equipment(bag: Bag) -> dict[str, Any] | None:
+    """Return what is not ideal: errors of measurement, what links held, effectors less what they were told, the air."""
+    try:
+        topics = joined(bag, equipment_topics(bag))
+    except RecordingError:
+        return None
+    told = input_columns(topics[ACTUATOR]) if ACTUATOR in topics else np.empty((0, len(INPUT_NAMES)))
+    away = {name: were - told[:, INPUT_NAMES.index(name)] for name, were in effectors(topics).items()}
+    return {
+        "measurement_error_rms": {n: float(np.sqrt(np.mean(e**2))) for n, e in measurement_errors(topics).items()},
+        "held_steps": {name: int(steps.sum()) for name, steps in held(topics).items()},
+        "effector_largest_difference": {name: float(np.nanmax(np.abs(way))) for name, way in away.items()},
+        "air_range": {name: [float(np.nanmin(air)), float(np.nanmax(air))] for name, air in moving_air(topics).items()},
+    }
+
+
+def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | None:
+    """Return what no certificate covers, by the parameters and the certificate in the bag, its faults as recorded."""
+    try:
+        sections = [ParameterSections.parse(bag.text(name), name) for name in ("design.yaml", "scenario.yaml")]
+        values = sections[0].overlaid(sections[1]).of(TUBE_MPC.name)
+        report = bag.attachments.get("certificate.json")
+        flown = [(fault["channel"], fault["type"], fault["parameters"]) for fault in faults or ()]
+        return uncovered(values, design_of(values), parse_json(report) if report else None, flown)
+    except (HsvError, ValueError, LookupError, TypeError):
+        return None  # what is attached is not of this version, or not whole
+
+
+def _saturation(bag: Bag) -> dict[str, Any]:
+    saturated = bag.columns(saturation_topic(bag))["saturated"]
+    return {
+        "steps": int(saturated.any(axis=1).sum()),
+        "fuel_equivalence_ratio_steps": int(saturated[:, 0].sum()),
+        "elevator_deflection_steps": int(saturated[:, 1].sum()),
+    }
+
+
+def _tube(bag: Bag) -> dict[str, Any]:
+    columns, constants = bag.columns(TUBE_STATUS), bag.constants(TUBE_STATUS)
+    checked = columns["status"] != bag.constant(TUBE_STATUS, "NO_SET")
+    outside = checked & ~columns["inside"]
+    levels = columns["level"][checked & np.isfinite(columns["level"])]
+    return {
+        "checked_steps": int(checked.sum()),
+        "outside_steps": int(outside.sum()),
+        "largest_level": float(levels.max()) if len(levels) else None,
+        "excursions": _intervals(columns["header.stamp"], outside),
+        "uncertified_steps": int((columns["status"] == constants.get("UNCERTIFIED_VEHICLE", -1)).sum()),
+        "uncertified_hardware_steps": int((columns["status"] == constants.get("UNCERTIFIED_HARDWARE", -1)).sum()),
+    }
+
+
+def _intervals(stamps: NDArray[np.int64], holds: NDArray[np.bool_]) -> list[dict[str, float | None]]:
+    """Return the intervals in which a condition holds: from its first step to the first in which it is over."""
+    edges = np.diff(np.concatenate(([False], holds, [False])).astype(np.int8))
+    return [
+        {"start_s": float(stamps[first]) / 1e9, "end_s": float(stamps[over]) / 1e9 if over < len(stamps) else None}
+        for first, over in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
+    ]

@@ -1,0 +1,397 @@
+"""Reading a bag that hsv or ``ros2 bag`` wrote: of one file or several, compressed or not, whole or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Metadata, Schema
+from numpy.typing import NDArray
+from rosbags.interfaces.typing import ConstValue
+from rosbags.typesys.store import Typestore
+
+from hsv.bags.columns import Columns
+from hsv.bags.description import ROOT, TOPICS, resolved
+from hsv.bags.files import find_files, read_file, read_message
+from hsv.bags.metadata import (
+    CUSTOM_DATA,
+    DISTRO,
+    ROSBAG2,
+    SERIALIZED,
+    custom_data,
+    message_counts,
+    parsed,
+    read_metadata,
+)
+from hsv.bags.roles import KINDS, namespace_of, roles
+from hsv.bags.scan import MESSAGE_HEADER, Damage, Scan, content
+from hsv.bags.topic import Qos
+from hsv.bags.track import Track
+from hsv.bags.typestore import message_types
+from hsv.base.errors import RecordingError
+
+_OURS = "/hsv/"
+"""Common prefix of this project's topics, unless they are remapped."""
+_USUAL = {resolved(role): kinds for role, kinds in KINDS.items()}
+"""Types of the topics of a graph by the names that they have unless they are moved or remapped."""
+_STAMP_START, _STAMP_END = 4, 12
+"""Range of bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
+_BIG_ENDIAN = b"\x00\x00"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedTopic:
+    """A topic as found in a bag."""
+
+    name: str
+    type: str
+    count: int
+    type_hash: str
+
+
+@dataclass
+class _Recorded:
+    """A topic in the files of a bag; its channels differ at most in their quality of service."""
+
+    channel: Channel
+    schema: Schema
+    log_times: list[int] = field(default_factory=list)
+    messages: list[bytes] = field(default_factory=list)
+
+
+@dataclass
+class Loss:
+    """Losses of a bag, as far as its files tell."""
+
+    files: list[str] = field(default_factory=list)
+    """Files that the bag should have."""
+    damages: list[tuple[Path, Damage]] = field(default_factory=list)
+    messages: int = 0
+    """Messages that were recorded and cannot be read."""
+    attachments: int = 0
+    counted: bool = True
+    """Whether the numbers are known, not only the least that they can be."""
+
+    def __bool__(self) -> bool:
+        return bool(self.files or self.damages or self.messages or self.attachments)
+
+
+class Bag:
+    """A recorded run: its topics, messages, attachments and custom data.
+
+    Times are simulated ones, in nanoseconds: of the step topics the stamp that every message begins with, whenever it
+    was received; of the others that of the last step before them. Damage is skipped and told in :attr:`loss`.
+
+    A topic is asked for by its name in the bag, ``/veh1/hsv/state``, or by its role in the graph, ``hsv/state``.
+
+    Args:
+        path: A bag directory, or a file in it.
+
+    Raises:
+        RecordingError: If there is no such bag, it is no MCAP file, nothing of it can be read, or it is not of this
+            project.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        given = Path(path)
+        self.files, missing = find_files(given)
+        """The files of the bag, in their order."""
+        self.path = self.files[0] if len(self.files) == 1 and not missing else given
+        """The file, or the directory of several."""
+        self.folder = self.files[0].parent
+        """The bag directory."""
+        self.complete = not missing
+        """Whether the writer closed every file; a killed writer leaves one that is truncated."""
+        self.loss = Loss(files=missing)
+        self.attachments: dict[str, bytes] = {}
+        self.media_types: dict[str, str] = {}
+        """Media type of each attachment."""
+        self.custom_data: dict[str, str] = {}
+        self.distro = DISTRO
+        """The distribution of ROS 2 that it was recorded with."""
+        self.roles: dict[str, str] = {}
+        """Names of the topics by their role in the graph, as :mod:`hsv.bags.description` has it."""
+        self.namespace = ROOT
+        """Namespace of the graph."""
+        self._topics: dict[str, _Recorded] = {}
+        self._columns: dict[str, Columns] = {}
+        self._read()
+        self._check()
+
+    @property
+    def topics(self) -> dict[str, RecordedTopic]:
+        """The topics by name, those without messages included."""
+        return {
+            name: RecordedTopic(
+                name,
+                recorded.schema.name,
+                len(recorded.messages),
+                recorded.channel.metadata.get("topic_type_hash", ""),
+            )
+            for name, recorded in self._topics.items()
+        }
+
+    def name_of(self, role: str) -> str:
+        """Return the name of the topic that plays ``role``, or that it would have if it were in the bag."""
+        return self.roles.get(role) or resolved(role, self.namespace)
+
+    @cached_property
+    def span(self) -> tuple[int, int]:
+        """First and last time in the bag in nanoseconds; zeros if it holds no message."""
+        times = [(int(times.min()), int(times.max())) for times in map(self.times, self._topics) if len(times)]
+        return (min(first for first, _ in times), max(last for _, last in times)) if times else (0, 0)
+
+    def times(self, topic: str) -> NDArray[np.int64]:
+        """Return the simulated times of the messages of a topic, shape (n,), in nanoseconds.
+
+        Raises:
+            RecordingError: If the topic is not in the bag, or a message of a step is too short to have a stamp.
+        """
+        recorded, name = self._of(topic), self.name_of(topic)
+        if name in self._step_topics:
+            return self._stamps(name, recorded.messages)
+        log_times = np.array(recorded.log_times, np.int64)
+        received, stamps = self._clock
+        if np.array_equal(received, stamps):
+            return log_times  # of a recorder that goes by simulated time itself
+        before = np.searchsorted(received, log_times, side="right") - 1
+        return np.asarray(stamps[np.maximum(before, 0)])
+
+    def messages(self, topic: str) -> list[tuple[int, bytes]]:
+        """Return the messages of a topic as recorded: simulated time in nanoseconds and CDR with its header."""
+        return list(zip(self.times(topic).tolist(), self._of(topic).messages, strict=True))
+
+    def columns(self, topic: str) -> Columns:
+        """Return all messages of a topic, decoded, one array per field.
+
+        Returns:
+            Arrays with the messages along the first axis, by field path; see :mod:`hsv.bags.columns`. They are
+            decoded once and then cached.
+
+        Raises:
+            RecordingError: If the topic is not in the bag or a message does not fit its definition.
+        """
+        name = self.name_of(topic)
+        if name not in self._columns:
+            self._columns[name] = self.track(topic).columns()
+        return self._columns[name]
+
+    def decode(self, topic: str) -> Iterator[tuple[int, Any]]:
+        """Yield time in nanoseconds and message of a topic, deserialized one by one.
+
+        Raises:
+            RecordingError: As :meth:`columns`.
+        """
+        return self.track(topic).decode()
+
+    def track(self, topic: str) -> Track:
+        """Return the messages of a topic with what decodes them.
+
+        Raises:
+            RecordingError: If the topic is not in the bag.
+        """
+        recorded, name = self._of(topic), self.name_of(topic)
+        if (kind := recorded.schema.name) not in self.types.fielddefs:
+            raise RecordingError(f"{self.path}: topic {name}: the definition of {kind} cannot be used")
+        return Track(name, kind, self.types, self.times(topic).tolist(), recorded.messages, str(self.path))
+
+    def text(self, name: str) -> str:
+        """Return an attachment as text.
+
+        Raises:
+            RecordingError: If it is not in the bag or no text.
+        """
+        if name not in self.attachments:
+            raise RecordingError(f"{self.path}: no attachment {name}, expected a bag recorded by hsv run")
+        try:
+            return self.attachments[name].decode()
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"{self.path}: attachment {name}: {error}, expected text") from None
+
+    def definition(self, topic: str) -> str:
+        """Return the definition of a topic's type as recorded, its dependencies included."""
+        return self._text(self._of(topic).schema)
+
+    def qos(self, topic: str) -> Qos:
+        """Return the quality of service with which a topic was offered; the default if the bag does not tell."""
+        return Qos.from_yaml(self._of(topic).channel.metadata.get("offered_qos_profiles", ""))
+
+    def constants(self, topic: str) -> dict[str, ConstValue]:
+        """Return the constants that the type of a topic defines, as recorded in the bag."""
+        return {name: value for name, _, value in self.types.fielddefs[self._of(topic).schema.name][0]}
+
+    def constant(self, topic: str, name: str) -> ConstValue:
+        """Return a constant that the type of a topic defines.
+
+        Raises:
+            RecordingError: It defines none of this name.
+        """
+        found = self.constants(topic)
+        if name not in found:
+            raise RecordingError(f"{self.path}: definition of {self._of(topic).schema.name}: no constant {name}")
+        return found[name]
+
+    @cached_property
+    def types(self) -> Typestore:
+        """The message types as the bag's own definitions state them."""
+        ours: dict[str, str] = {}
+        others: dict[str, str] = {}
+        for topic, recorded in self._topics.items():
+            (ours if _is_ours(topic) or topic in self.roles.values() else others)[recorded.schema.name] = self._text(
+                recorded.schema
+            )
+        return message_types(list(ours.items()), str(self.path), list(others.items()))
+
+    def _text(self, schema: Schema) -> str:
+        try:
+            return schema.data.decode()
+        except UnicodeDecodeError as error:
+            raise RecordingError(f"{self.path}: a definition of a message is no text: {error}") from None
+
+    def _of(self, topic: str) -> _Recorded:
+        name = self.name_of(topic)
+        if name in self._topics:
+            return self._topics[name]
+        raise RecordingError(f"{self.path}: no topic {name}, only {', '.join(sorted(self.topics))}")
+
+    def _stamps(self, topic: str, messages: list[bytes]) -> NDArray[np.int64]:
+        """Return the stamps that the messages of a step topic begin with, right behind the header of the CDR."""
+        if any(len(message) < _STAMP_END for message in messages):
+            raise RecordingError(f"{self.path}: topic {topic}: a message of less than {_STAMP_END} bytes")
+        order = ">" if messages and messages[0].startswith(_BIG_ENDIAN) else "<"
+        raw = b"".join(message[_STAMP_START:_STAMP_END] for message in messages)
+        stamps = np.frombuffer(raw, np.dtype([("sec", f"{order}i4"), ("nanosec", f"{order}u4")]))
+        return np.asarray(stamps["sec"].astype(np.int64) * 10**9 + stamps["nanosec"])
+
+    @cached_property
+    def _step_topics(self) -> frozenset[str]:
+        return frozenset(name for role, name in self.roles.items() if role in TOPICS)
+
+    @cached_property
+    def _clock(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Log times at which steps were received, ascending, and the latest stamp received until then."""
+        steps = sorted(self._step_topics)
+        received = np.concatenate([np.array([], np.int64), *(self._topics[topic].log_times for topic in steps)])
+        stamps = np.concatenate([np.array([], np.int64), *(self.times(topic) for topic in steps)])
+        order = np.argsort(received, kind="stable")
+        return received[order].astype(np.int64), np.maximum.accumulate(stamps[order].astype(np.int64))
+
+    def _read(self) -> None:
+        metadata = read_metadata(self.folder)
+        counts = message_counts(metadata)
+        recorded_by: dict[str, Any] = metadata
+        for file in self.files:
+            data = read_file(file)
+            scan = Scan(data)
+            # Of several files, one that is nothing any more is a damage.
+            if len(self.files) == 1 and not data:
+                raise RecordingError(f"{file}: is empty, expected an MCAP file")
+            if len(self.files) == 1 and not scan.is_mcap:
+                raise RecordingError(f"{file}: is not an MCAP file (starts with {data[:8].hex(' ')})")
+            found, orphans, attachments, rosbag2 = self._read_file(scan)
+            recorded_by = rosbag2 or recorded_by
+            self.complete &= scan.closed
+            self.loss.damages += [(file, damage) for damage in scan.damages]
+            statistics = scan.statistics
+            expected = statistics.message_count if statistics else counts.get(file.name)
+            self.loss.counted &= expected is not None or not scan.damages
+            self.loss.messages += max((scan.indexed if expected is None else expected) - found, orphans, 0)
+            self.loss.attachments += max(statistics.attachment_count - attachments, 0) if statistics else 0
+        self.loss.counted &= not self.loss.files
+        self.custom_data = self.custom_data or custom_data(recorded_by)
+        self.distro = str(recorded_by.get("ros_distro") or DISTRO)
+        kinds = {name: recorded.schema.name for name, recorded in self._topics.items()}
+        self.roles = roles(kinds, self.custom_data, str(self.path))
+        self.namespace = namespace_of(self.roles)
+
+    def _read_file(self, scan: Scan) -> tuple[int, int, int, dict[str, Any]]:
+        """Add what a file holds; return the messages read, those of unknown topics, attachments, rosbag2's metadata."""
+        unpack, size = MESSAGE_HEADER.unpack_from, MESSAGE_HEADER.size
+        schemas: dict[int, Schema] = {}
+        channels: dict[int, Channel] = {}
+        # Channels of one topic share their lists, in the order of the file.
+        lists: dict[int, tuple[list[int], list[bytes]]] = {}
+        attachments = 0
+        rosbag2: dict[str, Any] = {}
+        for opcode, body in scan.records():
+            match opcode:
+                case Opcode.MESSAGE:
+                    channel_id, _, time, _ = unpack(body)
+                    if channel_id not in lists:  # its channel is lost, or stands in the summary only
+                        lists[channel_id] = [], []
+                    times, messages = lists[channel_id]
+                    times.append(time)
+                    messages.append(bytes(body[size:]))
+                case Opcode.SCHEMA:
+                    schema = Schema.read(content(body))
+                    schemas.setdefault(schema.id, schema)  # the first has the checksum of its chunk
+                case Opcode.CHANNEL:
+                    channel = Channel.read(content(body))
+                    if channel.id not in channels:
+                        channels[channel.id] = channel
+                        first = next(c.id for c in channels.values() if c.topic == channel.topic)
+                        shared, early = lists.setdefault(first, ([], [])), lists.get(channel.id)
+                        if early is not None and early is not shared:
+                            shared[0].extend(early[0])
+                            shared[1].extend(early[1])
+                        lists[channel.id] = shared
+                case Opcode.ATTACHMENT:
+                    attached = Attachment.read(content(body))
+                    attachments += 1
+                    self.attachments[attached.name] = attached.data
+                    self.media_types[attached.name] = attached.media_type
+                case Opcode.METADATA:
+                    metadata = Metadata.read(content(body))
+                    if metadata.name == CUSTOM_DATA:
+                        self.custom_data |= metadata.metadata
+                    elif metadata.name == ROSBAG2:
+                        rosbag2 = parsed(metadata.metadata.get(SERIALIZED, "")) or rosbag2
+        for channel in list(channels.values()):
+            try:
+                self._declare(channel, schemas.get(channel.schema_id))
+            except RecordingError:
+                if not scan.damages:
+                    raise
+                del channels[channel.id]  # its definition is lost, or not what it was
+        read = 0
+        for topic, number in {channel.topic: channel.id for channel in channels.values()}.items():
+            found = [(time, read_message(data)) for time, data in zip(*lists[number], strict=True)]
+            whole = [(time, message) for time, message in found if message is not None]
+            read += len(whole)
+            if topic in self._topics:
+                self._topics[topic].log_times += [time for time, _ in whole]
+                self._topics[topic].messages += [message for _, message in whole]
+        orphans = sum(len(times) for number, (times, _) in lists.items() if number not in channels)
+        return read, orphans, attachments, rosbag2
+
+    def _declare(self, channel: Channel, schema: Schema | None) -> None:
+        """Take up the topic of a channel; one of somebody else's whose messages cannot be decoded is left out."""
+        name = channel.topic
+        decodable = schema is not None and (schema.encoding, channel.message_encoding) == ("ros2msg", "cdr")
+        if not decodable and not _is_ours(name):
+            return
+        if schema is None or not decodable:
+            raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
+        if schema.name not in (expected := _USUAL.get(name, (schema.name,))):
+            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected[0]}")
+        first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
+        if (schema.name, schema.data) != (first.name, first.data):
+            raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")
+
+    def _check(self) -> None:
+        if not self._topics and self.loss.damages:
+            file, damage = self.loss.damages[0]
+            raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
+        if not self._topics and not self.complete:
+            raise RecordingError(f"{self.path}: is truncated before its first messages")
+        if not any(_OURS in topic for topic in (*self._topics, *map(resolved, self.roles))):
+            raise RecordingError(f"{self.path}: has no topic below {_OURS}, expected a bag of this project")
+
+
+def _is_ours(topic: str) -> bool:
+    return topic in _USUAL or _OURS in topic

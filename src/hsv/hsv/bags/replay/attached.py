@@ -1,0 +1,228 @@
+"""Origin of a bag: the parameters attached to it, and what was changed in flight."""
+
+from __future__ import annotations
+
+import mimetypes
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.bags.description import (
+    ACTUATOR,
+    COMMAND,
+    FAULT_INJECTOR,
+    NOMINAL,
+    NOMINAL_TRAJECTORY,
+    NOTCH_FILTER,
+    PLANT,
+    REFERENCE,
+    STATE,
+    TOPICS,
+    TUBE_MPC,
+    TUBE_STATUS,
+)
+from hsv.bags.exchange import active_faults
+from hsv.bags.flight import input_columns
+from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
+from hsv.bags.parameter_sections import ParameterSections
+from hsv.bags.reader import Bag
+from hsv.bags.steps import cut_off, expected_stamps, joined
+from hsv.bags.track import expecting_fields
+from hsv.base.errors import DesignError, ParameterError, RecordingError
+from hsv.base.parameters import check_all
+from hsv.control.certificate import CERTIFICATE_PARAMETERS, design_files
+from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.design import ControlDesign
+from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.reference_trajectory import COLUMNS
+from hsv.control.tube_factor import TAU, change_parameters, rigid_factors, scheduled_changes
+from hsv.flight.assembly import blamed_on
+from hsv.flight.scenario import parse_scenario, scenario_text
+from hsv.model.faults.injector import FaultInjector
+from hsv.model.vehicle import vehicle_label
+
+DESIGN, SCENARIO = "design.yaml", "scenario.yaml"
+"""Attachments: the parameters of the design and, over them, those of the scenario."""
+
+_OF_THE_RUN = {
+    p.name for p in (*PACE_PARAMETERS, *RECORDER_PARAMETERS, *CERTIFICATE_PARAMETERS, *LOCKSTEP_PARAMETERS)
+} - {p.name for p in (*CONTROLLER_PARAMETERS, ESTIMATOR_ENABLED)}
+"""Parameters that say how and where the flight was made, such as its pace and files, and nothing of the flight."""
+
+LEAST_ACTIVE_TIME = 10.0
+"""Seconds of simulated time for which the controller must have done something."""
+
+ACTIVE_INPUT = 1e-6
+"""Deviation of a command from the reference input (-, rad) from which on the controller does something."""
+
+
+def supply(bag: Bag, design: Path | None, scenario: str | None) -> None:
+    """Give a bag attachments that it does not have, or replace its own, as if it had been flown with them.
+
+    Args:
+        bag: Any bag of a flight.
+        design: Parameter file of the design; where none is given, that of ``scenario``.
+        scenario: Name of a shipped scenario, or path of a TOML file.
+
+    Raises:
+        ScenarioError: The scenario is not acceptable.
+        DesignError: The design is not acceptable.
+    """
+    files = {}
+    if scenario is not None:
+        text = scenario_text(scenario)
+        parsed = parse_scenario(text, Path(scenario).stem)
+        files = {"scenario.toml": text, SCENARIO: ParameterSections(parsed.parameters()).to_yaml()}
+        with blamed_on(parsed):
+            design = design or find_design(parsed.design)
+    if design is not None:
+        read_design(design)
+        files |= design_files(design)
+    for name, content in files.items():
+        bag.attachments[name] = content.encode()
+        bag.media_types[name] = mimetypes.guess_type(name)[0] or "text/plain"
+
+
+def flown_parameters(bag: Bag, design: Path | None = None) -> ParameterSections:
+    """Return the parameters of the nodes in a recorded run, with what was changed in flight: faults, tau, commands.
+
+    Args:
+        bag: A bag of our recorder, or one that :func:`supply` gave what it lacks.
+        design: Parameter file to put in place of the attached design.
+
+    Raises:
+        RecordingError: The bag carries no parameters, or none that are acceptable.
+        DesignError: ``design`` is not acceptable.
+    """
+    for name in (DESIGN, SCENARIO):
+        if name not in bag.attachments:
+            raise RecordingError(
+                f"{bag.path}: no attachment {name}: ros2 bag record and convert keep none, expected --scenario "
+                "NAME|FILE and, where the flight had another design than the scenario's, --design FILE"
+            )
+    designed, scenario = (_attached(bag, name) for name in (DESIGN, SCENARIO))
+    values = designed.overlaid(scenario)
+    with expecting_fields(bag.path):
+        try:
+            # Of these nodes alone: others may have another design, which is not certified for the same factors.
+            changed = {
+                FAULT_INJECTOR.name: _faults_as_flown(bag, values.of(FAULT_INJECTOR.name)),
+                TUBE_MPC.name: _tau_as_flown(bag, values),
+                NOMINAL_TRAJECTORY.name: _commands_as_flown(bag),
+            }
+        except (DesignError, ParameterError) as error:
+            raise RecordingError(f"{bag.path}: attached {error}") from error
+    if design is not None:
+        values = ParameterSections(read_parameters(design)).overlaid(scenario)
+    return values.overlaid(ParameterSections({}, changed))
+
+
+def _attached(bag: Bag, name: str) -> ParameterSections:
+    """Return attached parameters of a flight; of a vehicle that was in a file, which is not read, what it is called."""
+    sections = ParameterSections.parse(bag.text(name), f"{bag.path}: {name}")
+    for flat in (sections.shared, *sections.own.values()):
+        if "vehicle.name" in flat:
+            flat["vehicle.name"] = vehicle_label(str(flat["vehicle.name"]))
+    return sections.only(sections.names - _OF_THE_RUN)
+
+
+def controller_of(values: ParameterSections) -> str:
+    """Return the controller that these parameters choose, as a scenario names it; nothing is loaded."""
+    return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
+
+
+def estimated(values: ParameterSections) -> bool:
+    """Tell whether an estimator flies with these parameters."""
+    return bool(check_all((ESTIMATOR_ENABLED,), values.of(NOTCH_FILTER.name))[ESTIMATOR_ENABLED.name])
+
+
+def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:
+    """Return the number of steps, up to the first that is missing, of which the bag has every one of ``topics``.
+
+    Without ``topics``: of all step topics that it has.
+
+    Raises:
+        RecordingError: A topic is missing.
+    """
+    stamps = [bag.times(topic) for topic in topics or [topic for topic in TOPICS if topic in bag.roles]]
+    present = np.all([np.isin(expected_stamps(bag), stamp) for stamp in stamps], axis=0)
+    return min(*map(len, stamps), len(present) if present.all() else int(np.argmin(present)))
+
+
+def broken_off(bag: Bag) -> bool:
+    """Whether the run ended before its planned end: killed, interrupted, or recovered from a killed recorder."""
+    status = bag.columns(STATE)["status"]
+    return not len(status) or int(status[-1]) == 0 or cut_off(bag)
+
+
+def refuse_vacuous(bag: Bag) -> None:
+    """Refuse a bag that would prove nothing.
+
+    Raises:
+        RecordingError: The controller was active for less than ten seconds of simulated time, or there is no step.
+    """
+    command, nominal = joined(bag, (COMMAND, NOMINAL)).values()
+    deviation = input_columns(command) - input_columns(nominal, "reference_input.")
+    active = np.abs(deviation).max(axis=1, initial=0.0) > ACTIVE_INPUT
+    stamps = nominal["header.stamp"] * 1e-9
+    period = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    seconds = np.count_nonzero(active) * period
+    if seconds < LEAST_ACTIVE_TIME:
+        raise RecordingError(
+            f"{bag.path}: the controller was active for {seconds:.2f} s, "
+            f"expected at least {LEAST_ACTIVE_TIME:g} s: a replay would prove nothing"
+        )
+
+
+def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the fault parameters that give the recorded active set, the attached schedule changed where it was not."""
+    injector = FaultInjector.from_parameters(values)
+    command = np.zeros(2)
+    changed = False
+    for _, status in bag.decode(ACTUATOR):
+        recorded = active_faults(status)
+        planned = injector.acting(status.step)
+        if planned != recorded:
+            changed = True
+            for fault, _ in set(planned) - set(recorded):
+                injector.clear(fault.channel, fault.type)
+            for fault, since in recorded:
+                if (fault, since) not in planned:
+                    injector.inject(fault)
+        injector.step(status.step, command)
+    return injector.parameters() if changed else {}
+
+
+def _commands_as_flown(bag: Bag) -> dict[str, Any]:
+    """Return the parameters of the reference that was flown, none where nothing was commanded in flight."""
+    published = [message for _, message in bag.decode(REFERENCE)] if REFERENCE in bag.roles else []
+    if not published or published[-1].step == 0:
+        return {}
+    return {f"reference.{name}": np.asarray(getattr(published[-1], name)).tolist() for name in COLUMNS}
+
+
+def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
+    """Return the parameters of tau that give the recorded factors, none where the attached ones do."""
+    if controller_of(sections) != TUBE_MPC.name:
+        return {}
+    recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]
+    if recorded_status and not np.shape(recorded_status[0].tau):
+        raise RecordingError(
+            f"{bag.path}: topic {bag.name_of(TUBE_STATUS)}: recorded with another definition, one number for tau"
+        )
+    values = sections.of(TUBE_MPC.name)
+    design = ControlDesign.from_parameters(values)
+    schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]
+    flown: list[tuple[int, np.ndarray]] = []
+    planned = []
+    for status in recorded_status:
+        recorded = rigid_factors(status.tau, TAU.name)
+        if not flown or np.any(recorded != flown[-1][1]):
+            flown.append((status.step, recorded))
+        planned.append(np.all(recorded == [tau for start, tau in schedule if start <= status.step][-1]))
+    if all(planned):
+        return {}
+    return {TAU.name: flown[0][1].tolist(), **change_parameters(flown[1:], design.period)}

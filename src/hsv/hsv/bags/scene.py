@@ -1,0 +1,123 @@
+"""A bag with pictures: an MCAP file with its messages and, beside them, what a viewer draws the vehicle from."""
+
+from __future__ import annotations
+
+import json
+from heapq import merge
+from pathlib import Path
+
+import numpy as np
+from mcap.writer import CompressionType, Writer
+
+from hsv.bags.columns import Columns
+from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TUBE_STATUS
+from hsv.bags.equipment import effectors, equipment_topics
+from hsv.bags.flight import input_columns, state_columns
+from hsv.bags.metadata import CUSTOM_DATA
+from hsv.bags.overview import OVERVIEW_SCHEMA, OVERVIEW_TOPIC, OVERVIEW_TYPE, overview_message
+from hsv.bags.reader import Bag
+from hsv.bags.steps import joined
+from hsv.base.errors import RecordingError
+from hsv.model.airframe.pose import Sample
+from hsv.model.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
+from hsv.model.dynamics import INPUT_NAMES, STATE_NAMES
+
+Message = tuple[int, str, bytes]
+"""Time in nanoseconds, topic, data."""
+
+
+def scene_path(bag: Bag) -> Path:
+    """Return where the file of ``bag`` lies unless somebody wants it elsewhere: in a folder of the bag's own."""
+    return bag.folder / "scene" / f"{bag.path.stem}_scene.mcap"
+
+
+def scene_of(bag: Bag) -> Path:
+    """Return the file of ``bag`` with pictures, written now unless there is one that is no older than the bag.
+
+    Raises:
+        RecordingError: See :func:`write_scene`.
+    """
+    target = scene_path(bag)
+    if not target.is_file() or target.stat().st_mtime < bag.path.stat().st_mtime:
+        target.unlink(missing_ok=True)
+        write_scene(bag, target)
+    return target
+
+
+def write_scene(bag: Bag, target: Path, exaggeration: float | None = None) -> None:
+    """Write ``target``: the messages and attachments of ``bag``, and the vehicle as a Foxglove scene with its frames.
+
+    Args:
+        bag: A flight.
+        target: New MCAP file.
+        exaggeration: Factor on the bending; default: that of the airframe.
+
+    Raises:
+        RecordingError: The bag holds no flight, or the file exists or cannot be written.
+    """
+    pictures = _pictures(bag, exaggeration)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with target.open("xb") as stream:
+            writer = Writer(stream, compression=CompressionType.ZSTD)
+            writer.start(profile="ros2")
+            channels = _channels(writer, bag)
+            recorded = [[(time, topic, data) for time, data in bag.messages(topic)] for topic in bag.topics]
+            for time, topic, data in merge(pictures, *recorded, key=lambda message: message[0]):
+                writer.add_message(channels[topic], time, data, time)
+            for name, data in bag.attachments.items():
+                writer.add_attachment(0, 0, name, bag.media_types[name], data)
+            if bag.custom_data:
+                writer.add_metadata(CUSTOM_DATA, bag.custom_data)
+            writer.finish()
+    except FileExistsError:
+        raise RecordingError(f"out = {str(target)!r}: exists already, expected a new file") from None
+    except OSError as error:
+        raise RecordingError(f"{target}: cannot be written: {error.strerror}, expected an MCAP file to write") from None
+
+
+def _channels(writer: Writer, bag: Bag) -> dict[str, int]:
+    """Register every topic; return the channels by the name of the topic."""
+    channels, schemas = {}, {}
+    for name, topic in bag.topics.items():
+        if topic.type not in schemas:
+            schemas[topic.type] = writer.register_schema(topic.type, "ros2msg", bag.definition(name).encode())
+        metadata = {"offered_qos_profiles": bag.qos(name).as_yaml(), "topic_type_hash": topic.type_hash}
+        channels[name] = writer.register_channel(name, "cdr", schemas[topic.type], metadata)
+    for name, message in ((SCENE_TOPIC, scene(0)), (TRANSFORMS_TOPIC, frame_transforms(Sample(*[0.0] * 6), 0))):
+        schema = message.get_schema()
+        number = writer.register_schema(schema.name, schema.encoding, schema.data)
+        channels[name] = writer.register_channel(name, "protobuf", number)
+    number = writer.register_schema(OVERVIEW_TYPE, "jsonschema", json.dumps(OVERVIEW_SCHEMA).encode())
+    channels[OVERVIEW_TOPIC] = writer.register_channel(OVERVIEW_TOPIC, "json", number)
+    return channels
+
+
+def _pictures(bag: Bag, exaggeration: float | None) -> list[Message]:
+    """Return what is added, in the order of time."""
+    topics = dict.fromkeys((STATE, ACTUATOR, NOMINAL, *equipment_topics(bag)))
+    if TUBE_STATUS in bag.roles:
+        topics[TUBE_STATUS] = None
+    columns = joined(bag, list(topics))
+    stamps = columns[STATE]["header.stamp"].tolist()
+    inputs = dict(zip(INPUT_NAMES, input_columns(columns[ACTUATOR]).T, strict=True))
+    for name, were in effectors(columns).items():
+        inputs[name] = np.where(np.isfinite(were), were, inputs[name])
+    states = dict(zip(STATE_NAMES, state_columns(columns[STATE]).T, strict=True))
+    drawn = np.stack([(states | inputs)[name] for name in Sample._fields], axis=1)
+    nominal = state_columns(columns[NOMINAL], "reference.") + state_columns(columns[NOMINAL], "deviation.")
+    tube = columns.get(TUBE_STATUS, Columns())
+    centre, half = (tube.get(name, [()] * len(stamps)) for name in ("tube_centre", "tube_half_width"))
+
+    active = columns[ACTUATOR]["active"]
+
+    found: list[Message] = [(stamps[0], SCENE_TOPIC, scene(stamps[0], exaggeration).encode())]
+    due = stamps[0]
+    for row, stamp in enumerate(stamps):
+        faults = [(fault["channel"], fault["type"]) for fault in active[row]]
+        found.append((stamp, OVERVIEW_TOPIC, overview_message(nominal[row], centre[row], half[row], faults)))
+        if stamp >= due and np.isfinite(drawn[row]).all():
+            message = frame_transforms(Sample(*drawn[row].tolist()), stamp, exaggeration)
+            found.append((stamp, TRANSFORMS_TOPIC, message.encode()))
+            due = stamp + round(1e9 / RATE)
+    return found

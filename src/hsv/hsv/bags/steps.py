@@ -1,0 +1,145 @@
+"""Steps for which the topics of a bag have messages, and rows of the same step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsv.bags.columns import Columns
+from hsv.bags.description import RUN, STATE, TOPICS
+from hsv.bags.reader import Bag
+from hsv.bags.recover import RECOVERED
+from hsv.base.errors import RecordingError
+
+
+def cut_off(bag: Bag) -> bool:
+    """Whether the last messages may be missing: the recorder was killed, even if the bag was completed since."""
+    return not bag.complete or RECOVERED.items() <= bag.custom_data.items()
+
+
+def joined(bag: Bag, topics: Sequence[str]) -> dict[str, Columns]:
+    """Return the columns of ``topics`` row by row of the same step: the steps that all of them have, in order.
+
+    Raises:
+        RecordingError: A topic is missing or carries no step, or there is no step that all have.
+    """
+    columns = {topic: bag.columns(topic) for topic in topics}
+    steps = [found["step"] for found in columns.values()]
+    common = steps[0]
+    for found in steps:
+        common = np.intersect1d(common, found)
+    if not len(common):
+        raise RecordingError(f"{bag.path}: holds no complete step, expected a flight")
+    if all(np.array_equal(found, common) for found in steps):
+        return columns
+    rows = {}
+    for topic, found in zip(topics, steps, strict=True):
+        present, first = np.unique(found, return_index=True)
+        rows[topic] = columns[topic].rows(first[np.searchsorted(present, common)])
+    return rows
+
+
+def expected_stamps(bag: Bag) -> NDArray[np.int64]:
+    """Return the stamps, in nanoseconds, of all steps that the bag should hold.
+
+    They are those that the plant announced on /hsv/run, up to the state that it called the last. Of a bag without an
+    announcement they end with the last step that any topic has.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    found = np.unique(np.concatenate([np.array([], np.int64), *_stamps(bag).values()]))
+    announced = _announced(bag) or _numbered(bag)
+    if not announced:
+        return found
+    period, last = announced
+    state = bag.columns(STATE) if STATE in bag.roles else Columns()
+    if {"status", "step"} <= state.keys() and len(ends := np.flatnonzero(state["status"])):
+        last = int(state["step"][ends[0]])
+    return np.union1d(np.round(np.arange(last + 1) * period * 1e9).astype(np.int64), found)
+
+
+def _announced(bag: Bag) -> tuple[float, int] | None:
+    """Return period and last step of the run as the plant announced it, None where it is not in the bag."""
+    columns = bag.columns(RUN) if RUN in bag.roles else Columns()
+    if not {"period", "last_step"} <= columns.keys() or not len(columns["period"]):
+        return None
+    return float(columns["period"][-1]), int(columns["last_step"][-1])
+
+
+def _numbered(bag: Bag) -> tuple[float, int] | None:
+    """Return the period, and the last step, that the recorded steps tell by their number."""
+    last: tuple[float, int] | None = None
+    for topic, stamps in _stamps(bag).items():
+        steps = bag.columns(topic).get("step", np.array([], np.uint64))
+        if len(steps) and (number := int(steps.max())) > (last[1] if last else 0):
+            last = float(stamps[np.argmax(steps)]) * 1e-9 / number, number
+    return last
+
+
+def _stamps(bag: Bag) -> dict[str, NDArray[np.int64]]:
+    return {bag.name_of(topic): bag.times(topic) for topic in TOPICS if topic in bag.roles}
+
+
+def complete_stamps(bag: Bag) -> NDArray[np.int64]:
+    """Return the stamps of the steps of which the bag has every step topic that it has at all."""
+    stamps = list(_stamps(bag).values())
+    common = np.unique(stamps[0]) if stamps else np.array([], np.int64)
+    for stamp in stamps:
+        common = np.intersect1d(common, stamp)
+    return common
+
+
+def lost_seconds(bag: Bag) -> float:
+    """Return the simulated time of the steps that are missing in the bag, or have not all of its topics.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    stamps = expected_stamps(bag)
+    if len(stamps) < 2:
+        return 0.0
+    missing = len(np.setdiff1d(stamps, complete_stamps(bag)))
+    return missing * float(np.median(np.diff(stamps))) * 1e-9
+
+
+def irregularities(bag: Bag) -> list[str]:
+    """Say which steps are missing, on all topics or on some, or twice or out of order; nothing of a whole bag.
+
+    Of a bag that is truncated, the steps count that all topics have reached.
+
+    Raises:
+        RecordingError: A message does not fit its definition.
+    """
+    stamps = _stamps(bag)
+    every = expected_stamps(bag)
+    found = np.unique(np.concatenate([np.array([], np.int64), *stamps.values()]))
+    if not len(found):
+        return []
+    words = []
+    if (end := int(every[-1])) > found[-1]:
+        words.append(f"ends at t = {found[-1] * 1e-9:.2f} s of {end * 1e-9:.2f} s")
+        every = every[every <= found[-1]]
+    if cut_off(bag):
+        reached = min(int(stamp.max(initial=-1)) for stamp in stamps.values())
+        every, found = every[every <= reached], found[found <= reached]
+    nowhere = np.setdiff1d(every, found)
+    if len(nowhere):
+        first = f"the first at t = {nowhere[0] * 1e-9:.2f} s"
+        words.append(f"lacks {len(nowhere)} of {len(every)} steps on all topics, {first}")
+    # Topics that are recorded together lack the same.
+    lacking: dict[tuple[int, ...], list[str]] = {}
+    for topic, stamp in stamps.items():
+        if len(missing := np.setdiff1d(found, stamp)):
+            lacking.setdefault(tuple(missing.tolist()), []).append(topic)
+    for missed, topics in lacking.items():
+        first = f"the first at t = {missed[0] * 1e-9:.2f} s"
+        more = "more " if len(nowhere) else ""
+        verb = "lacks" if len(topics) == 1 else "lack"
+        words.append(f"{', '.join(topics)} {verb} {len(missed)} {more}of {len(every)} steps, {first}")
+    for topic, stamp in stamps.items():
+        if len(late := stamp[1:][stamp[1:] <= stamp[:-1]]):
+            words.append(f"{topic} is out of order at t = {late[0] * 1e-9:.2f} s")
+    return words

@@ -1,0 +1,112 @@
+"""Description of a topic in a bag: name, type, definition, type hash and offered quality of service."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+
+from hsv.base.documents import parse_yaml
+from hsv.base.errors import DocumentError
+
+INFINITE = 2**63 - 1
+"""An endless duration in nanoseconds; rendered as ROS 2 does: sec 9223372036, nsec 854775807."""
+
+
+def _duration(nanoseconds: int) -> dict[str, int]:
+    sec, nsec = divmod(nanoseconds, 10**9)
+    return {"sec": sec, "nsec": nsec}
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """A quality-of-service profile in the words of rosbag2; the durations in nanoseconds."""
+
+    history: str = "keep_last"
+    depth: int = 10
+    reliability: str = "reliable"
+    durability: str = "volatile"
+    """``transient_local`` for latched topics; a player must offer them with the same durability."""
+    deadline: int = INFINITE
+    lifespan: int = INFINITE
+    liveliness: str = "automatic"
+    liveliness_lease_duration: int = INFINITE
+    avoid_ros_namespace_conventions: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the nine keys that rosbag2 demands of a profile."""
+        return {
+            "history": self.history,
+            "depth": self.depth,
+            "reliability": self.reliability,
+            "durability": self.durability,
+            "deadline": _duration(self.deadline),
+            "lifespan": _duration(self.lifespan),
+            "liveliness": self.liveliness,
+            "liveliness_lease_duration": _duration(self.liveliness_lease_duration),
+            "avoid_ros_namespace_conventions": self.avoid_ros_namespace_conventions,
+        }
+
+    @classmethod
+    def from_yaml(cls, text: str) -> Qos:
+        """Return the first profile of the text that :meth:`as_yaml` makes, with defaults for missing entries."""
+        profiles = readable_profiles(text) or [{}]
+        given = {key: value for key, value in profiles[0].items() if key in cls.__dataclass_fields__}
+        for key, value in given.items():
+            if isinstance(value, dict):
+                given[key] = int(value["sec"]) * 10**9 + int(value["nsec"])
+        return cls(**given)
+
+    def as_yaml(self) -> str:
+        """Return the profile as the list of one profile that the metadata of an MCAP channel carries as text."""
+        return yaml.safe_dump([self.as_dict()], sort_keys=False)
+
+
+def readable_profiles(text: str) -> list[dict[str, Any]]:
+    """Return the profiles in the metadata of a channel, with defaults for damaged entries."""
+    try:
+        profiles = parse_yaml(text)
+    except DocumentError:
+        return []
+    if not isinstance(profiles, list) or not all(isinstance(profile, dict) for profile in profiles):
+        return []
+    usual = Qos().as_dict()
+    return [{key: _sound(key, profile.get(key), default) for key, default in usual.items()} for profile in profiles]
+
+
+def repaired_profiles(text: str) -> str:
+    """Return the ``text`` of profiles, repaired if it is damaged; empty if nothing of it is left."""
+    profiles = readable_profiles(text)
+    if not profiles:
+        return ""
+    return text if profiles == parse_yaml(text) else yaml.safe_dump(profiles, sort_keys=False)
+
+
+_WORDS = {
+    "history": {"keep_last", "keep_all", "system_default", "unknown"},
+    "reliability": {"reliable", "best_effort", "system_default", "best_available", "unknown"},
+    "durability": {"volatile", "transient_local", "system_default", "best_available", "unknown"},
+    "liveliness": {"automatic", "manual_by_topic", "system_default", "best_available", "unknown"},
+}
+
+
+def _sound(key: str, value: Any, default: Any) -> Any:
+    if isinstance(default, dict):
+        times = value if isinstance(value, dict) else {}
+        return value if all(isinstance(times.get(part), int) for part in default) else default
+    return value if isinstance(value, type(default)) and value in _WORDS.get(key, (value,)) else default
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic of a bag."""
+
+    name: str
+    type: str
+    """``package/msg/Type``."""
+    definition: str
+    """The .msg text with its dependencies; see :func:`hsv.bags.definitions.definition`."""
+    type_hash: str
+    """``RIHS01_`` and 64 hexadecimal digits, or empty where it is not known."""
+    qos: Qos

@@ -1,0 +1,87 @@
+"""The messages of one topic, from a bag or made in a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
+
+from hsv.bags.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
+from hsv.bags.description import TOPIC_OF
+from hsv.base.errors import RecordingError, SignalError
+
+
+@contextmanager
+def expecting_fields(source: object) -> Iterator[None]:
+    """Convert a field that the definition of a message does not have, or that no block can take, into a clear error.
+
+    Raises:
+        RecordingError: It names ``source``, the message's type or the topic, and the field.
+    """
+    try:
+        yield
+    except AttributeError as error:
+        if not (kind := getattr(error.obj, "__msgtype__", None)):
+            raise
+        raise RecordingError(
+            f"{source}: {kind}: recorded with another definition, expected a field {error.name}"
+        ) from None
+    except SignalError as error:
+        raise RecordingError(f"{source}: topic {TOPIC_OF[error.signal]}: {error}") from error
+
+
+@dataclass(frozen=True)
+class Track:
+    """Messages of one topic in their order."""
+
+    topic: str
+    type: str
+    """``package/msg/Type``."""
+    types: Typestore
+    """Definitions of the type and of those it depends on."""
+    times: list[int]
+    """Simulated times in nanoseconds."""
+    data: list[bytes]
+    """CDR with its header of four bytes."""
+    source: str = ""
+    """Source of the messages, for error messages."""
+
+    def cut(self, count: int) -> Track:
+        """Return the first ``count`` messages."""
+        return self.rows(range(min(count, len(self.data))))
+
+    def rows(self, rows: Iterable[int]) -> Track:
+        """Return these messages."""
+        chosen = [(self.times[row], self.data[row]) for row in rows]
+        times, data = [time for time, _ in chosen], [message for _, message in chosen]
+        return Track(self.topic, self.type, self.types, times, data, self.source)
+
+    def columns(self) -> Columns:
+        """Return all messages decoded, one array per field; see :mod:`hsv.bags.columns`.
+
+        Raises:
+            RecordingError: A message does not fit its definition.
+        """
+        types, where = self.types.fielddefs, f"{self.source}: topic {self.topic}"
+        if self.data:
+            try:
+                return columns_at_once(types, self.type, self.data, where)
+            except NoCommonLayoutError:
+                pass
+        return columns_one_by_one(types, self.type, [message for _, message in self.decode()], where)
+
+    def decode(self) -> Iterator[tuple[int, Any]]:
+        """Yield time in nanoseconds and message, deserialized one by one.
+
+        Raises:
+            RecordingError: See :meth:`columns`.
+        """
+        for time, message in zip(self.times, self.data, strict=True):
+            try:
+                yield time, self.types.deserialize_cdr(message, self.type)
+            except SerdeError as error:
+                raise RecordingError(f"{self.source}: topic {self.topic}: message at {time} ns: {error}") from None

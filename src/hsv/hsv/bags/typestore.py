@@ -1,0 +1,61 @@
+"""The message types of a bag, made from the definitions that it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
+
+from hsv.bags.fields import TIMES, fields_of
+from hsv.base.errors import RecordingError
+
+
+def message_types(
+    definitions: Sequence[tuple[str, str]], source: str, optional: Sequence[tuple[str, str]] = ()
+) -> Typestore:
+    """Return the types of ``definitions``, complete: none refers to a type that is not there.
+
+    Args:
+        definitions: Name and text of each, in the ``ros2msg`` format of MCAP.
+        source: Source of the definitions, for error messages.
+        optional: More of them; what cannot be used of these is left out.
+
+    Raises:
+        RecordingError: A definition cannot be parsed, contradicts another, or refers to an unknown type or to itself.
+    """
+    store = get_typestore(Stores.EMPTY)
+    for name, text in definitions:
+        _register(store, name, text, f"{source}: definition of {name}")
+    for name, _ in definitions:
+        _check(store, name, (), f"{source}: definition of {name}")
+    for name, text in optional:
+        with suppress(RecordingError, TypesysError):
+            alone = get_typestore(Stores.EMPTY)
+            _register(alone, name, text, source)
+            _check(alone, name, (), source)
+            store.register(alone.fielddefs)
+    return store
+
+
+def _register(store: Typestore, name: str, text: str, where: str) -> None:
+    try:
+        store.register(get_types_from_msg(text, name))
+    except TypesysError as error:
+        raise RecordingError(f"{where}: {str(error).splitlines()[0]}") from None
+    except Exception as error:
+        # The library parses more than it can compile: a list as a constant, or one that is infinite.
+        raise RecordingError(f"{where}: cannot be used ({type(error).__name__})") from None
+
+
+def _check(store: Typestore, name: str, within: tuple[str, ...], where: str) -> None:
+    if name in within:
+        raise RecordingError(f"{where}: {name} holds itself")
+    if name not in store.fielddefs:
+        raise RecordingError(f"{where}: unknown type {name}")
+    for field in fields_of(store.fielddefs, name):
+        if field.length < 0:
+            raise RecordingError(f"{where}: field {field.name}: length {field.length}, expected a number not below 0")
+        if field.is_message and field.type not in TIMES:
+            _check(store, field.type, (*within, name), where)

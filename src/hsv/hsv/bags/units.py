@@ -1,0 +1,97 @@
+"""Units of the fields of a recorded topic, read from the comments of its message definition.
+
+A comment begins with the unit (``m/s``), or with the units of the elements of an array in turn (``rad, rad s: ...``);
+``then`` sets off those that repeat (``m, m/s, then rad, rad s: ...``). ``-`` stands for no unit. A comment that begins
+with anything else names none.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from rosbags.interfaces.typing import Typesdict
+
+from hsv.bags.definitions import SEPARATOR
+from hsv.bags.fields import fields_of
+
+KNOWN = ("-", "s", "m", "m/s", "rad", "rad/s", "rad s", "kg^0.5 m", "kg^0.5 m/s", "N", "N m", "Pa")
+NANOSECONDS = "ns"
+"""Times and durations are exported as one number in this unit."""
+
+_FIELD = re.compile(r"^\s*[\w/]+(?:\[[^\]]*\])?(?:<=\d+)?\s+(?P<name>\w+)\s*(?:#\s*(?P<comment>.*))?$")
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of the elements of a field: the ``first`` ones, then the ``others`` in turn; a number is one element."""
+
+    first: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
+
+    def of(self, index: int = 0) -> str:
+        """Return the unit of an element, empty where none is known or it has none."""
+        if index < len(self.first):
+            unit = self.first[index]
+        elif self.others:
+            unit = self.others[(index - len(self.first)) % len(self.others)]
+        else:
+            unit = ""
+        return "" if unit == "-" else unit
+
+
+def units_of(definition: str, types: Typesdict, message_type: str) -> dict[str, Units]:
+    """Return the units of every field of a type, by field path as in :mod:`hsv.bags.columns`.
+
+    Args:
+        definition: The recorded definition with its dependencies.
+        types: The same, parsed.
+        message_type: ``package/msg/Type``.
+    """
+    comments = _comments(definition, message_type)
+    found: dict[str, Units] = {}
+
+    def walk(kind: str, prefix: str) -> None:
+        for field in fields_of(types, kind):
+            path = prefix + field.name
+            if field.is_time and field.count == "one":
+                found[path] = Units((NANOSECONDS,))
+            elif field.is_message and field.count == "one":
+                walk(field.type, path + ".")
+            else:
+                found[path] = parse_units(comments.get((kind, field.name), ""))
+
+    walk(message_type, "")
+    return found
+
+
+def parse_units(comment: str) -> Units:
+    """Return the units with which a comment begins."""
+    head = comment.partition(":")[0]
+    first, then, others = head.partition("then ")
+    if then:
+        return Units(_leading(first), _leading(others))
+    return Units((), _leading(head))
+
+
+def _leading(text: str) -> tuple[str, ...]:
+    units = []
+    for word in (word.strip() for word in text.split(",")):
+        if word not in KNOWN:
+            break
+        units.append(word)
+    return tuple(units)
+
+
+def _comments(definition: str, message_type: str) -> dict[tuple[str, str], str]:
+    comments = {}
+    for number, part in enumerate(definition.split(f"\n{SEPARATOR}\n")):
+        kind, text = message_type, part
+        if number:
+            head, _, text = part.partition("\n")
+            package, _, name = head.removeprefix("MSG: ").strip().partition("/")
+            kind = f"{package}/msg/{name.removeprefix('msg/')}"
+        for line in text.splitlines():
+            if match := _FIELD.match(line):
+                comments[kind, match["name"]] = match["comment"] or ""
+    return comments

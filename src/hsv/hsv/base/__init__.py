@@ -1,0 +1,1 @@
+"""Errors, units, files with limits, progress and interruption."""

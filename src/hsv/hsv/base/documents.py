@@ -1,0 +1,233 @@
+"""Files that people or programs wrote, and the TOML, YAML and JSON in them: read with a bound on every kind of work.
+
+Whatever a file holds, reading it ends, and ends with values or with one line: a pipe or a device, and what is too large
+or nested too deep, is refused before anything else is done with it.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import stat
+import tomllib
+from collections.abc import Callable
+from functools import partial
+from io import BufferedReader
+from pathlib import Path
+from typing import Any
+
+import yaml
+from yaml.composer import Composer
+from yaml.constructor import SafeConstructor
+from yaml.resolver import Resolver
+
+from hsv.base.errors import DocumentError, reason
+
+if yaml.__with_libyaml__:
+    from yaml.cyaml import CParser as _Parser  # type: ignore[attr-defined]
+else:
+    from yaml.parser import Parser
+    from yaml.reader import Reader
+    from yaml.scanner import Scanner
+
+    class _Parser(Reader, Scanner, Parser):  # type: ignore[no-redef]
+        def __init__(self, stream: str) -> None:
+            Reader.__init__(self, stream)
+            Scanner.__init__(self)
+            Parser.__init__(self)
+
+
+MOST_BYTES = 2**22
+"""Size of the largest text that is read; designs and certificates have less than a thirtieth of it."""
+
+MOST_LEVELS = 64
+"""Tables and lists in each other."""
+
+MOST_NODES = 10**6
+"""Values of a YAML text, those of aliases counted wherever they stand."""
+
+_MOST_DIGITS = 4000
+_LARGEST = 10**_MOST_DIGITS
+
+_LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}""")
+"""A dotted key that nests too deep: the parser takes a time that is the square of its length."""
+
+
+def open_regular(path: Path) -> BufferedReader:
+    """Return the file ``path``, open for reading.
+
+    Raises:
+        DocumentError: The system refuses, or it is no regular file, such as a pipe, from which reading need not end.
+    """
+    try:
+        # Of a pipe, opening alone would wait for somebody to write to it.
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as error:
+        raise DocumentError(f"cannot be read ({reason(error)})") from error
+    except ValueError as error:
+        raise DocumentError("cannot be read (a zero byte in its name)") from error
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        why = os.strerror(errno.EISDIR) if stat.S_ISDIR(mode) else "not a regular file"
+        raise DocumentError(f"cannot be read ({why})")
+    return os.fdopen(descriptor, "rb")
+
+
+def read_bytes(path: Path, most: int | None = None) -> bytes:
+    """Return the contents of the file ``path``, which may be larger than ``most`` bytes only if that is ``None``.
+
+    Raises:
+        DocumentError: See :func:`open_regular`; or the file is larger.
+    """
+    with open_regular(path) as stream:
+        if most is not None and os.fstat(stream.fileno()).st_size > most:
+            raise DocumentError(f"cannot be read (more than {most} bytes)")
+        try:
+            return stream.read()
+        except OSError as error:
+            raise DocumentError(f"cannot be read ({reason(error)})") from error
+
+
+def read_text(path: Path) -> str:
+    """Return the text in the file ``path``.
+
+    Raises:
+        DocumentError: See :func:`read_bytes`; or the file is not UTF-8.
+    """
+    try:
+        return read_bytes(path, MOST_BYTES).decode().replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise DocumentError("cannot be read (not text)") from error
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the tables in a TOML text.
+
+    Raises:
+        DocumentError: It is none, too long or nested too deep.
+    """
+    _check_length(text)
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise DocumentError(f"a key nested more than {MOST_LEVELS} levels deep (at line {line})")
+    return _parsed(text, tomllib.loads)
+
+
+def parse_json(text: str | bytes) -> Any:
+    """Return the value in a JSON text.
+
+    Raises:
+        DocumentError: It is none, too long or nested too deep, or a key stands twice in an object.
+    """
+    _check_length(text)
+    return _parsed(text, partial(json.loads, object_pairs_hook=_without_doubles))
+
+
+def parse_yaml(text: str) -> Any:
+    """Return the value in a YAML text, of plain types.
+
+    Raises:
+        DocumentError: It is none, too long or nested too deep, a key stands twice in a mapping, or aliases make it grow
+            beyond all bounds.
+    """
+    _check_length(text)
+    try:
+        values = yaml.load(text, _Loader)  # type: ignore[arg-type]
+    except (yaml.YAMLError, ValueError, OverflowError) as error:
+        raise DocumentError(" ".join(str(error).split()).replace(' in "<unicode string>",', " at")) from error
+    _check(values)
+    return values
+
+
+class _Loader(Composer, _Parser, SafeConstructor, Resolver):
+    """The safe loader on the events of the C library, whose own composer ends the process where nesting is deep."""
+
+    def __init__(self, stream: str) -> None:
+        _Parser.__init__(self, stream)
+        Composer.__init__(self)
+        SafeConstructor.__init__(self)
+        Resolver.__init__(self)
+        self._levels = self._nodes = 0
+        self._sizes: dict[Any, int] = {}
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Return the next node, as of the base class; keep count of levels, and of nodes with those of aliases."""
+        event, before = self.peek_event(), self._nodes
+        self._levels += 1
+        if self._levels > MOST_LEVELS:
+            raise _refused(f"nested more than {MOST_LEVELS} levels deep", event)
+        node = super().compose_node(parent, index)
+        self._levels -= 1
+        if not isinstance(event, yaml.AliasEvent):
+            self._nodes += 1
+            self._sizes[node] = self._nodes - before
+        elif node in self._sizes:
+            self._nodes += self._sizes[node]
+        else:
+            raise _refused(f"the alias {event.anchor!r} stands inside of what it is for", event)
+        if self._nodes > MOST_NODES:
+            raise _refused(f"more than {MOST_NODES} values", event)
+        return node
+
+    def compose_mapping_node(self, anchor: Any) -> Any:
+        """Return the next mapping, like the base class, and check that its keys differ."""
+        node = super().compose_mapping_node(anchor)
+        seen: set[tuple[str, str]] = set()
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode):
+                if (key.tag, key.value) in seen:
+                    raise _refused(f"the key {key.value!r} occurs twice", key)
+                seen.add((key.tag, key.value))
+        return node
+
+
+def _parsed(text: Any, parse: Callable[[Any], Any]) -> Any:
+    try:
+        values = parse(text)
+    except RecursionError as error:
+        raise _too_deep() from error
+    except ValueError as error:
+        raise DocumentError(str(error)) from error
+    _check(values)
+    return values
+
+
+def _refused(why: str, where: Any) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=why, problem_mark=where.start_mark)
+
+
+def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise ValueError(f"the key {next(name for name in names if names.count(name) > 1)!r} occurs twice")
+    return values
+
+
+def _check_length(text: str | bytes) -> None:
+    if len(text) > MOST_BYTES:
+        raise DocumentError(f"more than {MOST_BYTES} bytes")
+
+
+def _check(value: object) -> None:
+    """Refuse what is nested too deep for those who walk through it, and numbers that Python refuses to print."""
+    level = [value]
+    for _ in range(MOST_LEVELS + 1):
+        if any(isinstance(one, int) and abs(one) >= _LARGEST for one in level):
+            raise DocumentError(f"a whole number of more than {_MOST_DIGITS} digits")
+        level = [
+            entry
+            for one in level
+            if isinstance(one, dict | list)
+            for entry in (one.values() if isinstance(one, dict) else one)
+        ]
+        if not level:
+            return
+    raise _too_deep()
+
+
+def _too_deep() -> DocumentError:
+    return DocumentError(f"nested more than {MOST_LEVELS} levels deep")

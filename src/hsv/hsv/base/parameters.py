@@ -1,0 +1,208 @@
+"""Parameters of the components: one table a component, from which nodes declare and files are checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, cast
+
+from hsv.base.errors import ParameterError, did_you_mean
+from hsv.base.units import in_unit_of, is_finite, parse_quantity
+
+Value = bool | int | float | str | list[float] | list[str] | list[int]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter; its type is that of ``default``."""
+
+    name: str
+    """Dotted name, as in ROS 2."""
+    default: Value
+    """Value where nothing else is given; an empty list of floats stands for an array that a design must bring."""
+    description: str
+    """Short description."""
+    unit: str = ""
+    """SI unit, empty where it has none."""
+    minimum: float = -math.inf
+    """Least admissible number (of every element)."""
+    maximum: float = math.inf
+    """Largest admissible number (of every element)."""
+    choices: tuple[str, ...] = ()
+    """Admissible words; empty: any."""
+    read_only: bool = True
+    """Whether it is fixed once the node has started."""
+    whole: bool = False
+    """Whether only whole numbers are admissible, of steps or of an order, though they are written as doubles."""
+
+    @property
+    def kind(self) -> str:
+        """Name of the ROS 2 parameter type, e.g. ``double_array``."""
+        if isinstance(self.default, list):
+            return "string_array" if self.default and isinstance(self.default[0], str) else "double_array"
+        return {bool: "bool", int: "integer", float: "double", str: "string"}[type(self.default)]
+
+    @property
+    def constraint(self) -> str:
+        """Condition for a valid value, in words."""
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        words = _range(self.minimum, self.maximum)
+        if self.kind == "double_array":
+            words = words or " of finite numbers"
+        whole = ", whole" if self.whole else ""
+        return f"{self.kind.replace('_', ' ')}{words}{' ' + self.unit if self.unit else ''}{whole}"
+
+    def check(self, value: object) -> Any:
+        """Return ``value`` if it is admissible.
+
+        Raises:
+            ParameterError: Wrong type (an integer is not a double), not finite, not whole, outside the range or the
+                choices.
+        """
+        if self.kind.endswith("_array"):
+            if not isinstance(value, list | tuple) and not hasattr(value, "tolist"):
+                raise self.refusal(value)
+            element = str if self.kind == "string_array" else float
+            values = list(cast(Iterable[Any], value))
+            for index, entry in enumerate(values):
+                if not isinstance(entry, element) or (element is float and not self.admits(entry)):
+                    raise ParameterError(
+                        f"parameter {self.name}[{index}] = {_shown(entry)}: expected {self.constraint}"
+                    )
+            return values
+        expected = {"bool": bool, "integer": int, "double": float, "string": str}[self.kind]
+        if not isinstance(value, expected) or (expected is int and isinstance(value, bool)):
+            raise self.refusal(value)
+        if isinstance(value, str):
+            if self.choices and value not in self.choices:
+                raise self.refusal(value)
+        elif not isinstance(value, bool) and not self.admits(value):
+            raise self.refusal(value)
+        return value
+
+    def refusal(self, value: object) -> ParameterError:
+        """Return the error for an invalid ``value``, with a hint how to write a whole number."""
+        hint = ""
+        if self.kind == "double" and _is_whole(value):
+            hint = f" (write {float(cast(int, value))})"
+        elif self.kind == "double_array" and isinstance(value, Iterable) and not isinstance(value, str):
+            values = list(value)
+            if any(map(_is_whole, values)) and all(_is_whole(entry) or isinstance(entry, float) for entry in values):
+                hint = f" (write {_shown([float(entry) for entry in values])})"
+        shown = value.tolist() if hasattr(value, "tolist") else value
+        return ParameterError(f"parameter {self.name} = {_shown(shown)}: expected {self.constraint}{hint}")
+
+    def admits(self, value: object) -> bool:
+        """Tell whether a number is finite, within the range, and whole where it has to be."""
+        if not isinstance(value, int | float) or not is_finite(value):
+            return False
+        return self.minimum <= value <= self.maximum and (not self.whole or float(value).is_integer())
+
+
+def _range(low: float, high: float) -> str:
+    return {
+        (False, False): "",
+        (True, False): f" of at least {low:.10g}",
+        (False, True): f" of at most {high:.10g}",
+        (True, True): f" from {low:.10g} to {high:.10g}",
+    }[(math.isfinite(low), math.isfinite(high))]
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and is_finite(value)
+
+
+def _shown(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[str, Any]:
+    """Return the values of a whole table, defaults filled in; names that are not in the table are left out.
+
+    Raises:
+        ParameterError: A value that its parameter does not admit.
+    """
+    return {p.name: p.check(values.get(p.name, p.default)) for p in table}
+
+
+def read_number(parameter: Parameter, text: object, field: str) -> float:
+    """Return the number that a file has in ``text`` for a ``parameter``, or for an element of it, SI.
+
+    Raises:
+        ParameterError, QuantityError: No quantity in its unit, not whole, or out of its range, which is told in the
+            unit given.
+    """
+    whole = " a whole number" if parameter.whole else ""
+    # To Python a truth value is a number.
+    value = math.nan if whole and isinstance(text, bool) else parse_quantity(text, parameter.unit or "1", field)
+    if not parameter.admits(value):
+        raise ParameterError(f"{field} = {_shown(text)}: expected{whole}{limits_in_words(parameter, text)}")
+    return value
+
+
+def limits_in_words(parameter: Parameter, text: object) -> str:
+    """Return the range of a parameter with a space before it, in the unit in which the quantity ``text`` is written."""
+    ends, unit = in_unit_of((parameter.minimum, parameter.maximum), parameter.unit or "1", text)
+    return _range(*ends) + unit
+
+
+def table_values(
+    parameters: Iterable[Parameter], tables: Mapping[str, Any], read: Callable[..., float] = read_number
+) -> dict[str, Any]:
+    """Return the flat values, SI, that ``tables``, as a file has them, give to the ``parameters`` named after them.
+
+    One value stands for a list of it.
+
+    Args:
+        parameters: Known parameters.
+        tables: One in the other; their keys, with dots between, are names of parameters.
+        read: Reads a number, with the arguments of :func:`read_number`.
+
+    Raises:
+        ParameterError, QuantityError: A table, key or value that is not admitted, named.
+    """
+    known = {parameter.name: parameter for parameter in parameters}
+    values: dict[str, Any] = {}
+    for name, entry in tables.items():
+        parameter = known.get(name)
+        if parameter is None:
+            entries = _entries_of(name, entry, known)
+            values |= table_values(known.values(), {f"{name}.{key}": entries[key] for key in entries}, read)
+        elif parameter.kind.startswith("double"):
+            several = isinstance(entry, list)
+            if several and parameter.kind == "double":
+                raise ParameterError(f"{name} = {_shown(entry)}: expected one value, not a list")
+            numbers = [
+                read(parameter, number, f"{name}[{i}]" if several else name)
+                for i, number in enumerate(entry if several else [entry])
+            ]
+            values[name] = numbers if parameter.kind == "double_array" else numbers[0]
+        else:
+            several = parameter.kind.endswith("_array") and not isinstance(entry, list)
+            try:
+                values[name] = parameter.check([entry] if several else entry)
+            except ParameterError as error:
+                hint = did_you_mean(entry, parameter.choices) if isinstance(entry, str) else ""
+                raise ParameterError(str(error).removeprefix("parameter ") + hint) from error
+    return values
+
+
+def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:
+    """Return the entries of what is called ``name`` and is no parameter, if it is a table of them.
+
+    Raises:
+        ParameterError: There is no such table, or it is none.
+    """
+    depth = name.count(".") + 1
+    within, _, own = name.rpartition(".")
+    inside = [other.split(".")[depth] for other in known if other.startswith(f"{name}.")]
+    if inside and isinstance(entry, Mapping):
+        return entry
+    if inside:
+        raise ParameterError(f"{name} = {_shown(entry)}: expected a table of {', '.join(dict.fromkeys(inside))}")
+    beside = [other.split(".")[depth - 1] for other in known if other.startswith(f"{within}." if within else "")]
+    expected = ", ".join(dict.fromkeys(beside)) or "no table"
+    raise ParameterError(f"{name}: unknown key, expected one of {expected}{did_you_mean(own, beside)}")

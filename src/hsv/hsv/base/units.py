@@ -1,0 +1,302 @@
+"""The edge between quantities with units, as people write them, and the SI numbers used everywhere inside.
+
+A conversion is one rounding: numbers are read and factors multiplied as fractions, so that constants are the same
+numbers on every machine and under every version of the units library.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import sys
+from collections.abc import Sequence
+from decimal import Decimal
+from enum import StrEnum
+from fractions import Fraction
+from functools import cache, lru_cache
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from hsv.base.errors import QuantityError
+
+if TYPE_CHECKING:
+    import pint
+
+PAPER_UNITS = {
+    "m": "ft",
+    "m/s": "ft/s",
+    "rad": "deg",
+    "rad/s": "deg/s",
+    "kg^0.5 m": "slug^0.5 ft",
+    "kg^0.5 m/s": "slug^0.5 ft/s",
+    "N": "lbf",
+    "N m": "lbf ft",
+    "Pa": "lbf/ft^2",
+    "m s": "ft s",
+}
+"""The unit in which the paper (or the literature it cites) prints a quantity of an SI unit of ours."""
+
+METRIC_UNITS = {"rad": "deg"}
+"""The unit in which people read a quantity of an SI unit of ours, where that is another one."""
+
+
+class UnitSystem(StrEnum):
+    """Units in which something is printed or drawn for people."""
+
+    metric = "metric"
+    """SI, but angles in degrees and shares in percent"""
+    si = "si"
+    paper = "paper"
+    """Feet, pounds, slugs and degrees"""
+
+
+_EXAMPLES = {"m": "85500 ft", "m/s": "7900 ft/s", "rad": "0.3 deg", "s": "200 s", "1": "+10 %", "rad/s": "15 rad/s"}
+
+_TERM = r"([^\W\d]\w*|[%°])(\s*(\^|\*\*)\s*-?\d(\.\d+)?)?"
+_QUANTITY = re.compile(
+    r"(?P<number>(?>[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d{1,4})?))"
+    rf"\s*(?P<unit>(1?\s*/\s*)?{_TERM}(\s*[*/ ]\s*{_TERM})*)?",
+    re.IGNORECASE,
+)
+"""A decimal number and, if anything follows, a product or quotient of units with one-digit exponents."""
+
+_ROOT_BITS = 80
+"""Binary digits of a square root before it is rounded to the 53 of a number."""
+
+
+@cache
+def registry() -> pint.UnitRegistry:
+    """Return the registry of units, with fractions as factors; created only for unknown units, because it is slow."""
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=False, non_int_type=Fraction)
+
+
+def is_finite(value: float) -> bool:
+    """Tell whether ``value`` is a number that a double can hold, which a whole one need not be."""
+    return abs(value) <= sys.float_info.max
+
+
+def rounded(value: float) -> float:
+    """Return ``value`` to 15 digits: as written, without the last-digit error of a sum or a product."""
+    return float(f"{value:.15g}")
+
+
+@cache
+def factor(unit: str, to: str) -> float:
+    """Return the number that turns a value in ``unit`` into one in ``to``; both multiplicative."""
+    return _scaled(Fraction(1), _squared(unit)[0] / _squared(to)[0])
+
+
+def unit_system(name: str) -> UnitSystem:
+    """Return the units called ``name``.
+
+    Raises:
+        QuantityError: There are none.
+    """
+    if name not in [*UnitSystem]:
+        raise QuantityError(f"units = {name!r}: expected one of {', '.join(UnitSystem)}")
+    return UnitSystem(name)
+
+
+def unit_in(system: UnitSystem, unit: str) -> str:
+    """Return the unit of an SI unit in ``system``, of a quotient without one that of the dividend converted."""
+    if system is UnitSystem.si:
+        return unit
+    own = PAPER_UNITS if system is UnitSystem.paper else METRIC_UNITS
+    dividend, slash, divisor = unit.rpartition("/")
+    return own.get(unit) or (f"{unit_in(system, dividend)}/{divisor}" if slash else unit)
+
+
+def in_system(value: float, unit: str, system: UnitSystem, *, share: bool = False) -> tuple[float, str]:
+    """Return ``value``, given in the SI ``unit``, in the unit of ``system``, and the name of that unit.
+
+    Args:
+        value: The number.
+        unit: Its SI unit.
+        system: Units of what is printed.
+        share: Whether it is a share of something, which the metric system has in percent.
+    """
+    if share and system is UnitSystem.metric:
+        return 100.0 * value, "%"
+    other = unit_in(system, unit)
+    return (value * factor(unit, other) if other != unit else value), other
+
+
+def to_paper(value: float, unit: str) -> tuple[float, str]:
+    """Return ``value``, given in the SI ``unit``, in the paper's unit, and the name of that unit."""
+    return in_system(value, unit, UnitSystem.paper)
+
+
+def readable(value: float, unit: str, system: UnitSystem = UnitSystem.metric) -> str:
+    """Return ``value``, given in the SI ``unit``, in that of ``system``, with its name; angles in degrees."""
+    number, shown = in_system(value, unit, system)
+    return f"{number:.10g}" + ("" if shown == "1" else f" {shown}")
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """Return ``value`` with so many significant digits, and all that it has before the decimal point up to 999999."""
+    return f"{value:.0f}" if float(f"1e{digits - 1}") <= abs(value) < 999999.5 else f"{value:.{digits}g}"
+
+
+def in_words(value: float, unit: str, system: UnitSystem) -> str:
+    """Return ``value``, given in the SI ``unit``, with three significant digits and its unit, as people read it."""
+    number, name = in_system(value, unit, system)
+    return significant(number) + ("" if name in ("", "1") else f" {name}")
+
+
+def si_unit_of(text: object) -> str:
+    """Return the SI unit of a quantity as written, ``"1"`` if it has no unit or is no quantity."""
+    try:
+        base = _squared(_number_and_unit(text)[1] if isinstance(text, str) else "")[1]
+    except ValueError:
+        return "1"
+    factors, divisors = (
+        [name + (f"^{abs(power) / 2:g}" if abs(power) != 2 else "") for name, power in base if sign * power > 0]
+        for sign in (1, -1)
+    )
+    return "/".join((" ".join(factors) or "1", *divisors))
+
+
+def written(value: float, unit: str) -> float | str:
+    """Return a number in ``unit`` as a file has it: a text, where it has a unit. No digit is lost."""
+    return value if unit == "1" else f"{value!r} {unit}"
+
+
+def percent(share: float) -> str:
+    """Return a share as a file has it, in percent. No digit is lost."""
+    return f"{Decimal(repr(share)).scaleb(2).normalize():f} %"
+
+
+def has_unit(text: object) -> bool:
+    """Tell whether a quantity is written with a unit."""
+    found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+    return bool(found and found["unit"])
+
+
+def in_unit_of(values: Sequence[float], unit: str, text: object) -> tuple[list[float], str]:
+    """Return ``values``, given in the SI ``unit``, in the one of the quantity ``text``, and its name after a space."""
+    found = _QUANTITY.fullmatch(text.strip()) if isinstance(text, str) else None
+    own = (found["unit"] or "") if found else ""
+    if not own:
+        return list(values), "" if unit == "1" else f" {unit}"
+    scale = factor(unit, own.replace("%", "percent"))
+    return [value * scale for value in values], f" {own}"
+
+
+def parse_quantity(text: object, unit: str, field: str) -> float:
+    """Return the quantity written in ``text`` as a number in ``unit``.
+
+    Args:
+        text: Text of the user, e.g. ``"85500 ft"``. A bare number is accepted only where ``unit`` is ``"1"``.
+        unit: Target unit, e.g. ``"m"``.
+        field: Name used in the error message.
+
+    Raises:
+        QuantityError: The text cannot be read, its unit has another dimension, or the value is not finite. Angles are
+            no bare numbers, nor frequencies angular frequencies: "15 Hz" is refused where rad/s are due.
+    """
+    expected = f"expected a finite quantity such as {_EXAMPLES.get(unit, f'1.0 {unit}')!r}"
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise QuantityError(f"{field} = {text!r}: {expected}")
+    if not isinstance(text, str):
+        if unit != "1":
+            raise QuantityError(f"{field} = {text!r}: the unit is missing, {expected}")
+        if not is_finite(text):
+            raise QuantityError(f"{field} = {text!r}: {expected}")
+        return float(text)
+    if not any(map(str.isdigit, text)):
+        raise QuantityError(f"{field} = {text!r}: no number, {expected}")
+    try:
+        value = _converted(text, unit)
+        if value is None:
+            problem = "wrong unit" if _number_and_unit(text)[1] else "the unit is missing"
+            raise QuantityError(f"{field} = {text!r}: {problem}, {expected}")
+        return value
+    except QuantityError:
+        raise
+    except OverflowError as error:
+        raise QuantityError(f"{field} = {text!r}: {expected}") from error
+    except _UnknownUnitError as error:
+        raise QuantityError(f"{field} = {text!r}: unknown unit, {expected}") from error
+    except Exception as error:  # pint lets the errors of Python's tokenizer and of its operators through
+        raise QuantityError(f"{field} = {text!r}: cannot be read, {expected}") from error
+
+
+@lru_cache(maxsize=4096)
+def _converted(text: str, unit: str) -> float | None:
+    """Return a quantity in ``unit``, ``None`` where its own is of another dimension; campaigns read the same often."""
+    number, written = _number_and_unit(text)
+    (square, dimension), (wanted_square, wanted) = _squared(written), _squared(unit)
+    return _scaled(number, square / wanted_square) if dimension == wanted else None
+
+
+def _number_and_unit(text: str) -> tuple[Fraction, str]:
+    found = _QUANTITY.fullmatch(text.strip())
+    if not found:
+        raise ValueError(f"{text!r}: expected a number and a unit")
+    unit = re.sub(r"\s*([*/^ ])\s*", r"\1", found["unit"] or "").replace("%", "percent")
+    return Fraction(found["number"]), f"1{unit}" if unit.startswith("/") else unit
+
+
+class _UnknownUnitError(ValueError):
+    """There is no such unit."""
+
+
+Square = tuple[Fraction, tuple[tuple[str, int], ...]]
+"""Square of the factor from a unit to base units, and the base units of the square by symbol, with their exponents.
+
+The literature gives elastic modes in roots of a mass: squares have whole exponents.
+"""
+
+
+@cache
+def _squared(unit: str) -> Square:
+    known = _known()
+    return known[unit] if unit in known else square_by_pint(unit)
+
+
+@cache
+def _known() -> dict[str, Square]:
+    """Return the units that scenarios and tables are written in: to import pint takes longer than a flight."""
+    rows = json.loads((resources.files("hsv.base") / "known_units.json").read_text(encoding="utf-8"))
+    return {unit: (Fraction(factor), tuple(map(tuple, base))) for unit, (factor, base) in rows.items()}
+
+
+def square_by_pint(unit: str) -> Square:
+    """Return the unit of the square of ``unit``.
+
+    Raises:
+        ValueError: It knows no such unit, or its exponents are neither whole nor halves.
+    """
+    import pint
+
+    square = {}
+    try:
+        units = registry().parse_units("" if unit == "1" else unit)._units
+    except pint.UndefinedUnitError as error:
+        raise _UnknownUnitError(str(error)) from None
+    for name, exponent in units.items():
+        square[name] = round(2 * float(exponent))  # type: ignore[arg-type]
+        if square[name] != 2 * exponent:
+            raise ValueError(f"{unit!r}: expected exponents that are whole or halves")
+    base = registry().Quantity(Fraction(1), pint.util.UnitsContainer(square)).to_base_units()
+    exponents = {registry().get_symbol(name): int(exponent) for name, exponent in base._units.items()}  # type: ignore[arg-type]
+    return Fraction(base.magnitude), tuple(sorted(exponents.items()))
+
+
+def _scaled(number: Fraction, square: Fraction) -> float:
+    """Return ``number`` times the square root of ``square``, rounded once."""
+    if not number:
+        return 0.0
+    product = number * number * square
+    # A whole number of at least _ROOT_BITS bits; where the root goes on behind it, its last bit says so.
+    shift = max(0, _ROOT_BITS - (product.numerator.bit_length() - product.denominator.bit_length()) // 2)
+    whole, rest = divmod(product.numerator << 2 * shift, product.denominator)
+    root = math.isqrt(whole)
+    if rest or root * root != whole:
+        root = root << 1 | 1
+        shift += 1
+    value = float(Fraction(root, 1 << shift))
+    return -value if number < 0 else value

@@ -1,0 +1,163 @@
+"""Notch filter, nominal trajectory and tube law of a design as blocks of ``hsv_block.h`` in C99."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.control.c_block import include_folder
+from hsv.control.design import ControlDesign
+from hsv.control.nominal_trajectory import nominal_data
+from hsv.control.tube_law import TubeLaw
+from hsv.core import Struct, ffi
+from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+
+SOURCE = "controller.c"
+NUMBERS = "design.h"
+HEADER = "hsv_block.h"
+CORE_HEADERS = ("core.h", "vehicle_fields.h", "real.h", "notch_filter.h", "nominal.h", "tube_law.h")
+_COUNTS = ("multiplications", "additions", "comparisons", "numbers of state")
+
+
+@dataclass(frozen=True)
+class StepBound:
+    """Maximum number of operations in a step of a block, step 0 included, and the size of its state."""
+
+    multiplications: int
+    """And divisions."""
+    additions: int
+    """And subtractions."""
+    comparisons: int
+    state_size: int
+
+
+def controller_files(design: ControlDesign) -> dict[str, str]:
+    """Return the texts of the files, by name, that fly ``design`` without this library.
+
+    Raises:
+        DesignError: The design carries no tube.
+    """
+    if design.tube is None:
+        raise DesignError(f"design {design.name!r}: parameter tube.shape: empty, expected a design with a tube")
+    core = files("hsv.core")
+    return {
+        SOURCE: files("hsv.control").joinpath("export.c").read_text(encoding="utf-8"),
+        NUMBERS: design_header(design),
+        HEADER: (include_folder() / HEADER).read_text(encoding="utf-8"),
+        **{name: core.joinpath(name).read_text(encoding="utf-8") for name in CORE_HEADERS},
+    }
+
+
+def design_header(design: ControlDesign) -> str:
+    """Return the header with the numbers of ``design``, as structs of core.h."""
+    about = (
+        f"The digest of the design is {design.to_parameters()['design.hash']}. This file is written by "
+        '"hsv export-controller"; write it anew instead of changing it.',
+        f'The tube is certified for the inertial coupling "{_plain(design.coupling)}" and the factors tau that '
+        f"tube_law admits. The control period T is {design.period} s. All numbers are in SI units and radians; core.h "
+        "describes the arrays.",
+        "Maximum number of operations in a step, step 0 included; a division counts as a multiplication, a subtraction "
+        "as an addition:",
+    )
+    rows = [("block", *_COUNTS), *((name, *vars(most).values()) for name, most in step_bounds(design).items())]
+    # The factors tau are a parameter of the block, so that the gain is F alone.
+    tube = replace(TubeLaw(design).kernel, gains=design.feedback_gain[None])
+    lines = [
+        f'/* Numbers of the design "{_plain(design.name)}".',
+        *(f" *\n{textwrap.fill(text, 119, initial_indent=' * ', subsequent_indent=' * ')}" for text in about),
+        " *",
+        *(f" *   {name:18}{''.join(f'{count:>17}' for count in counts)}" for name, *counts in rows),
+        " */",
+        "#pragma once",
+        '#include "core.h"',
+        "",
+        f"enum {{ SECTIONS = {len(design.notch)}, FILTERED = {int(design.filtered)} }};",
+        f"#define TAU_MINIMUM {_number(design.tau_minimum.min())}",
+        _array("designed_tau", "double", design.tau),
+        *_constant("hsv_nominal", "nominal_data", nominal_data(design)),
+        *_constant("hsv_tube", "tube_data", tube),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def step_bounds(design: ControlDesign) -> dict[str, StepBound]:
+    """Return the bounds of a step of each block, by its name, counted from the loops of the headers."""
+    n, m, rigid, integrated = N_STATES, N_INPUTS, N_RIGID, 2
+    sections, gains, polytope = len(design.notch), len(design.nominal_gains), design.polytope.data()
+    axes = [axis.coefficients.shape[1:] for axis in (polytope.altitude, polytope.velocity)]
+    vertices, size = polytope.S.shape
+    used, weights = len(polytope.entries), 3 * sum(count for _, count in axes)
+    membership, filtered = rigid * rigid + rigid, int(design.filtered)
+    between = int(design.interpolated and gains > 1)
+    return {
+        "notch_filter": StepBound((9 + 2) * sections, 6 * sections, 0, 2 * sections),
+        "nominal_trajectory": StepBound(
+            multiplications=gains * membership + m * n + between * m * (n + 2) + weights + vertices * (1 + size) + used,
+            additions=n
+            + gains * membership
+            + m * n
+            + between * m * (n + 4)
+            + weights
+            + len(axes)
+            + vertices * size
+            + used
+            + n,
+            comparisons=gains + m + sum(4 + pieces - 1 for pieces, _ in axes),
+            state_size=n,
+        ),
+        "tube_law": StepBound(
+            multiplications=9 * sections * filtered + m * (n + rigid + 2 * integrated) + 1 + integrated,
+            additions=2 + (2 + 6 * sections) * filtered + m * (3 * n + integrated + 6) + 3 * integrated,
+            comparisons=6 * m + 1,
+            state_size=integrated + 2 * sections * filtered,
+        ),
+    }
+
+
+def _constant(kind: str, name: str, source: Any) -> list[str]:
+    """Return a struct of core.h with the numbers of ``source``, after the arrays that it points to."""
+    arrays: list[str] = []
+
+    def fields(struct: Any, name: str, source: Any, indent: str) -> str:
+        lines = []
+        for field, declared in ffi.typeof(struct).fields:
+            value, own = getattr(struct, field), f"{name}_{field}"
+            if declared.type.kind == "struct":
+                text = fields(value, own, getattr(source, field), indent + "    ")
+            elif declared.type.kind == "pointer":
+                text = own if value else "0"
+                if value:
+                    arrays.append(_array(own, declared.type.item.cname, getattr(source, field)))
+            elif declared.type.kind == "array":
+                text = f"{{{', '.join(map(_number, value))}}}"
+            else:
+                text = _number(value)
+            lines.append(f"\n{indent}.{field} = {text}")
+        return f"{{{','.join(lines)}}}"
+
+    text = fields(Struct(kind, source).pointer[0], name, source, "    ")
+    return [*arrays, f"static const {kind} {name} = {text};"]
+
+
+def _array(name: str, element: str, numbers: np.ndarray) -> str:
+    shape = ", ".join(map(str, numbers.shape))
+    values = textwrap.fill(
+        ", ".join(map(_number, numbers.ravel())), 120, initial_indent="    ", subsequent_indent="    "
+    )
+    return f"static const {element} {name}[] = {{ /* ({shape}) */\n{values}}};"
+
+
+def _number(value: Any) -> str:
+    """Return a number in C; hexadecimal ones are exact."""
+    return str(int(value)) if isinstance(value, int | np.integer) else float(value).hex()
+
+
+def _plain(text: str) -> str:
+    """Return a name as it can stand in a comment of C: it must not end it."""
+    return re.sub(r"[^A-Za-z0-9_. -]", "_", text)

@@ -1,0 +1,216 @@
+"""Nominal gains by the min-max LMI with input bounds (paper eq. 31 to eq. 35), one gain or a nested family.
+
+The problem is Kothare, Balakrishnan and Morari's (Automatica 32, 1996); the look-up over nested ellipsoids is Wan and
+Kothare's (Automatica 39, 2003): the smallest ellipsoid that holds the state names the gain, and because each ellipsoid
+is invariant under its own gain and lies in the one before, the state only ever moves inwards. Their second law takes a
+gain between those of two ellipsoids, so that the input is continuous; each ellipsoid must then be invariant under the
+gain of the next one inside, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.control.nominal_problem import NominalProblem, certified_cost, decrease_between
+from hsv.control.optimisation.centring import Unknown, minimise
+from hsv.control.optimisation.lmi import SolverReport, smallest_eigenvalues, spectral_radii
+from hsv.control.optimisation.rounding import GAIN_DIGITS, rounded, rounded_matrix
+from hsv.control.optimisation.scaling import Whitening, lqr_whitening
+
+
+@dataclass(frozen=True)
+class NominalGain:
+    """K = Y Q^-1 of one ellipsoid x' Q^-1 x <= 1, with its evidence.
+
+    ``K`` (m, n) and ``Q`` (n, n) in SI, rounded, ``Y`` (m, n) = K Q; ``gamma`` (s) the bound of (32) as solved,
+    ``certified_gamma`` (s) as recomputed: the cost from any state of the ellipsoid is at most this. Residuals are those
+    of the returned matrices: ``decrease`` (r) smallest eigenvalues of (34) with the certified bound, scaled to a unit
+    diagonal;
+    ``state`` 1 minus the level of the design state, (33); ``input`` (m) 1 minus the largest squared input over its
+    squared bound, (35); ``nesting`` smallest eigenvalue of 1 - Q, Q measured in the ellipsoid outside; ``between`` (r)
+    how much the level in that ellipsoid decreases under K, of an interpolated family; ``radii`` (r) closed-loop
+    spectral radii.
+    """
+
+    K: np.ndarray
+    Y: np.ndarray
+    Q: np.ndarray
+    gamma: float
+    certified_gamma: float
+    state: float
+    decrease: np.ndarray
+    input: np.ndarray
+    nesting: float | None
+    between: np.ndarray | None
+    radii: np.ndarray
+    solver: SolverReport
+
+    def report(self) -> dict[str, Any]:
+        """Return everything a stranger needs to check the gain, for JSON."""
+        between = {} if self.between is None else {"between_smallest_eigenvalues": self.between.tolist()}
+        return {
+            "solver": self.solver.as_dict(),
+            "Y": self.Y.tolist(),
+            "Q": self.Q.tolist(),
+            "gamma": self.gamma,
+            "certified_gamma": self.certified_gamma,
+            "state_residual": self.state,
+            "lmi_smallest_eigenvalues": self.decrease.tolist(),
+            "input_residuals": self.input.tolist(),
+            "nesting_residual": self.nesting,
+            **between,
+            "spectral_radii": self.radii.tolist(),
+        }
+
+
+def nominal_gain(problem: NominalProblem, state: np.ndarray, outside: np.ndarray | None = None) -> NominalGain:
+    """Return the gain with the smallest worst-case cost from ``state``, verified after solving.
+
+    Paper eq. 32, eq. 33, eq. 34, eq. 35; of the co-designed model eq. 49, eq. 50, eq. 51, eq. 52.
+
+    Args:
+        problem: Vertices, weights and input bounds.
+        state: (n) nominal deviation x_n to start from, SI.
+        outside: (n, n) Q of an ellipsoid that the new one must lie in, or None.
+
+    Raises:
+        DesignError: No solution, or a solution that fails one of its inequalities when recomputed.
+    """
+    white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
+    return _solve(problem, white, state, outside, False, "nominal gain K, LMI (32)-(35)")
+
+
+def nested_gains(
+    problem: NominalProblem,
+    state: np.ndarray,
+    scales: Sequence[float],
+    *,
+    interpolated: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[NominalGain]:
+    """Return one gain for each of ``scales`` times ``state``, ellipsoids nested, outermost first.
+
+    Args:
+        problem: Vertices, weights and input bounds.
+        state: (n) the largest nominal deviation x_n, SI.
+        scales: Decreasing factors, the first usually 1.
+        interpolated: Whether gains between those of two ellipsoids are to be certified, too.
+        progress: Called with (solved, total).
+
+    Raises:
+        DesignError: Scales that do not decrease, no solution, or one that fails an inequality when recomputed.
+    """
+    if not scales or min(scales) <= 0.0 or any(b >= a for a, b in pairwise(scales)):
+        raise DesignError(f"nominal.scales = {list(scales)}: expected decreasing factors above zero")
+    white = lqr_whitening(problem.A, problem.B, problem.state_scale, problem.input_scale)
+    gains: list[NominalGain] = []
+    for index, scale in enumerate(scales):
+        outside = gains[-1].Q if gains else None
+        name = f"nominal gain {index + 1} of {len(scales)}, LMI (32)-(35)"
+        gains.append(_solve(problem, white, scale * state, outside, interpolated, name))
+        if progress:
+            progress(index + 1, len(scales))
+    return gains
+
+
+def _solve(
+    problem: NominalProblem,
+    white: Whitening,
+    state: np.ndarray,
+    outside: np.ndarray | None,
+    interpolated: bool,
+    name: str,
+) -> NominalGain:
+    n, m = problem.B.shape[1:]
+    # With the state at unit length and inputs in units of their bounds, everything sought comes out near one.
+    x = white.to_white @ state
+    size = float(np.linalg.norm(x))
+    x /= size
+    bound = problem.input_bound / (white.input_scale * size)
+    A, B = white.dynamics(problem.A, problem.B)
+    B = B * bound
+    state_root = white.from_white / problem.state_scale[:, None]
+    input_root = np.diag(bound)
+    limit = None if outside is None else white.to_white @ outside @ white.to_white.T / size**2
+
+    def inequalities(Q: np.ndarray, Y: np.ndarray, gamma: np.ndarray, *slack: np.ndarray) -> list[np.ndarray]:
+        # K = Y G^-1; with G = Q these are (33), (34) and (35). X of (35) at its bound, which loses nothing.
+        G = slack[0] if slack else Q
+        inner = G + G.T - Q
+        blocks = [
+            np.block([[np.ones((1, 1)), x[None, :]], [x[:, None], Q]]),
+            np.block([[np.eye(m), Y], [Y.T, inner]]),
+        ]
+        for A_i, B_i in zip(A, B, strict=True):
+            S = A_i @ G + B_i @ Y
+            rows = [
+                [inner, S.T, (state_root @ G).T, (input_root @ Y).T],
+                [S, Q, np.zeros((n, n)), np.zeros((n, m))],
+                [state_root @ G, np.zeros((n, n)), gamma * np.eye(n), np.zeros((n, m))],
+                [input_root @ Y, np.zeros((m, n)), np.zeros((m, n)), gamma * np.eye(m)],
+            ]
+            blocks.append(np.block(rows))
+            if slack:
+                # The level in the ellipsoid outside decreases, too; its size is free.
+                sized = slack[1] * limit
+                blocks.append(np.block([[G + G.T - sized, S.T], [S, sized]]))
+        return blocks if limit is None else [*blocks, limit - Q]
+
+    # One matrix G for two Lyapunov functions (de Oliveira, Bernussou, Geromel, Systems & Control Letters 37, 1999).
+    slack = [Unknown((n, n)), Unknown((1, 1))] if interpolated and limit is not None else []
+    (Q, Y, gamma, *found), solver = minimise(
+        (Unknown((n, n), symmetric=True), Unknown((m, n)), Unknown((1, 1)), *slack),
+        lambda Q, Y, gamma, *slack: gamma[0, 0],
+        inequalities,
+        name,
+    )
+    G = found[0] if found else Q
+    # G is not symmetric: K = Y G^-1.
+    K = white.gain(np.linalg.solve(G.T, (bound[:, None] * Y).T).T)
+    K = rounded(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
+    Q_si = rounded_matrix(white.covariance(Q * size**2))
+    bounded = gamma[0, 0] * size**2 * problem.period
+    return _verified(problem, state, outside, interpolated, K, Q_si, bounded, solver, name)
+
+
+def _verified(
+    problem: NominalProblem,
+    state: np.ndarray,
+    outside: np.ndarray | None,
+    interpolated: bool,
+    K: np.ndarray,
+    Q: np.ndarray,
+    gamma: float,
+    solver: SolverReport,
+    name: str,
+) -> NominalGain:
+    certified, decrease = certified_cost(problem, K, Q, name)
+    if not decrease.min() > -1e-9:
+        raise DesignError(f"{name}: smallest eigenvalue of (34) = {decrease.min():.3g}, expected not below zero")
+    level = 1.0 - float(state @ np.linalg.solve(Q, state))
+    if level < 0.0:
+        raise DesignError(f"{name}: level of the initial state = {1.0 - level:.9g}, expected at most 1")
+    inputs = 1.0 - np.einsum("ij,jk,ik->i", K, Q, K) / problem.input_bound**2
+    if inputs.min() < 0.0:
+        raise DesignError(f"{name}: largest input over its bound = {np.sqrt(1.0 - inputs)}, expected at most 1")
+    nesting = between = None
+    if outside is not None:
+        factor = np.linalg.inv(np.linalg.cholesky(outside))
+        nesting = float(smallest_eigenvalues(np.eye(len(Q)) - factor @ Q @ factor.T))
+        if nesting < 0.0:
+            raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
+        if interpolated:
+            between = decrease_between(problem, K, outside)
+            if not between.min() > 0.0:
+                raise DesignError(
+                    f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above "
+                    "zero for interpolated gains; scales that are closer to each other help"
+                )
+    radii = spectral_radii(problem.A + problem.B @ K)
+    return NominalGain(K, K @ Q, Q, gamma, certified, level, decrease, inputs, nesting, between, radii, solver)

@@ -1,0 +1,1 @@
+"""Linear matrix inequalities: centring, solver, scaling and rounding."""

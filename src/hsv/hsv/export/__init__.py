@@ -1,1 +1,0 @@
-"""A design's blocks as C source, for a computer that flies them without this library."""

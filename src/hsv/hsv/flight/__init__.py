@@ -1,0 +1,1 @@
+"""Scenarios, flights in one process, metrics, fingerprints and campaigns."""

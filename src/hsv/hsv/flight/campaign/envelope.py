@@ -1,0 +1,106 @@
+"""Envelopes of the curves of all flights, updated while they are flown; the curves themselves are not stored."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from hsv.flight.metrics import FlightCurves
+
+WINDOWS = 400
+"""Windows into which a flight is cut; of each, least and largest value are kept, so that no peak is lost."""
+
+
+class Signal(NamedTuple):
+    """A curve of the page."""
+
+    name: str
+    unit: str
+
+
+SIGNALS = (
+    Signal("altitude_error", "m"),
+    Signal("velocity_error", "m/s"),
+    Signal("angle_of_attack", "rad"),
+    Signal("pitch_angle", "rad"),
+    Signal("elastic_rate_1", "kg^0.5 m/s"),
+    Signal("elastic_rate_2", "kg^0.5 m/s"),
+    Signal("fuel_equivalence_ratio", "1"),
+    Signal("elevator_deflection", "rad"),
+)
+
+
+def signals(flight: FlightCurves) -> np.ndarray:
+    """Return the curves of a flight (signals, steps)."""
+    return flight.curves[: len(SIGNALS)]
+
+
+@dataclass
+class Envelope:
+    """Least and largest value, sum of the windows' mean values (windows, signals), and number of flights (windows)."""
+
+    low: np.ndarray
+    high: np.ndarray
+    total: np.ndarray
+    count: np.ndarray
+
+    @classmethod
+    def empty(cls, windows: int = WINDOWS) -> Self:
+        """Return the envelope of no flight."""
+        shape = windows, len(SIGNALS)
+        return cls(np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape), np.zeros(windows))
+
+    def add(self, flight: FlightCurves, steps: int) -> None:
+        """Take in a flight that was to last ``steps`` steps; one that diverged covers fewer windows."""
+        curves = signals(flight)
+        rows = curves.shape[1]
+        starts = window_starts(steps, len(self.count))
+        starts = starts[starts < rows]
+        reached = slice(len(starts))
+        finite = curves if np.isfinite(curves).all() else np.where(np.isfinite(curves), curves, np.nan)
+        self.low[reached] = np.fmin(self.low[reached], np.fmin.reduceat(finite, starts, axis=1).T)
+        self.high[reached] = np.fmax(self.high[reached], np.fmax.reduceat(finite, starts, axis=1).T)
+        means = np.add.reduceat(finite, starts, axis=1).T / np.diff(starts, append=rows)[:, None]
+        whole = np.isfinite(means).all(axis=1)
+        self.total[reached][whole] += means[whole]
+        self.count[reached] += whole
+
+    def merge(self, other: Envelope) -> None:
+        """Take in all flights of ``other``."""
+        self.low = np.fmin(self.low, other.low)
+        self.high = np.fmax(self.high, other.high)
+        self.total += other.total
+        self.count += other.count
+
+    @property
+    def mean(self) -> np.ndarray:
+        """Mean over the flights that reached a window (windows, signals); not a number where none did."""
+        with np.errstate(invalid="ignore"):
+            return np.where(self.count[:, None] > 0.0, self.total / np.maximum(self.count, 1.0)[:, None], np.nan)
+
+    def encode(self) -> str:
+        """Return the envelope as text."""
+        return base64.b64encode(np.column_stack((self.low, self.high, self.total, self.count)).tobytes()).decode()
+
+    @classmethod
+    def decode(cls, text: str) -> Self:
+        """Return the envelope that :meth:`encode` wrote.
+
+        Raises:
+            ValueError: It has other signals or windows.
+        """
+        s = len(SIGNALS)
+        table = np.frombuffer(base64.b64decode(text)).reshape(WINDOWS, 3 * s + 1).copy()
+        return cls(table[:, :s], table[:, s : 2 * s], table[:, 2 * s : -1], table[:, -1])
+
+
+@lru_cache(maxsize=8)
+def window_starts(steps: int, windows: int = WINDOWS) -> np.ndarray:
+    """Return the first step of each window of a flight of ``steps`` steps, at most ``windows`` of them."""
+    starts = np.unique(np.linspace(0, steps + 1, windows, endpoint=False).astype(int))
+    starts.setflags(write=False)
+    return starts

@@ -1,0 +1,210 @@
+"""Storage of results: finished batches beside the result file during the run, one Parquet file in the end."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hsv.base.documents import open_regular, read_text
+from hsv.base.errors import CampaignError, DocumentError, reason
+from hsv.flight.campaign.campaign import Campaign
+from hsv.flight.campaign.envelope import Envelope
+from hsv.flight.campaign.lock import locked
+from hsv.flight.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
+
+_CAMPAIGN_FILE = "campaign.json"
+
+_ROWS = 1024
+"""Rows that are written at a time, as far as whole batches have them: a group of rows takes as long as its rows."""
+
+
+class ResultStore:
+    """Stores the batches of one campaign; a stored batch stays whole whatever happens to this process."""
+
+    def __init__(self, out: Path, campaign: Campaign) -> None:
+        self.out = out
+        self.folder = out.with_name(out.name + ".parts")
+        self._campaign = campaign
+
+    @contextmanager
+    def opened(self, restart: bool = False) -> Iterator[set[int]]:
+        """Yield the numbers of the batches that are there whole; only one process at a time may hold a campaign.
+
+        Args:
+            restart: Throw away what is there.
+
+        Raises:
+            CampaignError: The file or folder belongs to another campaign, cannot be made, or is in use.
+        """
+        with _writing(self.out):
+            self.out.parent.mkdir(parents=True, exist_ok=True)
+        lock = self.out.with_name(self.out.name + ".lock")
+        with locked(lock, f"{self.out}: in use, another process is flying this campaign"):
+            if restart:
+                shutil.rmtree(self.folder, ignore_errors=True)
+                self.out.unlink(missing_ok=True)
+            if self.out.exists():
+                self._check(read_result(self.out)[0], self.out)
+                shutil.rmtree(self.folder, ignore_errors=True)
+                yield set(range(self._campaign.batches))
+                return
+            self._describe()
+            yield {batch for batch in range(self._campaign.batches) if self._is_whole(batch)}
+
+    def keep(self, batch: int, content: bytes) -> None:
+        """Keep a finished batch: it is there whole, or not at all.
+
+        Raises:
+            CampaignError: It cannot be written.
+        """
+        write_whole(self._part(batch), content)
+
+    def finish(self) -> None:
+        """Make the result file of all batches, and remove them.
+
+        Raises:
+            CampaignError: The file cannot be written, or a batch is damaged, which is then removed.
+        """
+        temporary = self.out.with_name(self.out.name + ".unfinished")
+        envelope = Envelope.empty()
+        columns = schema(self._campaign)
+        with _writing(self.out, temporary):
+            with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
+                together = max(1, _ROWS // self._campaign.batch)
+                for first in range(0, self._campaign.batches, together):
+                    parts = []
+                    for batch in range(first, min(first + together, self._campaign.batches)):
+                        part, its_envelope = self._read(batch)
+                        envelope.merge(its_envelope)
+                        parts.append(part.cast(columns))
+                    writer.write_table(pa.concat_tables(parts))
+                kept = {CAMPAIGN: self._campaign.text.encode(), ENVELOPE: envelope.encode().encode()}
+                writer.add_key_value_metadata(kept | {DIGEST: _digest(kept)})
+            _replace(temporary, self.out)
+        shutil.rmtree(self.folder)
+
+    def _describe(self) -> None:
+        described = self.folder / _CAMPAIGN_FILE
+        if described.exists():
+            try:
+                found = Campaign.from_text(read_text(described))
+            except (CampaignError, DocumentError) as error:
+                raise CampaignError(f"{described}: {error}; --restart begins anew") from error
+            self._check(found, self.folder)
+            return
+        with _writing(self.folder):
+            self.folder.mkdir(exist_ok=True)
+        write_whole(described, self._campaign.text.encode())
+
+    def _is_whole(self, batch: int) -> bool:
+        try:
+            with pq.ParquetFile(self._part(batch)) as file:
+                found, rows = file.schema_arrow, file.metadata.num_rows
+        except (OSError, ValueError):
+            return False
+        complete = rows == len(self._campaign.flights(batch)) and ENVELOPE in (found.metadata or {})
+        return complete and bool(found.equals(schema(self._campaign)))
+
+    def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
+        path = self._part(batch)
+        try:
+            with pq.ParquetFile(path, page_checksum_verification=True) as file:
+                part = file.read(use_threads=False)
+            return part, Envelope.decode(part.schema.metadata[ENVELOPE].decode())
+        except (OSError, ValueError) as error:
+            path.unlink(missing_ok=True)
+            raise CampaignError(f"{path}: damaged, removed; the same command flies these flights again") from error
+
+    def _part(self, batch: int) -> Path:
+        return self.folder / f"{batch:08}.parquet"
+
+    def _check(self, found: Campaign, where: Path) -> None:
+        difference = found.difference(self._campaign)
+        if difference:
+            raise CampaignError(
+                f"{where}: holds another campaign ({difference}), expected the same one, another --out, or --restart"
+            )
+
+
+def read_result(path: Path) -> tuple[Campaign, Envelope]:
+    """Return the campaign whose results are in a Parquet file, and the envelope of its flights.
+
+    Raises:
+        CampaignError: The file is missing, damaged, not the result of a campaign, or that of another version.
+    """
+    try:
+        with open_regular(path):
+            found = pq.read_metadata(path)
+            metadata, columns = found.metadata or {}, found.schema.to_arrow_schema()
+    except (DocumentError, OSError, ValueError) as error:
+        raise CampaignError(f"{path}: cannot be read, expected the Parquet file of a campaign") from error
+    if CAMPAIGN not in metadata:
+        raise CampaignError(f"{path}: not the result of a campaign, expected a file of hsv montecarlo")
+    # Results of before there was a digest have none.
+    if metadata.get(DIGEST, b"") not in (b"", _digest(metadata)):
+        raise CampaignError(f"{path}: damaged, expected the result of a campaign")
+    try:
+        campaign = Campaign.from_text(metadata[CAMPAIGN].decode())
+    except (CampaignError, UnicodeDecodeError) as error:
+        raise CampaignError(f"{path}: {error}") from error
+    for column in schema(campaign):
+        if not _has(columns, column):
+            raise _foreign(path, f"column {column.name!r}", campaign)
+    try:
+        return campaign, Envelope.decode(metadata[ENVELOPE].decode())
+    except (KeyError, ValueError) as error:
+        raise _foreign(path, "envelope of this version's curves", campaign) from error
+
+
+def _foreign(path: Path, lack: str, campaign: Campaign) -> CampaignError:
+    return CampaignError(
+        f"{path}: has no {lack}, written by commit {campaign.commit}; expected a result of this version"
+    )
+
+
+def _has(columns: pa.Schema, column: pa.Field) -> bool:
+    return columns.get_field_index(column.name) >= 0 and columns.field(column.name).equals(column, check_metadata=True)
+
+
+def _digest(kept: Mapping[bytes, bytes]) -> bytes:
+    """Return the SHA-256, hexadecimal, of what is kept beside the rows."""
+    texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
+    return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file that is there whole, or not at all.
+
+    Raises:
+        CampaignError: It cannot be written.
+    """
+    temporary = path.with_name(path.name + ".unfinished")
+    with _writing(path, temporary):
+        temporary.write_bytes(content)
+        _replace(temporary, path)
+
+
+@contextmanager
+def _writing(path: Path, temporary: Path | None = None) -> Iterator[None]:
+    """Turn what the system refuses into an error that names ``path``; leave no half of a ``temporary`` file."""
+    try:
+        yield
+    except OSError as error:
+        if temporary:
+            temporary.unlink(missing_ok=True)
+        kept = "; finished batches are kept" if temporary else ""
+        raise CampaignError(f"{path}: cannot be written ({reason(error)}){kept}") from error
+
+
+def _replace(temporary: Path, path: Path) -> None:
+    """Move a finished file into place, on the disk before it has its name."""
+    with temporary.open("rb") as stream:
+        os.fsync(stream.fileno())
+    temporary.replace(path)

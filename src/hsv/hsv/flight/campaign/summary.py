@@ -1,0 +1,238 @@
+"""Summary of a campaign: the share of flights within each limit, with its confidence, and the worst flights."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from hsv.base.errors import CampaignError
+from hsv.control.controllers import names_code
+from hsv.flight.campaign.campaign import Campaign
+from hsv.flight.campaign.envelope import Envelope
+from hsv.flight.campaign.sample_runner import SampleRunner
+from hsv.flight.campaign.store import read_result
+from hsv.flight.campaign.table import OUTCOMES
+from hsv.flight.trust import require_trust
+
+CONFIDENCE = 0.95
+
+CRASHED, DIVERGED = ENDED = ("crashed", "diverged")
+"""Rows that replace a limit: how a flight ended that did not finish."""
+
+TUBE_LIMIT = 1.0
+"""Level of e - c up to which the error is in the set."""
+
+
+@dataclass(frozen=True)
+class Share:
+    """Number of flights that satisfy a limit (SI, ``None`` for a yes-or-no statement), and the interval (95 %)."""
+
+    name: str
+    limit: float | None
+    within: int
+    flights: int
+    interval: tuple[float, float] | None
+    """Clopper-Pearson; ``None`` for corners, which are all there are and no sample of anything."""
+
+    @property
+    def fraction(self) -> float:
+        """Share of the flights."""
+        return self.within / self.flights
+
+
+@dataclass(frozen=True)
+class WorstFlight:
+    """A flight, the limit it comes closest to or breaks most, and value over limit (infinite: it did not end)."""
+
+    flight: int
+    limit: str
+    ratio: float
+    sample: dict[str, float]
+
+
+class Results:
+    """The result file of a campaign, read back; only :attr:`sample_runner` loads a controller."""
+
+    def __init__(self, path: Path, *, trust: bool = False) -> None:
+        """Read ``path``.
+
+        Args:
+            path: The result file.
+            trust: Whether code that the file names may run, see :mod:`hsv.flight.trust`.
+
+        Raises:
+            CampaignError: The file is missing, not the result of a campaign, or that of another version.
+        """
+        self.path = path
+        self.trust = trust
+        self.campaign: Campaign
+        self.envelope: Envelope
+        """The envelope of all flights."""
+        self.campaign, self.envelope = read_result(path)
+
+    @property
+    def flyable(self) -> bool:
+        """Whether flights may be repeated: the controller is registered here, or the file is trusted."""
+        return self.trust or not names_code(self.campaign.scenario.controller)
+
+    @cached_property
+    def sample_runner(self) -> SampleRunner:
+        """The sample runner that replays flights of the campaign; its first use loads the controller.
+
+        Raises:
+            ParameterError: The file names the controller's code, and is not trusted.
+        """
+        require_trust(self.campaign.scenario.controller, self.path, self.trust)
+        return SampleRunner(self.campaign)
+
+    def column(self, name: str) -> np.ndarray:
+        """Return a column (flights); numbers that a flight does not define are not a number."""
+        return np.asarray(self._column(name).to_numpy())
+
+    @property
+    def crashed(self) -> np.ndarray:
+        """Whether its controller ended a flight (flights)."""
+        return np.asarray(self._column("crashed").is_valid())
+
+    @property
+    def samples(self) -> np.ndarray:
+        """The samples (flights, factors)."""
+        return np.column_stack([self.column(f"sample_{factor.name}") for factor in self.campaign.factors])
+
+    def row(self, flight: int) -> dict[str, Any]:
+        """Return the row of a flight.
+
+        Raises:
+            CampaignError: There is no such flight.
+        """
+        if not 0 <= flight < self.campaign.samples:
+            raise CampaignError(f"flight = {flight}: expected 0 to {self.campaign.samples - 1}")
+        rows = self._read(filters=[("flight", "==", flight)]).to_pylist()
+        if len(rows) != 1:
+            raise CampaignError(f"{self.path}: has {len(rows)} rows of flight {flight}, expected one")
+        return dict(rows[0])
+
+    def sample(self, flight: int) -> dict[str, float]:
+        """Return the recorded sample of a flight, by factor; errors as :meth:`row`."""
+        row = self.row(flight)
+        return {factor.name: row[f"sample_{factor.name}"] for factor in self.campaign.factors}
+
+    def file(self, flight: int, **replaced: str) -> str:
+        """Return the scenario of a flight as a file, with values ``replaced`` by key; errors as :meth:`row`."""
+        return self.campaign.file(flight, list(self.sample(flight).values()), **replaced)
+
+    def _column(self, name: str) -> pa.ChunkedArray:
+        column = self._read(columns=[name])[name]
+        if len(column) != self.campaign.samples:
+            raise self._damaged()
+        return column
+
+    def _read(self, **what: Any) -> pa.Table:
+        try:
+            return pq.read_table(self.path, page_checksum_verification=True, **what)
+        except (OSError, ValueError) as error:
+            raise self._damaged() from error
+
+    def _damaged(self) -> CampaignError:
+        return CampaignError(f"{self.path}: damaged, expected the result of a campaign")
+
+
+def limits(results: Results) -> dict[str, float]:
+    """Return the limits (SI) to hold flights against: those of the scenario, and the tube where there is a set."""
+    stated = dict(results.campaign.scenario.limits)
+    if np.any(np.isfinite(results.column("tube_level"))):
+        stated["tube_level"] = TUBE_LIMIT
+    return stated
+
+
+def within_all(results: Results) -> int:
+    """Return how many flights come to their end within every limit; an undefined metric is not within."""
+    within = ~(results.column("diverged") | results.crashed)
+    for name, limit in limits(results).items():
+        within &= np.abs(results.column(name)) <= limit
+    return int(np.count_nonzero(within))
+
+
+def shares(results: Results) -> list[Share]:
+    """Return the share of flights that come to their end, and within each limit; an undefined metric is not within."""
+    flown = ~(results.column("diverged") | results.crashed)
+    rows = [_share(results.campaign, "flown_to_the_end", None, flown)]
+    for name, limit in limits(results).items():
+        # A comparison with what is not a number is false.
+        rows.append(_share(results.campaign, name, limit, flown & (np.abs(results.column(name)) <= limit)))
+    return rows
+
+
+def _share(campaign: Campaign, name: str, limit: float | None, within: np.ndarray) -> Share:
+    count, n = int(np.count_nonzero(within)), len(within)
+    return Share(name, limit, count, n, None if campaign.method == "corners" else clopper_pearson(count, n))
+
+
+def clopper_pearson(count: int, n: int, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Return the exact interval of a probability of which ``count`` of ``n`` independent trials were seen."""
+    from scipy.stats import binomtest
+
+    interval = binomtest(count, n).proportion_ci(confidence, method="exact")
+    return float(interval.low), float(interval.high)
+
+
+def worst_flights(results: Results, number: int = 10) -> list[WorstFlight]:
+    """Return the flights with the largest metric over limit; first those that crashed, then diverged (earliest)."""
+    stated = {name: limit for name, limit in limits(results).items() if limit > 0.0}
+    diverged, crashed, end = results.column("diverged"), results.crashed, results.column("end_time")
+    ratios = np.zeros((len(diverged), len(stated) or 1))
+    for index, (name, limit) in enumerate(stated.items()):
+        ratio = np.abs(results.column(name)) / limit
+        ratios[:, index] = np.where(np.isnan(ratio), np.inf, ratio)
+    largest = np.where(diverged | crashed, np.inf, ratios.max(axis=1))
+    ended = np.where(crashed, -1.0, np.where(diverged, end, math.inf))
+    order = np.lexsort((np.arange(len(end)), ended, -largest))[:number]
+    samples, names = results.samples, list(stated) or [""]
+    return [
+        WorstFlight(
+            flight=int(flight),
+            limit=CRASHED
+            if crashed[flight]
+            else DIVERGED
+            if diverged[flight]
+            else names[int(np.argmax(ratios[flight]))],
+            ratio=float(largest[flight]),
+            sample={f.name: float(v) for f, v in zip(results.campaign.factors, samples[flight], strict=True)},
+        )
+        for flight in order
+    ]
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """A metric over all flights that define it: unit (SI), least, median, 95th percentile, largest, mean."""
+
+    name: str
+    unit: str
+    flights: int
+    minimum: float
+    median: float
+    percentile_95: float
+    maximum: float
+    mean: float
+
+
+def distributions(results: Results) -> list[Distribution]:
+    """Return the distribution of every outcome that any flight defines."""
+    found = []
+    for name, unit in OUTCOMES.items():
+        values = results.column(name)
+        values = values[np.isfinite(values)]
+        if len(values):
+            middle, high = np.percentile(values, (50.0, 95.0))
+            found.append(
+                Distribution(name, unit, len(values), values.min(), middle, high, values.max(), float(values.mean()))
+            )
+    return found

@@ -1,0 +1,92 @@
+"""Components of flights that differ little from one: what a change leaves as it was is built once and shared."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
+from hsv.control.design import design_of
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.core.noise import SEED_PARAMETER
+from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
+from hsv.flight.closed_loop import Components
+from hsv.flight.scenario import Scenario
+from hsv.model.faults.injector import FaultInjector
+from hsv.model.initial import initial_trim
+from hsv.model.plant import PLANT_PARAMETERS, Plant
+
+_NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
+"""Beginnings of parameters on which the bench's own controllers do not depend."""
+
+_PERTURBATION = "vehicle.perturbation."
+
+_CHANGES = {p.name.removeprefix(_PERTURBATION): p for p in PLANT_PARAMETERS if p.name.startswith(_PERTURBATION)}
+"""Relative changes of the vehicle's parameters, by theirs."""
+
+
+class FlightVariants:
+    """A scenario's flight, and variants of it."""
+
+    def __init__(self, scenario: Scenario, design: Mapping[str, Any]) -> None:
+        """Assemble the flight.
+
+        Args:
+            scenario: Scenario of the flight that is varied.
+            design: Flat parameters of the controller's design.
+
+        Raises:
+            ScenarioError: The scenario is not acceptable; the message names the field.
+        """
+        self._parameters = dict(design)
+        self._design = design_of(design)
+        self._nominal = {**design, **scenario_parameters(scenario)}
+        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
+        self.unchanged: Components = assemble_flight(scenario, self._design)
+        """Components of the flight itself"""
+        self._vehicle, _ = initial_trim(self._nominal)
+
+    def components(self, scenario: Scenario) -> Components:
+        """Return the components of the flight of another ``scenario`` with the same design.
+
+        Raises:
+            ParameterError, DesignError, TrimError: Names the parameter that is wrong.
+        """
+        values = {**self._parameters, **scenario_parameters(scenario)}
+        names = values.keys() | self._nominal.keys()
+        changed = [name for name in names if values.get(name) != self._nominal.get(name)]
+        if not all(name.startswith(self._kept_for) for name in changed):
+            return assemble(values)
+        if all(name.startswith(_PERTURBATION) or name == SEED_PARAMETER.name for name in changed):
+            found = self.perturbed(scenario.vehicle.perturbation, scenario.seed)
+            if found is not None:
+                return found
+        trajectory = self.unchanged.nominal_trajectory
+        if any(name.startswith("reference.") for name in changed):
+            trajectory = NominalTrajectory.from_parameters(values, self._design)
+        return replace(
+            self.unchanged,
+            plant=Plant.from_parameters(values),
+            nominal_trajectory=trajectory,
+            fault_injector=FaultInjector.from_parameters(values),
+        )
+
+    def perturbed(self, perturbation: Mapping[str, float], seed: int) -> Components | None:
+        """Return the components of a flight that differs in its perturbation and its seed alone.
+
+        That is what most campaigns vary; it is cheap, as nothing else depends on it. ``None`` where a change is none
+        that its parameter admits: who reads such a scenario, or builds its plant, is told which.
+
+        Args:
+            perturbation: Relative changes of the nominal vehicle's parameters, by name.
+            seed: Of what is random in the flight.
+        """
+        if not all(_CHANGES[name].admits(change) for name, change in perturbation.items()):
+            return None
+        vehicle = self._vehicle.perturbed(perturbation)
+        return replace(
+            self.unchanged,
+            plant=self.unchanged.plant.varied(vehicle, seed),
+            fault_injector=self.unchanged.fault_injector.with_seed(seed),
+        )

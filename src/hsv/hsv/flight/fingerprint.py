@@ -1,0 +1,74 @@
+"""The fingerprint of a flight: a digest of every bit that its loop computed, the same on every machine.
+
+A table of published fingerprints is part of the library: whoever flies a shipped scenario with a shipped design can
+tell whether it is the same flight. It holds no scenario whose nominal law calls a solver in flight: what a solver
+returns depends on the machine, within a tolerance.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from hsv.flight.scenario import Scenario, load_scenario
+
+FORMAT = 1
+"""Version of what is digested, and in which order."""
+
+TABLE = "fingerprints.toml"
+
+_ROWS = 2000
+
+
+def fingerprint(flown: np.ndarray) -> str:
+    """Return ``v1:`` and the SHA-256 of the rows ``flown`` (n + 1, 25).
+
+    Rows k = 0 ... n of x (9), q_f, x_n (9), u_n, command, actuator (2 each). The digest is of little-endian float64
+    numbers, row after row, every NaN as the same one.
+    """
+    digest = hashlib.sha256()
+    # As many at a time as the processor's cache holds.
+    for start in range(0, len(flown), _ROWS):
+        digest.update(digested(flown[start : start + _ROWS]).data)
+    return written(digest.digest())
+
+
+def digested(flown: np.ndarray) -> np.ndarray:
+    """Return rows of a history as their fingerprint has them."""
+    rows = np.ascontiguousarray(flown, "<f8")
+    return np.where(unknown, np.nan, rows) if (unknown := np.isnan(rows)).any() else rows
+
+
+def written(digest: bytes) -> str:
+    """Return a digest as a fingerprint is written."""
+    return f"v{FORMAT}:{digest.hex()}"
+
+
+def as_published(found: str | None, scenario: Scenario | None, design_hash: str) -> bool | None:
+    """Tell whether the flight of a scenario with the design of this digest has its published fingerprint.
+
+    ``None`` where nothing can be said: no fingerprint or scenario, one that is not as it is shipped, another design.
+    """
+    entry = _table().get(scenario.name) if scenario else None
+    if found is None or scenario is None or entry is None or entry["design_hash"] != design_hash:
+        return None
+    if load_scenario(scenario.name).parameters() != scenario.parameters():
+        return None
+    return bool(found == entry["fingerprint"])
+
+
+def published_in_words(found: str | None, same: bool | None) -> str:
+    """Return what :func:`as_published` said about a fingerprint, for people."""
+    if found is None:
+        return "none: steps are missing"
+    return {True: "as published", False: "not the published flight of this scenario", None: "none is published"}[same]
+
+
+@cache
+def _table() -> dict[str, Any]:
+    return tomllib.loads(files("hsv.flight").joinpath(TABLE).read_text(encoding="utf-8"))

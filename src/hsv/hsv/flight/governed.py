@@ -1,0 +1,66 @@
+"""Scenarios with governed commands: the same flight along the fastest reference that its design has room for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import tomli_w
+
+from hsv.base.errors import GovernorError
+from hsv.base.units import rounded, written
+from hsv.control.governor import GovernedReference, Governor, InputBounds, input_bounds, legs_of
+from hsv.control.nominal_law import FamilyLaw
+from hsv.control.tube_law import TubeLaw
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.scenario import load_scenario, scenario_table, scenario_text
+
+
+@dataclass(frozen=True)
+class GovernedScenario:
+    """The text of a scenario with governed commands, their reference, and the bounds that its plan keeps."""
+
+    text: str
+    reference: GovernedReference
+    bounds: InputBounds
+
+
+def governed(name: str, blend: float) -> GovernedScenario:
+    """Return the scenario ``name`` (or path) with its commands governed, corners blended over twice ``blend`` (s).
+
+    Raises:
+        ScenarioError: There is no such scenario, or it cannot be flown.
+        GovernorError: It has no certified plan to govern, or a command for which nothing fits.
+    """
+    scenario = load_scenario(name)
+    components = assemble_flight(scenario)
+    law, controller = components.nominal_trajectory.law, components.controller
+    if not isinstance(controller, TubeLaw) or controller.design.plan_bounds is None:
+        raise GovernorError(
+            f"scenario {scenario.name!r}: controller = {scenario.controller!r}, design = {scenario.design!r}: expected "
+            "tube_mpc with a design that has tightened inputs"
+        )
+    if not isinstance(law, FamilyLaw):
+        raise GovernorError(f"scenario {scenario.name!r}: nominal.law = {scenario.nominal.law!r}: expected 'family'")
+    design, allowed = controller.design, controller.design.plan_bounds
+    bounds = input_bounds(allowed, components.plant.data.actuators)
+    governor = Governor(law.data, scenario.vehicle.described.decoupled, design.period, bounds)
+    start = rounded(scenario.initial.altitude), rounded(scenario.initial.velocity)
+    reference = governor.govern(start, legs_of(start, *scenario.commands), blend)
+    return GovernedScenario(tomli_w.dumps(_table(name, reference)), reference, bounds)
+
+
+def _table(name: str, reference: GovernedReference) -> dict[str, Any]:
+    table = scenario_table(scenario_text(name), name)
+    commands = []
+    for (start, *before, _), (end, *after, _) in pairwise(reference.corners):
+        climbed, gained = (round(b - a, 9) for a, b in zip(before, after, strict=True))
+        if climbed or gained:
+            changes = {"altitude_change": written(climbed, "m"), "velocity_change": written(gained, "m/s")}
+            commands.append({**changes, "start": written(start, "s"), "end": written(end, "s")})
+    return {
+        **table,
+        "command": commands,
+        "reference": {**table.get("reference", {}), "blend": written(reference.blend, "s")},
+    }

@@ -1,0 +1,121 @@
+"""What a flight produced: every signal of every step."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+from typing import NamedTuple
+
+import numpy as np
+
+from hsv.model.dynamics import N_INPUTS, N_STATES
+
+X, Q_F, X_N, U_N, U, ACTUATOR, FLOWN = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
+"""First columns of x, q_f, x_n, u_n, the command u and what reaches the actuators in the rows of
+:attr:`History.flown`, and the number of all columns."""
+
+GAIN_INDEX, U_UNSATURATED, BESIDE = accumulate((0, 1, N_INPUTS))
+"""The same of the rows of :attr:`History.beside`."""
+
+
+class History(NamedTuple):
+    """Rows k = 0 ... n of everything that a flight produced, SI."""
+
+    flown: np.ndarray
+    """(n + 1, 25): what its fingerprint is made of, side by side"""
+    beside: np.ndarray
+    """(n + 1, 3)"""
+    estimated: np.ndarray | None
+    """(n + 1, 9), where that is not the state"""
+
+    @classmethod
+    def empty(cls, rows: int, *, estimated: bool = True) -> History:
+        """Return room for ``rows`` steps; ``estimated``: also for what the controller was given for the state."""
+        return cls.over(np.empty(rows * (cls.numbers() if estimated else FLOWN + BESIDE)), rows, estimated=estimated)
+
+    @classmethod
+    def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
+        """Return ``rows`` steps that lie in ``memory`` (..., numbers), one matrix after the other; of each of many."""
+        matrices, start = [], 0
+        for width in (FLOWN, BESIDE, N_STATES)[: 3 if estimated else 2]:
+            stop = start + rows * width
+            matrices.append(memory[..., start:stop].reshape(*memory.shape[:-1], rows, width))
+            start = stop
+        return cls(matrices[0], matrices[1], matrices[2] if estimated else None)
+
+    @staticmethod
+    def numbers() -> int:
+        """Return how many numbers a step has."""
+        return FLOWN + BESIDE + N_STATES
+
+    @property
+    def state(self) -> np.ndarray:
+        """State x (n + 1, 9)."""
+        return self.flown[:, X:Q_F]
+
+    @property
+    def estimate(self) -> np.ndarray:
+        """(n + 1, 9), what the controller was given for the state: measured, or what an estimator makes of that."""
+        return self.state if self.estimated is None else self.estimated
+
+    @property
+    def filtered_pitch_rate(self) -> np.ndarray:
+        """q_f (n + 1), rad/s."""
+        return self.flown[:, Q_F]
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """x_n (n + 1, 9)."""
+        return self.flown[:, X_N:U_N]
+
+    @property
+    def nominal_input(self) -> np.ndarray:
+        """u_n (n + 1, 2)."""
+        return self.flown[:, U_N:U]
+
+    @property
+    def gain_index(self) -> np.ndarray:
+        """(n + 1), of the nested family."""
+        return self.beside[:, GAIN_INDEX]
+
+    @property
+    def u_unsaturated(self) -> np.ndarray:
+        """(n + 1, 2)."""
+        return self.beside[:, U_UNSATURATED:BESIDE]
+
+    @property
+    def command(self) -> np.ndarray:
+        """Input u (n + 1, 2)."""
+        return self.flown[:, U:ACTUATOR]
+
+    @property
+    def actuator(self) -> np.ndarray:
+        """(n + 1, 2)."""
+        return self.flown[:, ACTUATOR:FLOWN]
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Return all signals by name, in the order of the loop."""
+        return {name: getattr(self, name) for name in SIGNALS}
+
+    def copy(self) -> History:
+        """Return a copy in new memory."""
+        estimated = None if self.estimated is None else self.estimated.copy()
+        return History(self.flown.copy(), self.beside.copy(), estimated)
+
+    def cut(self, rows: int) -> History:
+        """Return the first ``rows`` steps."""
+        estimated = None if self.estimated is None else self.estimated[:rows]
+        return History(self.flown[:rows], self.beside[:rows], estimated)
+
+
+SIGNALS = (
+    "state",
+    "estimate",
+    "filtered_pitch_rate",
+    "deviation",
+    "nominal_input",
+    "gain_index",
+    "u_unsaturated",
+    "command",
+    "actuator",
+)
+"""What a :class:`History` tells of, in the order of the loop."""

@@ -1,0 +1,92 @@
+"""The verdict on a flight: its metrics against the limits that its scenario states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from hsv.base.units import UnitSystem, in_system, significant
+from hsv.flight.metrics import CRITERIA, METRICS, in_words
+from hsv.flight.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A limit (SI) and the metric it is for; ``value`` is None where the flight does not define the metric."""
+
+    limit: float
+    value: float | None
+    ended: bool = True
+    """Whether the flight came to its end; one that did not may exceed a limit, but kept none."""
+
+    @property
+    def within(self) -> bool:
+        """Whether the flight came to its end and the magnitude of the metric stayed within the limit."""
+        return self.words == "within"
+
+    @property
+    def words(self) -> str:
+        """The verdict: ``within``, ``over``, ``not reached`` or ``not flown to the end``."""
+        if self.value is not None and not abs(self.value) <= self.limit:
+            return "over"
+        if not self.ended:
+            return "not flown to the end"
+        return "not reached" if self.value is None else "within"
+
+
+def verdicts(scenario: Scenario, metrics: Mapping[str, float], *, ended: bool) -> dict[str, Verdict]:
+    """Return the verdict for each metric that ``scenario`` limits, on a flight that came to its end or did not."""
+    return {name: Verdict(limit, metrics.get(name), ended) for name, limit in scenario.limits.items()}
+
+
+def in_units(name: str, value: float, system: UnitSystem) -> str:
+    """Return the value (SI) of a metric with its unit in ``system``, three digits."""
+    metric = METRICS[name]
+    number, unit = in_system(value, metric.unit, system, share=metric.share)
+    return significant(number) + ("" if unit == "1" else f" {unit}")
+
+
+def not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float]) -> list[str]:
+    """Return the names of the metrics of a flight that have no limit, those that the paper judges by first."""
+    free = [name for name in metrics if name not in judged]
+    return sorted(free, key=lambda name: name not in CRITERIA)
+
+
+def verdict_sentence(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> str:
+    """Return in one line whether a flight kept the limits of its scenario, which it broke, and what is not judged.
+
+    Args:
+        judged: Verdicts, from :func:`verdicts`.
+        metrics: Metrics of the flight by name, SI.
+        system: Units of the numbers in it.
+    """
+    text = limits_kept(judged, system)
+    words = criteria_not_judged(judged, metrics, system)
+    if others := len(not_judged(judged, metrics)) - len(words):
+        plural = "s" if others > 1 else ""
+        words.append(f"{others} other{plural}" if words else f"{others} metric{plural} without a limit")
+    return f"{text}; not judged: {', '.join(words)}" if words and judged else text
+
+
+def criteria_not_judged(judged: Mapping[str, Verdict], metrics: Mapping[str, float], system: UnitSystem) -> list[str]:
+    """Return in words, with their values, the metrics that the paper judges a flight by and its scenario does not."""
+    named = [name for name in not_judged(judged, metrics) if name in CRITERIA]
+    return [f"{in_words(name)} ({in_units(name, metrics[name], system)})" for name in named]
+
+
+def limits_kept(judged: Mapping[str, Verdict], system: UnitSystem) -> str:
+    """Return the same without what is not judged."""
+    if not judged:
+        return "not judged: the scenario has no limits"
+    if all(verdict.within for verdict in judged.values()):
+        return f"within {'its limit' if len(judged) == 1 else f'all {len(judged)} limits'}"
+    over = [(name, v) for name, v in judged.items() if not v.within and (v.ended or v.words == "over")]
+    said = ", ".join(f"{in_words(name)} {_broken(name, verdict, system)}" for name, verdict in over)
+    head = [] if all(verdict.ended for verdict in judged.values()) else ["not flown to the end"]
+    return "; ".join([*head, *([f"{len(over)} of {len(judged)} limits not kept: {said}"] if over else [])])
+
+
+def _broken(name: str, verdict: Verdict, system: UnitSystem) -> str:
+    if verdict.value is None:
+        return verdict.words
+    return f"{in_units(name, verdict.value, system)} (limit {in_units(name, verdict.limit, system)})"

@@ -1,0 +1,166 @@
+"""Whether a controller flies the same bytes whenever, and beside whatever else, it is flown.
+
+Runs are repeated, campaigns are flown by many processes, and replays go on from where another run stood: all that asks
+of a controller that everything it keeps from step to step is its own, is forgotten in ``reset`` and can be copied.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsv.base.errors import HsvError, ParameterError, RunError
+from hsv.base.threads import ctrl_c_held_back
+from hsv.control.controller import Controller, ControllerInput
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.flight import Flight
+from hsv.flight.history import SIGNALS, History
+from hsv.flight.scenario import Scenario, load_scenario, scenario_names
+from hsv.model.dynamics import PITCH_RATE
+
+FLOWN_BY_DEFAULT = "case1"
+"""The scenario of a controller that is given without one."""
+
+_FLIGHTS = 2
+"""Flights at a time in each process under load."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One way of repeating a flight, how many flights it took, and where bytes differ first; empty: nowhere."""
+
+    check: str
+    flights: int
+    difference: str
+
+
+def scenario_of(name: str) -> Scenario:
+    """Return the scenario with this name or path, or the default one with the controller of this name.
+
+    Raises:
+        ScenarioError: Names what is wrong with it.
+    """
+    if name in scenario_names() or name.endswith(".toml"):
+        return load_scenario(name)
+    return load_scenario(FLOWN_BY_DEFAULT, {"controller": name})
+
+
+def findings(scenario: Scenario) -> Iterator[Finding]:
+    """Fly ``scenario`` in every way in which it must be the same, and yield what came out.
+
+    Raises:
+        ScenarioError: It cannot be flown.
+        RunError: The controller failed in the first flight; it is named, with the step.
+    """
+    parts = assemble_flight(scenario)
+    first = fly(parts)
+    yield Finding("flown twice", 2, _flown_alike(first, assemble_flight(scenario)))
+    yield Finding("after a reset", 2, _flown_alike(first, parts))
+    yield Finding("from a copied state", 2, from_copied_state(assemble_flight(scenario), first))
+    yield under_load(scenario, first)
+
+
+def from_copied_state(parts: Components, flight: Flight) -> str:
+    """Step the controller along a ``flight`` of its own, from half-way on in turns with a copy of it.
+
+    Returns:
+        Where an answer differs first from that of the flight, and whose it is; empty: nowhere.
+    """
+    steps = len(flight.time)
+    steppers = {"the controller": parts.controller}
+    try:
+        parts.controller.reset()
+        parts.notch_filter.reset()
+        for k in range(steps):
+            if k == steps // 2:
+                steppers["its copy"] = _copy(parts.controller)
+            filtered = parts.notch_filter.step(flight.history.estimate[k, PITCH_RATE])
+            for name, stepper in steppers.items():
+                inputs = _inputs(k, flight, filtered.filtered_pitch_rate, filtered.filter_state)
+                answered, expected = stepper.step(inputs).u_unsaturated, flight.history.u_unsaturated[k]
+                if answered.tobytes() != expected.tobytes():
+                    return f"{name}: u_unsaturated from step {k} on: {answered.tolist()}, not {expected.tolist()}"
+    except HsvError as error:
+        return str(error)
+    return ""
+
+
+def _copy(controller: Controller) -> Controller:
+    try:
+        return controller.copied()
+    # Foreign objects may refuse in any way.
+    except Exception as error:
+        words = " ".join(str(error).split())
+        raise ParameterError(f"the controller cannot be copied: {type(error).__name__}: {words}") from error
+
+
+def _inputs(k: int, flight: Flight, filtered_pitch_rate: float, filter_state: np.ndarray) -> ControllerInput:
+    history = flight.history
+    rows = history.estimate, flight.reference, flight.reference_input, history.deviation, history.nominal_input
+    # Copies: a controller may keep or change what it was given.
+    x, x_r, u_r, x_n, u_n = (row[k].copy() for row in rows)
+    return ControllerInput(k, x, filtered_pitch_rate, x_r, u_r, x_n, u_n, filter_state.copy())
+
+
+def under_load(scenario: Scenario, first: Flight) -> Finding:
+    """Fly ``scenario`` in more processes than there are processors, several flights at a time in each."""
+    processes = min(os.cpu_count() or 1, 4) + 1
+    # A process of its own in every respect, as that of a campaign on another machine.
+    context = multiprocessing.get_context("spawn")
+    name = f"under load, {processes} processes"
+    try:
+        with ProcessPoolExecutor(processes, mp_context=context) as pool:
+            try:
+                with ctrl_c_held_back():
+                    flown = [pool.submit(_fly_at_once, scenario) for _ in range(processes)]
+                histories = [history for future in flown for history in future.result()]
+            except KeyboardInterrupt:
+                for process in multiprocessing.active_children():
+                    process.terminate()
+                raise
+    except BrokenProcessPool:
+        return Finding(name, processes * _FLIGHTS, "a process died")
+    except HsvError as error:
+        return Finding(name, processes * _FLIGHTS, str(error))
+    differences = (_difference(first.history, history) for history in histories)
+    return Finding(name, len(histories), next(filter(None, differences), ""))
+
+
+def _fly_at_once(scenario: Scenario) -> list[History]:
+    with ThreadPoolExecutor(_FLIGHTS) as threads:
+        return list(threads.map(lambda _: fly(assemble_flight(scenario)).history, range(_FLIGHTS)))
+
+
+def _flown_alike(first: Flight, parts: Components) -> str:
+    try:
+        return _difference(first.history, fly(parts).history)
+    except RunError as error:
+        return str(error)
+
+
+def _difference(first: History, other: History) -> str:
+    """Return where the bytes of another flight differ first from those of the ``first``; empty: nowhere."""
+    rows = min(len(first.state), len(other.state))
+    found = []
+    # In the order of the loop: of what differs in a step, the first is the cause.
+    for order, name in enumerate(SIGNALS):
+        columns = (getattr(history, name)[:rows] for history in (first, other))
+        expected, flown = (np.ascontiguousarray(column).reshape(rows, -1) for column in columns)
+        different = np.flatnonzero(np.any(expected.view(np.uint64) != flown.view(np.uint64), axis=1))
+        if len(different):
+            step = int(different[0])
+            found.append(
+                (step, order, f"{name} from step {step} on: {flown[step].tolist()}, not {expected[step].tolist()}")
+            )
+    if found:
+        return min(found)[2]
+    if len(first.state) != len(other.state):
+        return f"ends with step {len(other.state) - 1}, not {len(first.state) - 1}"
+    return ""

@@ -1,0 +1,157 @@
+"""Summary of a resilience campaign: cells of severity, time and fault, and the worst flight of each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from hsv.base.errors import CampaignError
+from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
+from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
+from hsv.flight.resilience.flights import Boundary, FlownFault
+from hsv.flight.resilience.run import CaseStore
+
+
+@dataclass(frozen=True)
+class Cell:
+    """The flights of one controller with one fault, severity and time of occurrence, over the vehicles."""
+
+    case: Case
+    severity: str
+    flights: tuple[FlownFault, ...]
+
+    @property
+    def survived(self) -> int:
+        """Flights that came to their end."""
+        return sum(flight.survived for flight in self.flights)
+
+    @property
+    def share(self) -> float:
+        """Share of flights that came to their end."""
+        return self.survived / len(self.flights)
+
+    @property
+    def worst(self) -> FlownFault:
+        """The flight that was lost first, or went farthest from that without the fault."""
+        return worst_of(self.flights)
+
+    @property
+    def attitude(self) -> float | None:
+        """Largest distance of attitude, rad."""
+        return max((f.attitude for f in self.flights if f.attitude is not None), default=None)
+
+    @property
+    def altitude(self) -> float | None:
+        """Largest distance of altitude, m."""
+        return max((f.altitude for f in self.flights if f.altitude is not None), default=None)
+
+    @property
+    def recovery_time(self) -> float | None:
+        """Longest time to recovery, s; None where not every flight recovers."""
+        times = [flight.recovery_time if flight.survived else None for flight in self.flights]
+        known = [time for time in times if time is not None]
+        return max(known) if len(known) == len(times) else None
+
+    @property
+    def time_to_loss(self) -> float | None:
+        """Shortest time to the loss of a flight, s; None where none was lost."""
+        return min((f.time_to_loss for f in self.flights if f.time_to_loss is not None), default=None)
+
+
+def worst_of(flights: Iterable[FlownFault]) -> FlownFault:
+    """Return the flight that its controller crashed, else was lost first, else went farthest off in attitude."""
+
+    def rank(flight: FlownFault) -> tuple[float, ...]:
+        if flight.survived:
+            return (1.0, 0.0, -(flight.attitude or 0.0))
+        return (0.0, flight.time_to_loss or 0.0, 0.0)
+
+    return min(flights, key=rank)
+
+
+@dataclass(frozen=True)
+class Square:
+    """A fault and a controller on the map: cells by time and severity, and the boundary at each time."""
+
+    fault: str
+    subject: Subject
+    cells: dict[Moment, tuple[Cell, ...]]
+    boundaries: dict[Moment, Boundary]
+
+    @property
+    def worst(self) -> tuple[Cell, FlownFault]:
+        """The worst flight of all, and its cell."""
+        flights = {id(cell.worst): cell for row in self.cells.values() for cell in row}
+        found = worst_of(cell.worst for cell in flights.values())
+        return flights[id(found)], found
+
+    @property
+    def survived(self) -> tuple[int, int]:
+        """Flights that came to their end, and all."""
+        cells = [cell for row in self.cells.values() for cell in row]
+        return sum(cell.survived for cell in cells), sum(len(cell.flights) for cell in cells)
+
+
+@dataclass(frozen=True)
+class ResilienceResults:
+    """A campaign with all of its squares."""
+
+    campaign: ResilienceCampaign
+    squares: dict[tuple[str, str], Square]
+    """Squares by fault and controller."""
+
+    @classmethod
+    def read(cls, campaign: ResilienceCampaign, store: CaseStore) -> ResilienceResults:
+        """Return the results in ``store``.
+
+        Raises:
+            CampaignError: A case is missing.
+        """
+        squares = {}
+        for fault in campaign.faults:
+            for subject in campaign.subjects:
+                cells, boundaries = {}, {}
+                for moment in Moment:
+                    case = Case(subject, fault, moment)
+                    outcome = store.read(case)
+                    if outcome is None:
+                        raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
+                    flights, boundaries[moment] = outcome
+                    cells[moment] = tuple(
+                        Cell(case, severity, tuple(f for f in flights if f.severity == severity))
+                        for severity in SEVERITIES
+                    )
+                squares[fault, subject.name] = Square(fault, subject, cells, boundaries)
+        return cls(campaign, squares)
+
+    @property
+    def cells(self) -> list[Cell]:
+        """All cells, in a fixed order."""
+        return [cell for square in self.squares.values() for row in square.cells.values() for cell in row]
+
+    @property
+    def flights(self) -> Sequence[FlownFault]:
+        """All flights but those of the bisections."""
+        return [flight for cell in self.cells for flight in cell.flights]
+
+
+def said_boundary(fault: TriedFault, boundary: Boundary) -> str:
+    """Return in words how far the nominal vehicle survives."""
+    if boundary.survived is None:
+        return f"lost at {fault.said(fault.harmless)}"
+    if boundary.lost is None:
+        return f"all, to {fault.said(fault.worst)}"
+    return f"to {fault.said(fault.value(boundary.survived))}"
+
+
+def said_boundaries(fault: TriedFault, boundaries: Mapping[Moment, Boundary]) -> list[str]:
+    """Return in words how far the nominal vehicle survives at each time; once, where that is the same."""
+    return list(dict.fromkeys(said_boundary(fault, boundaries[moment]) for moment in Moment))
+
+
+def parameter_words(name: str) -> str:
+    """Return the description of a fault's severity: mild, medium and severe values, range, and fixed parameters."""
+    fault = TRIED[name]
+    fixed = "".join(f", {key.replace('_', ' ')} {value}" for key, value in fault.fixed.items())
+    tried = f"{fault.said(*fault.values)} ({fault.harmless:g} to {fault.said(fault.worst)}){fixed}"
+    return f"{fault.parameter.replace('_', ' ')} {tried}"

@@ -1,0 +1,487 @@
+"""A flight to fly, as written in a TOML file with units, and as the parameters that the components take."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any
+
+import tomli_w
+from pydantic import Field, StrictInt, ValidationError
+
+from hsv.base.documents import parse_toml, read_text
+from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
+from hsv.base.inheritance import follow_extends, is_path
+from hsv.base.parameters import table_values
+from hsv.base.units import parse_quantity
+from hsv.control.controllers import SHIPPED_CONTROLLERS
+from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
+from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
+from hsv.control.library import inside
+from hsv.control.tube_factor import TAU, rigid_factors
+from hsv.core.noise import SEED_PARAMETER
+from hsv.flight.commands import Breakpoints, CommandTable, breakpoints, check_envelope
+from hsv.flight.distribution import KINDS, Distribution
+from hsv.flight.fields import Reading, Table, Time
+from hsv.flight.metrics import METRICS
+from hsv.flight.tables import (
+    FaultTable,
+    InitialTable,
+    IntegralTable,
+    NominalTable,
+    NotchTable,
+    ReferenceTable,
+    RobustMpcTable,
+    TubeTable,
+    VehicleTable,
+)
+from hsv.flight.values import fault_tables, number, own_value, tables_in
+from hsv.model.faults.injector import NEVER_TIME, written_parameters
+from hsv.model.faults.table import Fault
+from hsv.model.links import COMMAND_LINK_PARAMETERS
+from hsv.model.plant import EQUIPMENT_PARAMETERS, check_equipment
+from hsv.model.vehicle import (
+    DEFAULT_VEHICLE,
+    SHIPPED_VEHICLES,
+    vehicle_label,
+    vehicle_tables,
+)
+
+
+class Scenario(Table):
+    """A flight: vehicle, initial point, commands, controller design, faults, and what is expected of it."""
+
+    name: str
+    title: str
+    design: str = "baseline"
+    """Name or path; empty: none"""
+    controller: str = "tube_mpc"
+    """A registered name, ``package.module:Class``, or ``path/lib.so:symbol``, the path absolute"""
+    duration: Time
+    vehicle: VehicleTable = VehicleTable()
+    initial: InitialTable
+    command: tuple[CommandTable, ...] = ()
+    reference: ReferenceTable = ReferenceTable()
+    notch: NotchTable = NotchTable()
+    nominal: NominalTable = NominalTable()
+    tube: TubeTable = TubeTable()
+    integral: IntegralTable = IntegralTable()
+    robust_mpc: RobustMpcTable = RobustMpcTable()
+    fault: tuple[FaultTable, ...] = ()
+    seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
+    """Key of all that is random"""
+    equipment: dict[str, Any] = Field(default_factory=dict)
+    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors, links and estimators"""
+    own: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
+    limits: dict[str, float] = Field(default_factory=dict)
+    """Largest magnitude expected of a metric, SI."""
+
+    @property
+    def commands(self) -> Breakpoints:
+        """Altitudes (m) and velocities (m/s) that are commanded."""
+        return breakpoints(self.initial.altitude, self.initial.velocity, self.command)
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the flat parameters of this scenario but those of a controller of one's own.
+
+        With those (:func:`hsv.flight.assembly.scenario_parameters`) and the design's they determine the flight.
+        """
+        values: dict[str, Any] = {
+            "duration": self.duration,
+            **self.vehicle.described.to_parameters(),
+            "vehicle.digest": self.vehicle.described.digest,
+            "vehicle.model": self.vehicle.model,
+            "vehicle.coupling": self.vehicle.coupling,
+            "initial.altitude": self.initial.altitude,
+            "initial.velocity": self.initial.velocity,
+            "reference.trim": self.reference.trim,
+            "notch.enabled": self.notch.enabled,
+            "controller": self.controller,
+            "nominal.law": self.nominal.law,
+            "integral.rate": self.integral.rate,
+            "robust_mpc.gain_index": self.robust_mpc.gain_index,
+        }
+        values |= {f"reference.{name}": list(column) for name, column in self.commands._asdict().items()}
+        if self.reference.blend:
+            values["reference.blend"] = self.reference.blend
+        flown = self.notch.model_dump(exclude={"enabled"})
+        values |= {f"notch.flown.{name}": list(numbers) for name, numbers in flown.items() if numbers}
+        values |= {f"vehicle.perturbation.{name}": value for name, value in self.vehicle.perturbation.items()}
+        if self.tube.tau:
+            values["feedback.tau"] = list(self.tube.tau)
+        if self.tube.change:
+            # Flat parameters are of one kind: five factors a change.
+            values["tau_change.starts"] = [change.start for change in self.tube.change]
+            values["tau_change.values"] = [
+                tau for change in self.tube.change for tau in rigid_factors(change.tau, "tube.change.tau").tolist()
+            ]
+        if self.fault:
+            values["fault.channels"] = [fault.channel for fault in self.fault]
+            values["fault.types"] = [fault.type for fault in self.fault]
+            values["fault.parameters"] = [written_parameters(fault.parameters) for fault in self.fault]
+            values["fault.starts"] = [fault.start for fault in self.fault]
+            values["fault.stops"] = [NEVER_TIME if fault.stop is None else fault.stop for fault in self.fault]
+        return values | {"seed": self.seed} | self.equipment
+
+
+PERIOD = 0.02
+"""Control period, s, until a design defines it; whether equipment is consistent does not depend on it."""
+
+_EQUIPMENT_PARAMETERS = (
+    *EQUIPMENT_PARAMETERS,
+    *COMMAND_LINK_PARAMETERS,
+    *ESTIMATOR_PARAMETERS,
+    *EFFECTIVENESS_PARAMETERS,
+)
+
+EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
+"""Tables of what is ideal unless they say otherwise, and of the estimators, of the state and of the effectiveness."""
+
+_NO_KEYS = ("name", "own", "equipment")
+"""Fields that a file has not, or has otherwise."""
+
+_OF_A_CONTROLLER = ("tube", "integral", "effectiveness", "robust_mpc")
+"""Tables of the bench's own controllers."""
+
+REPLACED = ("limits",)
+"""Tables that a scenario does not share with the one it extends: what is expected of a flight is its own."""
+
+
+def scenario_names() -> list[str]:
+    """Return the names of the shipped scenarios."""
+    return sorted(Path(entry.name).stem for entry in _shipped().iterdir() if entry.name.endswith(".toml"))
+
+
+def scenario_text(name: str) -> str:
+    """Return the text of a shipped scenario (by name) or of a file (by path), which stands alone.
+
+    What it extends is written out, and a vehicle that is not a shipped one; the path of a library is absolute.
+
+    Raises:
+        ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
+    """
+    text = _own_text(name)
+    own = scenario_table(text, name)
+    whole = follow_extends(
+        name, lambda other: _located(scenario_table(_own_text(other), other), other), _refused, REPLACED, KINDS
+    )
+    whole = _with_definition(whole, name)
+    return text if whole == own else tomli_w.dumps(whole)
+
+
+def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return the table of a file with the paths of library and vehicle from where we are, as those of a shipped one.
+
+    A vehicle that is named replaces the definition of the one that the scenario would take from another.
+    """
+    folder = Path(name).parent if is_path(name) else Path()
+    controller, vehicle = table.get("controller"), table.get("vehicle", {})
+    located = dict(table)
+    if "name" in vehicle and "definition" not in vehicle:
+        place = str(folder / vehicle["name"]) if is_path(vehicle["name"]) else vehicle["name"]
+        located["vehicle"] = {**vehicle, "name": place, "definition": None}
+    if isinstance(controller, str):
+        try:
+            located["controller"] = inside(controller, folder)
+        except ParameterError as error:
+            raise _refused(name, error) from error
+    return located
+
+
+def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a scenario with its vehicle written out, if it is not a shipped one.
+
+    Raises:
+        ScenarioError: There is no such vehicle.
+    """
+    vehicle = {key: value for key, value in table.get("vehicle", {}).items() if value is not None}
+    place = vehicle.get("name", DEFAULT_VEHICLE)
+    if "definition" not in vehicle and place not in SHIPPED_VEHICLES:
+        try:
+            vehicle |= {"name": vehicle_label(place), "definition": vehicle_tables(place)}
+        except HsvError as error:
+            raise _refused(name, error) from error
+    return {**table, "vehicle": vehicle} if vehicle else table
+
+
+def _refused(name: str, why: object) -> ScenarioError:
+    return ScenarioError(f"scenario {Path(name).stem!r}: {why}")
+
+
+def _own_text(name: str) -> str:
+    if is_path(name):
+        try:
+            return read_text(Path(name))
+        except DocumentError as error:
+            raise ScenarioError(f"scenario {name!r}: {error}, expected a TOML file") from error
+    if name not in scenario_names():
+        raise ScenarioError(f"scenario {name!r}: expected a path or one of {', '.join(scenario_names())}")
+    return _shipped().joinpath(f"{name}.toml").read_text(encoding="utf-8")
+
+
+def scenario_table(text: str, name: str) -> dict[str, Any]:
+    """Return the table of a scenario's ``text``, its vehicle a table in it.
+
+    Raises:
+        ScenarioError: It is no TOML, or the vehicle is none, or the controller no name.
+    """
+    try:
+        table = parse_toml(text)
+    except DocumentError as error:
+        raise _refused(name, error) from error
+    if not isinstance(controller := table.get("controller", ""), str):
+        raise _refused(name, f"controller = {controller!r}: expected a name or a path")
+    return _with_named_vehicle(table, name)
+
+
+def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a scenario with a vehicle that is given by its name alone as a table."""
+    vehicle = table.get("vehicle", {})
+    if isinstance(vehicle, str):
+        vehicle = {"name": vehicle}
+    if not isinstance(vehicle, dict):
+        raise _refused(name, f"vehicle = {vehicle!r}: expected a name, a path, or a table")
+    if not isinstance(vehicle.get("name", ""), str):
+        raise _refused(name, f"vehicle.name = {vehicle['name']!r}: expected a name or a path")
+    if not isinstance(vehicle.get("definition", {}), dict):
+        raise _refused(name, f"vehicle.definition = {vehicle['definition']!r}: expected the tables of a vehicle file")
+    return {**table, "vehicle": vehicle} if vehicle else table
+
+
+def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Scenario:
+    """Return a shipped scenario (by name) or one from a file (by path), with fields changed.
+
+    Args:
+        name: Name or path.
+        changes: Values as a file has them, with their units, by field, such as ``{"fault[0].effectiveness": 0.8}``.
+
+    Raises:
+        ScenarioError: Missing, or a field is wrong; the message names it, its value and what was expected.
+    """
+    text = scenario_text(name)
+    if changes:
+        table = scenario_table(text, name)
+        for field, value in changes.items():
+            set_field(table, field, value, name)
+            table = _with_named_vehicle(table, name)
+            if field == "vehicle.name":
+                table["vehicle"].pop("definition", None)
+        if changes.keys() & {"controller", "vehicle", "vehicle.name"}:
+            table = _with_definition(_located(table, name), name)
+        text = tomli_w.dumps(table)
+    return parse_scenario(text, Path(name).stem)
+
+
+def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
+    """Put a value, as a file has it, in the place of a ``field`` of the scenario in ``table``.
+
+    Raises:
+        ScenarioError: There is no such place in the scenario, which is called ``name``.
+    """
+    *path, key = (int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", field))
+    place: Any = table
+    for part in path:
+        if isinstance(place, dict) and isinstance(part, str):
+            place = place.setdefault(part, {})
+        elif isinstance(place, list) and isinstance(part, int) and part < len(place):
+            place = place[part]
+        else:
+            raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
+    if isinstance(place, dict) != isinstance(key, str) or (isinstance(key, int) and key >= len(place)):
+        raise _refused(name, f"{field}: no such field, expected one such as fault[0].start")
+    place[key] = value
+
+
+def with_controller(text: str, controller: str, name: str) -> str:
+    """Return a scenario's ``text`` with another controller, without the tables of the controller that it had.
+
+    Raises:
+        ScenarioError: ``text``, the scenario called ``name``, is no TOML.
+    """
+    table = scenario_table(text, name)
+    left = {key: value for key, value in table.items() if key not in (*_OF_A_CONTROLLER, *_own_tables(table))}
+    return tomli_w.dumps(left | {"controller": controller})
+
+
+def parse_scenario(text: str, name: str) -> Scenario:
+    """Return the scenario written in ``text``, as :func:`scenario_text` returns it; errors as :func:`load_scenario`."""
+    scenario, drawn = scenario_at_means(scenario_table(text, name), name)
+    if drawn:
+        field = next(iter(drawn))
+        raise ScenarioError(
+            f"scenario {name!r}: {field}: a distribution, which hsv montecarlo draws; expected a number"
+        )
+    return scenario
+
+
+def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[str, Distribution]]:
+    """Return the scenario in ``table`` with the mean of each distribution in its place, and these by field.
+
+    Raises:
+        ScenarioError: As :func:`load_scenario`; or the vehicle is in another file: nothing is read from one.
+    """
+    whole = table
+    vehicle = table.get("vehicle", {})
+    if is_path(vehicle.get("name", "")) and "definition" not in vehicle:
+        raise ScenarioError(
+            f"scenario {name!r}: vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition"
+        )
+    for key in _NO_KEYS:
+        if key in table:
+            why = ", a scenario is called by its file" if key == "name" else ""
+            raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
+    equipment = {key: value for key, value in table.items() if key in EQUIPMENT}
+    own = _own_tables(table)
+    table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | equipment)}
+    vehicle = {"coupling": "", **table.get("vehicle", {})}
+    try:
+        reading = Reading(VehicleTable.model_construct(**vehicle).described)
+        found = reading.drawn
+        own = {key: {k: own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
+        given = {
+            **table,
+            "name": name,
+            "own": own,
+            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, partial(number, found)),
+            "fault": fault_tables(table.get("fault", ()), found),
+            "limits": _limits(table.get("limits", {})),
+            "vehicle": vehicle,
+        }
+        scenario = Scenario.model_validate(given, context=reading)
+        _check(scenario)
+    except ValidationError as error:
+        raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
+    except HsvError as error:
+        raise ScenarioError(f"scenario {name!r}: {error}") from error
+    return scenario, {field: found[id(place)] for field, place in tables_in(whole) if id(place) in found}
+
+
+def _shipped() -> Any:
+    return files("hsv.flight").joinpath("scenarios")
+
+
+def _own_tables(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a controller of one's own."""
+    if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
+        return {}
+    known = Scenario.model_fields.keys() | EQUIPMENT
+    return {key: value for key, value in table.items() if isinstance(value, dict) and key not in known}
+
+
+def _limits(table: object) -> dict[str, float]:
+    if not isinstance(table, dict):
+        raise ScenarioError(f"limits = {table!r}: expected a table of metrics")
+    for name in table:
+        if name not in METRICS:
+            raise ScenarioError(f"limits.{name}: no such metric, expected one of {', '.join(METRICS)}")
+    limits = {name: parse_quantity(value, METRICS[name].unit, f"limits.{name}") for name, value in table.items()}
+    for name, limit in limits.items():
+        if limit < 0.0:
+            raise ScenarioError(f"limits.{name} = {table[name]!r}: expected the largest magnitude, not below zero")
+    return limits
+
+
+def _check(scenario: Scenario) -> None:
+    if not scenario.design and scenario.controller in SHIPPED_CONTROLLERS:
+        raise ScenarioError(f"design = '': expected one, {scenario.controller} flies with its gains")
+    for name, value in scenario.vehicle.perturbation.items():
+        if name not in scenario.vehicle.described.uncertainty:
+            expected = ", ".join(scenario.vehicle.described.uncertainty)
+            raise ScenarioError(f"vehicle.perturbation.{name} = {value}: no such parameter, expected one of {expected}")
+    for table, controller in (("robust_mpc", "robust_mpc"), ("integral", "tube_mpc"), ("tube", "tube_mpc")):
+        if table in scenario.model_fields_set and scenario.controller != controller:
+            raise ScenarioError(f"{table}: {scenario.controller} does not read it, expected controller {controller}")
+    if scenario.controller != "tube_mpc" and any(name.startswith("effectiveness.") for name in scenario.equipment):
+        raise ScenarioError(f"effectiveness: {scenario.controller} does not read it, expected controller tube_mpc")
+    if "nominal" in scenario.model_fields_set and scenario.controller == "robust_mpc":
+        raise ScenarioError("nominal: robust_mpc does not read it, expected one that follows the nominal state")
+    for index, change in enumerate(scenario.tube.change):
+        field = f"tube.change[{index}].tau"
+        try:
+            rigid_factors(replace(TAU, name=field).check(change.tau), field)
+        except ParameterError as error:
+            raise ScenarioError(str(error).removeprefix("parameter ")) from error
+    for index, fault in enumerate(scenario.fault):
+        try:
+            Fault.of(fault.channel, fault.type, fault.parameters)
+        except ParameterError as error:
+            raise ScenarioError(str(error).replace("fault.", f"fault[{index}].", 1)) from error
+    if scenario.equipment:
+        try:
+            check_equipment(scenario.equipment, scenario.vehicle.described.decoupled, PERIOD)
+        except ParameterError as error:
+            raise ScenarioError(str(error).removeprefix("parameter ")) from error
+    check_envelope(scenario.commands, scenario.command, scenario.vehicle.described)
+    _check_starts(scenario)
+
+
+def _check_starts(scenario: Scenario) -> None:
+    """Refuse what the flight would never come to."""
+    starts = {
+        "command": [command.start for command in scenario.command],
+        "tube.change": [change.start for change in scenario.tube.change],
+        "fault": [fault.start for fault in scenario.fault],
+    }
+    for table, times in starts.items():
+        for index, start in enumerate(times):
+            if start > 0.0 and start >= scenario.duration:
+                raise ScenarioError(
+                    f"{table}[{index}].start = {start:g} s: "
+                    f"expected a time before the flight's end, {scenario.duration:g} s"
+                )
+    for index, fault in enumerate(scenario.fault):
+        if fault.stop is not None and fault.stop <= fault.start:
+            raise ScenarioError(
+                f"fault[{index}].stop = {fault.stop:g} s: expected a time after its start, {fault.start:g} s"
+            )
+
+
+_DUE = {
+    "tuple_type": "a list of tables",
+    "model_type": "a table",
+    "string_type": "a text",
+    "int_type": "a whole number",
+    "greater_than_equal": "at least {ge}",
+    "less_than_equal": "at most {le}",
+}
+"""Expectations by the type of a problem that pydantic finds; other problems have a message of their own."""
+
+
+def _first_problem(error: ValidationError) -> str:
+    problem = error.errors()[0]
+    field = _dotted(problem["loc"])
+    if problem["type"] == "extra_forbidden":
+        known = _siblings(problem["loc"])
+        hint = did_you_mean(str(problem["loc"][-1]), known)
+        return f"{field}: unknown key, expected one of {', '.join(known)}{hint}"
+    if problem["type"] == "missing":
+        return f"{field}: missing"
+    if problem["type"] == "value_error":
+        # The cause begins with the field's own name: the path of the field says more.
+        _, equals, rest = str(problem["ctx"]["error"]).partition(" = ")
+        return f"{field}{equals}{rest}"
+    due = _DUE.get(problem["type"]) or problem["msg"].removeprefix("Input should be ")
+    return f"{field} = {problem['input']!r}: expected {due.format(**problem.get('ctx', {}))}"
+
+
+def _dotted(location: Iterable[int | str]) -> str:
+    text = ""
+    for part in location:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
+    return text
+
+
+def _siblings(location: tuple[int | str, ...]) -> list[str]:
+    model: Any = Scenario
+    for part in location[:-1]:
+        if isinstance(part, str):
+            annotation = model.model_fields[part].annotation
+            model = annotation if isinstance(annotation, type) else annotation.__args__[0]
+    if model is Scenario:
+        return [name for name in (*model.model_fields, *sorted(EQUIPMENT)) if name not in _NO_KEYS]
+    return list(model.model_fields)

@@ -1,0 +1,121 @@
+"""Replay of a single flight of a campaign, in this process or by the graph of node processes over DDS."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.bags.description import TUBE_STATUS
+from hsv.base.errors import CampaignError, ControllerError
+from hsv.control.design_file import find_design, read_parameters
+from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.flight.campaign.flight_reader import FlightReading
+from hsv.flight.campaign.sample_runner import Outcome
+from hsv.flight.campaign.summary import Results
+from hsv.flight.campaign.table import OUTCOMES
+from hsv.flight.trust import require_path_inside
+
+
+@dataclass(frozen=True)
+class ReplayedFlight:
+    """A replayed flight: its outcome in the campaign and now (SI), and the bag where it was recorded."""
+
+    flight: int
+    recorded: Outcome
+    repeated: Outcome
+    bag: Path | None = None
+
+    @property
+    def differing(self) -> list[str]:
+        """Names of the outcomes in which any bit differs."""
+        return [name for name in self.recorded if not _same(self.recorded[name], self.repeated.get(name))]
+
+
+def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
+    """Repeat ``flight`` with the design stored in the results.
+
+    Raises:
+        CampaignError: No such flight.
+        ParameterError: The results name code, and are not trusted.
+    """
+    row, runner = results.row(flight), results.sample_runner
+    try:
+        flown = runner.fly(flight, runner.sample(flight))
+        data = flown.data()
+        repeated = runner.outcome(FlightReading.of(data, runner.level(data), flown.fingerprint))
+    except ControllerError as error:
+        repeated = runner.crashed(error)
+    return ReplayedFlight(flight, _outcome(row), repeated)
+
+
+def replay_over_dds(
+    results: Results, flight: int, bag: Path, progress: Callable[[int, int], None] = lambda step, steps: None
+) -> ReplayedFlight:
+    """Repeat ``flight`` with the node processes, recorded to ``bag``.
+
+    Args:
+        results: The campaign.
+        flight: Number of the flight.
+        bag: Bag to write, a new directory.
+        progress: Called with the step reached and the last step.
+
+    Raises:
+        CampaignError, DesignError: No such flight, or the design is not what it was.
+        ParameterError: The results name code, or a design in another folder, and are not trusted.
+        RunError: A process failed; its last words are in the message.
+    """
+    from hsv.bags.equipment import equipment_topics, measurement_errors
+    from hsv.bags.flight import flight_data, flight_fingerprint
+    from hsv.bags.reader import Bag
+    from hsv.bags.steps import joined
+    from hsv.graph.flight import fly_graph
+    from hsv.graph.preparation import prepare
+
+    row, runner = results.row(flight), results.sample_runner
+    require_design(results)
+    prepared = prepare(f"{results.campaign.scenario_name}_flight_{flight}", text=results.file(flight), bag=bag)
+    fly_graph(prepared, on_step=lambda step: progress(step, prepared.steps))
+    recorded = Bag(bag)
+    data = flight_data(recorded)
+    # Stamps are whole nanoseconds, the campaign's time is not: the last bit of an integral over time would differ.
+    data = replace(data, time=np.arange(len(data.time)) * runner.period)
+    repeated = runner.outcome(FlightReading.of(data, runner.level(data), flight_fingerprint(recorded)))
+    told = not (
+        measurement_errors(joined(recorded, equipment_topics(recorded)))
+        or prepared.scenario.equipment.get(ESTIMATOR_ENABLED.name)
+    )
+    if repeated["tube_level"] is not None and told:
+        # What the controller itself published, not what is computed from its messages. It is that of the state it is
+        # given: of the true one, which a campaign keeps, only where it is told the truth.
+        repeated["tube_level"] = float(np.max(recorded.columns(TUBE_STATUS)["level"]))
+    return ReplayedFlight(flight, _outcome(row), repeated, bag)
+
+
+def require_design(results: Results) -> None:
+    """Refuse results where the file of their design no longer holds the design that the campaign flew.
+
+    Raises:
+        CampaignError, DesignError: It holds another design, or is missing.
+        ParameterError: The results name one in another folder, and are not trusted.
+    """
+    name = results.campaign.scenario.design
+    if not name:
+        return
+    require_path_inside(name, "design", results.path, results.trust)
+    if read_parameters(find_design(name)) != results.campaign.design:
+        raise CampaignError(
+            f"design {name!r}: not the one that the campaign flew, which hsv montecarlo scenario --design writes"
+        )
+
+
+def _outcome(row: dict[str, Any]) -> Outcome:
+    return {name: row[name] for name in ("diverged", "crashed", *OUTCOMES, "fingerprint")}
+
+
+def _same(a: float | bool | str | None, b: float | bool | str | None) -> bool:
+    return a == b or (isinstance(a, float) and isinstance(b, float) and math.isnan(a) and math.isnan(b))

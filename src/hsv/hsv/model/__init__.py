@@ -1,0 +1,1 @@
+"""Signals, parameters, vehicles with their equipment and faults, trim, the LPV polytope and the airframe."""

@@ -1,0 +1,195 @@
+"""Actuators of the vehicle: published sets, their parameters, and the data that ``core/actuators.h`` steps.
+
+An actuator moves on substeps of a quarter of the control period, and so does the vehicle, whose effector is held over
+each at the mean of the substep's two ends. A channel whose actuator is ideal is where its command is; with all channels
+ideal and no fault of theirs the vehicle takes the command itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.core import ffi, lib
+from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS
+from hsv.model.vehicle_parameters import VehicleParameters
+
+SUBSTEPS = 4
+"""Substeps of a control period, if an actuator is not ideal."""
+
+
+@dataclass(frozen=True)
+class ActuatorSet:
+    """A published actuator, SI and radians; a limit that is infinite is none."""
+
+    channel: str
+    order: int
+    """0 ideal, 1 or 2"""
+    natural_frequency: float
+    """rad/s; the inverse of the time constant where the order is 1"""
+    damping_ratio: float
+    stop: float
+    """Largest magnitude of the position; the vehicle's limits hold beside"""
+    rate_limit: float
+    source: str
+
+
+IDEAL = "ideal"
+
+ACTUATOR_SETS = {
+    "elevator_50": ActuatorSet(
+        INPUT_NAMES[1],
+        2,
+        50.0,
+        0.7,
+        math.radians(20.0),
+        math.radians(400.0),
+        "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6",
+    ),
+    "elevator_150": ActuatorSet(
+        INPUT_NAMES[1],
+        2,
+        150.0,
+        0.7,
+        math.radians(30.0),
+        math.radians(100.0),
+        "Wiese, generic hypersonic vehicle, MIT thesis 2013",
+    ),
+    "elevator_20": ActuatorSet(
+        INPUT_NAMES[1], 2, 20.0, 0.7, math.radians(30.0), math.inf, "NASA, Generic Urban Air Mobility simulation"
+    ),
+    "elevator_first_order_20": ActuatorSet(
+        INPUT_NAMES[1], 1, 20.0, 1.0, math.inf, math.inf, "scramjet vehicle trade studies, AIAA 2009-7287"
+    ),
+    "fuel_10": ActuatorSet(
+        INPUT_NAMES[0],
+        1,
+        10.0,
+        1.0,
+        math.inf,
+        math.inf,
+        "Wiese, generic hypersonic vehicle, MIT thesis 2013: fuel delivery",
+    ),
+}
+"""Actuator sets that a scenario can name."""
+
+
+def _parameters() -> tuple[Parameter, ...]:
+    table = []
+    for channel, unit in zip(INPUT_NAMES, ("", *INPUT_UNITS[1:]), strict=True):
+        names = tuple(name for name, entry in ACTUATOR_SETS.items() if entry.channel == channel)
+        where = f"actuator.{channel}"
+        per_second = f"{unit or '1'}/s"
+        table += [
+            Parameter(f"{where}.set", IDEAL, "published actuator of this channel", choices=(IDEAL, *names)),
+            Parameter(
+                f"{where}.order", [], "order of the dynamics, 0 ideal, instead of the set's", "", 0.0, 2.0, whole=True
+            ),
+            Parameter(f"{where}.natural_frequency", [], "instead of the set's", "rad/s", 0.1, 1e4),
+            Parameter(f"{where}.damping_ratio", [], "instead of the set's", "", 0.05, 1.0),
+            Parameter(f"{where}.stop", [], "largest magnitude, instead of the set's", unit, 0.0, 1e3),
+            Parameter(f"{where}.rate_limit", [], "largest rate, instead of the set's", per_second, 1e-6, 1e6),
+            Parameter(f"{where}.acceleration_limit", [], "of order 2; none unless given", f"{per_second}^2", 1e-6),
+        ]
+    return tuple(table)
+
+
+ACTUATOR_PARAMETERS = _parameters()
+"""Empty: as the set has it."""
+
+
+class ActuatorData(NamedTuple):
+    """Actuators as the core takes them, an entry a channel (2), and the length ``substep`` (s) of a substep.
+
+    ``map`` (2, 4) is that of :func:`actuator_map`, over a substep.
+    """
+
+    order: np.ndarray
+    natural_frequency: np.ndarray
+    damping_ratio: np.ndarray
+    map: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+    rate_limit: np.ndarray
+    acceleration_limit: np.ndarray
+    substep: float
+    ideal: bool
+
+
+def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
+    """Return F11, F12, F21, F22 of position less command and rate over ``h`` (s), the command held: exact.
+
+    Args:
+        order: 1: position less command decays by F11; 2.
+        frequency: rad/s.
+        damping: Up to 1, of an order of 2.
+        h: s.
+    """
+    found = ffi.new("double[4]")
+    lib.hsv_actuator_map(int(order), frequency, damping, h, found)
+    return tuple(found)
+
+
+def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> ActuatorData:
+    """Return the actuators that :data:`ACTUATOR_PARAMETERS` describe, of ``vehicle``, on substeps of ``period`` (s).
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    v = check_all(ACTUATOR_PARAMETERS, values)
+    h = period / SUBSTEPS
+    order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 4))
+    frequency, damping, rate, acceleration = (np.full(N_INPUTS, np.inf) for _ in range(4))
+    low, high = vehicle.input_minimum, vehicle.input_maximum
+    for i, channel in enumerate(INPUT_NAMES):
+        where = f"actuator.{channel}"
+        name = v[f"{where}.set"]
+        base = ACTUATOR_SETS.get(name, ActuatorSet(channel, 0, math.inf, 1.0, math.inf, math.inf, ""))
+        given = {
+            field: _one(v, f"{where}.{field}", standard)
+            for field, standard in (
+                ("order", float(base.order)),
+                ("natural_frequency", base.natural_frequency),
+                ("damping_ratio", base.damping_ratio),
+                ("stop", base.stop),
+                ("rate_limit", base.rate_limit),
+                ("acceleration_limit", math.inf),
+            )
+        }
+        order[i] = int(given["order"])
+        frequency[i], damping[i] = given["natural_frequency"], given["damping_ratio"]
+        rate[i], acceleration[i] = given["rate_limit"], given["acceleration_limit"]
+        low[i], high[i] = max(low[i], -given["stop"]), min(high[i], given["stop"])
+        if order[i] > 0:
+            if not math.isfinite(frequency[i]):
+                raise ParameterError(
+                    f"parameter {where}.natural_frequency: none given, expected one for an order of {order[i]}"
+                )
+            map[i] = actuator_map(order[i], frequency[i], damping[i], h)
+        elif math.isfinite(frequency[i]):
+            raise ParameterError(f"parameter {where}.order: 0, expected 1 or 2 with a natural frequency")
+        if order[i] < 2 and math.isfinite(acceleration[i]):
+            raise ParameterError(f"parameter {where}.acceleration_limit: expected none for an order of {order[i]}")
+    stops = np.array_equal(low, vehicle.input_minimum) and np.array_equal(high, vehicle.input_maximum)
+    ideal = not order.any() and stops and not np.isfinite(rate).any()
+    return ActuatorData(order, frequency, damping, map, low, high, rate, acceleration, h, bool(ideal))
+
+
+def _one(values: Mapping[str, Any], name: str, standard: float) -> float:
+    given = values[name]
+    if len(given) > 1:
+        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
+    return float(given[0]) if len(given) else standard
+
+
+def actuators_at_rest(position: np.ndarray) -> np.ndarray:
+    """Return positions and rates (2, 2) of actuators that rest at ``position`` (2), as flights begin in trim."""
+    state = np.zeros((N_INPUTS, 2))
+    state[:, 0] = position
+    return state

@@ -1,0 +1,150 @@
+"""Geometry of the airframe in its own axes: x forward and z up from the centre of gravity, in metres, unbent."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from hsv.base.units import parse_quantity
+from hsv.model.airframe.beam import Cantilever
+from hsv.model.vehicle import load_vehicle
+
+FORE_SEGMENTS = 5
+"""Rigid pieces of the fore body ahead of the inlet; one more reaches from there to the centre of gravity."""
+AFT_SEGMENTS = 4
+"""Rigid pieces of the aft body behind the nozzle; one more reaches from there to the centre of gravity."""
+
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Airframe:
+    """Lengths in metres, angles in radians; ``airframe.toml`` explains each of them."""
+
+    fore_body: float
+    aft_body: float
+    inlet_ramp: float
+    engine: float
+    nozzle_ramp: float
+    upper_surface_angle: float
+    inlet_ramp_angle: float
+    engine_height: float
+    mass_per_length: float
+    nose_half_width: float
+    half_width: float
+    elevator_span: float
+    elevator_thickness: float
+    full_fuel_equivalence_ratio: float
+    exaggeration: float
+    largest_exaggeration: float
+    thrust_arm: float
+    """Distance of the thrust line, the middle of the engine, below the centre of gravity."""
+    elevator_arm: float
+    """Distance of the elevator's lift behind the centre of gravity."""
+    elevator_chord: float
+
+    @property
+    def length(self) -> float:
+        """Nose to tail."""
+        return self.fore_body + self.aft_body
+
+    @property
+    def inlet(self) -> float:
+        """Station of the inlet, x."""
+        return self.fore_body - self.inlet_ramp
+
+    @property
+    def nozzle(self) -> float:
+        """Station of the nozzle, x."""
+        return self.inlet - self.engine
+
+    @property
+    def engine_roof(self) -> float:
+        """Height of the body's lower surface above the engine, z."""
+        return 0.5 * self.engine_height - self.thrust_arm
+
+    @property
+    def nose(self) -> Point:
+        """The nose, (x, z)."""
+        return self.fore_body, self.engine_roof + self.inlet_ramp * math.tan(self.inlet_ramp_angle)
+
+    @property
+    def tail(self) -> Point:
+        """The tail, (x, z)."""
+        return -self.aft_body, float(self.upper(-self.aft_body))
+
+    @property
+    def nozzle_ramp_angle(self) -> float:
+        """Angle between nozzle ramp and upper surface, which closes the body at the tail."""
+        return math.atan2(self.tail[1] - self.engine_roof, self.nozzle_ramp) - self.upper_surface_angle
+
+    def upper(self, x: float | np.ndarray) -> Any:
+        """Return the height of the upper surface at stations."""
+        return self.nose[1] + (self.fore_body - x) * math.tan(self.upper_surface_angle)
+
+    def lower(self, x: float | np.ndarray) -> Any:
+        """Return the height of the lower surface at stations."""
+        corners = [self.tail, (self.nozzle, self.engine_roof), (self.inlet, self.engine_roof), self.nose]
+        stations, heights = np.array(corners).T
+        return np.interp(x, stations, heights)
+
+    def half_width_at(self, x: float) -> float:
+        """Return half of the body's width at a station."""
+        return float(np.interp(x, [self.inlet, self.fore_body], [self.half_width, self.nose_half_width]))
+
+    @cached_property
+    def elevator_hinge(self) -> Point:
+        """Axis of the elevator: its middle, half-way between upper and lower surface, (x, z)."""
+        x = -self.elevator_arm
+        return x, 0.5 * float(self.upper(x) + self.lower(x))
+
+    @cached_property
+    def cantilevers(self) -> tuple[Cantilever, Cantilever]:
+        """Fore and aft body as beams."""
+        return Cantilever(self.fore_body, self.mass_per_length), Cantilever(self.aft_body, self.mass_per_length)
+
+    @cached_property
+    def fore_stations(self) -> np.ndarray:
+        """Ends of the rigid pieces of the fore body, x from the centre of gravity to the nose."""
+        return np.array([0.0, *np.linspace(self.inlet, self.fore_body, FORE_SEGMENTS + 1)])
+
+    @cached_property
+    def aft_stations(self) -> np.ndarray:
+        """Ends of the rigid pieces of the aft body, x from the centre of gravity to the tail."""
+        return np.array([0.0, *np.linspace(self.nozzle, -self.aft_body, AFT_SEGMENTS + 1)])
+
+    def mode(self, x: float) -> int:
+        """Return the mode that bends the body at a station: 0 ahead of the centre of gravity, 1 behind."""
+        return 0 if x >= 0.0 else 1
+
+    def shape(self, x: float, derivative: int = 0) -> float:
+        """Return the upward deflection (kg^-0.5) at a station for one of that mode's coordinate, or its slope by x."""
+        return (-1.0 if x < 0.0 and derivative % 2 else 1.0) * float(
+            self.cantilevers[self.mode(x)].shape(abs(x), derivative)
+        )
+
+
+@cache
+def airframe() -> Airframe:
+    """Return the airframe that is drawn."""
+    tables = tomllib.loads(files("hsv.model.airframe").joinpath("airframe.toml").read_text(encoding="utf-8"))
+    values = {name: value for table in tables.values() for name, value in table.items()}
+    units = {name: "rad" if name.endswith("angle") else "m" for name in values} | {"mass_per_length": "kg/m"}
+    lengths = {
+        name: value if isinstance(value, float) else parse_quantity(value, units[name], name)
+        for name, value in values.items()
+    }
+    vehicle = load_vehicle().decoupled
+    return Airframe(
+        **lengths,
+        thrust_arm=vehicle.thrust_moment_arm,
+        # Where the elevator's lift has the moment that the published table gives it.
+        elevator_arm=-vehicle.moment_elevator * vehicle.mean_aerodynamic_chord / vehicle.lift_elevator,
+        elevator_chord=vehicle.mean_aerodynamic_chord,
+    )

@@ -1,0 +1,229 @@
+"""The fault injector: a schedule of faults, those injected and cleared in flight, and what they do to the command."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import copy
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.base.timing import NEVER, first_step
+from hsv.core import Struct, doubles, lib
+from hsv.core.noise import SEED_PARAMETER
+from hsv.model.dynamics import N_INPUTS
+from hsv.model.faults.laws import FaultRows, fault_rows
+from hsv.model.faults.schedule import ActiveFault, ScheduledFault
+from hsv.model.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
+from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state
+from hsv.model.vehicle import VEHICLE_PARAMETERS
+
+FAULT_PARAMETERS = (
+    Parameter("period", 0.02, "control period T", "s", 1e-4, 1.0),
+    SEED_PARAMETER,
+    Parameter("fault.channels", ["none"], "channel of each scheduled fault, or one 'none'"),
+    Parameter("fault.types", ["none"], "type of each scheduled fault: " + ", ".join(FAULT_KINDS)),
+    Parameter("fault.parameters", ["none"], "parameters of each, SI, such as 'effectiveness=0.9', separated by commas"),
+    Parameter("fault.starts", [0.0], "simulated time at which each scheduled fault begins", "s", 0.0),
+    Parameter("fault.stops", [], "simulated time at which each scheduled fault ends; empty: never", "s", 0.0),
+)
+LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
+"""Parameters of the link that carries the command to the injector."""
+
+NEVER_TIME = 1e9
+"""Stop (s) of a fault that does not end, where others do."""
+
+
+class FaultResult(NamedTuple):
+    """Input that reaches the actuators (2), and the active faults.
+
+    Those of command, actuators, effectors and engine are due in this step, those of sensors in the next: its
+    measurement is the first that can have heard of them.
+    """
+
+    actuator: np.ndarray
+    active: tuple[ActiveFault, ...]
+
+
+class FaultInjector:
+    """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on.
+
+    What acts on the command is applied here, to what the link of the command leaves of it; the rest is told to the
+    vehicle.
+    """
+
+    PARAMETERS = (*FAULT_PARAMETERS, *LINK_PARAMETERS, *INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
+
+    def __init__(
+        self,
+        scheduled: Sequence[ScheduledFault] = (),
+        period: float = 0.02,
+        seed: int = 0,
+        link: LinkData | None = None,
+        before: np.ndarray | None = None,
+    ) -> None:
+        """Take the faults of a schedule.
+
+        Args:
+            scheduled: Faults.
+            period: T (s).
+            seed: Seed of the flight.
+            link: Link that carries the command; None: an ideal one.
+            before: The input (2) that came on it until the flight began.
+        """
+        # The first measurement is there before anybody can have told the sensors of a fault.
+        self.scheduled = tuple(
+            row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
+        )
+        self.period, self.seed = period, seed
+        self.link = link or command_link({}, period)
+        self._before = np.zeros(N_INPUTS) if before is None else before
+        self.reset()
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, object]) -> Self:
+        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`, and of a link where the flight starts.
+
+        Raises:
+            ParameterError, TrimError: A wrong value, named, or arrays of different lengths.
+        """
+        v = check_all(FAULT_PARAMETERS, values)
+        period, seed = v["period"], v[SEED_PARAMETER.name]
+        link = command_link(values, period)
+        flown = (period, seed, link, None if link.ideal else initial_trim(values)[1].input)
+        names = ("channels", "types", "parameters", "starts", "stops")
+        columns = [v[f"fault.{name}"] for name in names]
+        if columns[0] == ["none"]:
+            return cls((), *flown)
+        columns[-1] = list(columns[-1]) or [NEVER_TIME] * len(columns[0])
+        for name, column in zip(names, columns, strict=True):
+            if len(column) != len(columns[0]):
+                raise ParameterError(
+                    f"parameter fault.{name}: {len(column)} values, "
+                    f"expected as many as fault.channels, {len(columns[0])}"
+                )
+        scheduled = [
+            ScheduledFault(
+                Fault.of(channel, kind, read_parameters(text)), first_step(start, period), first_step(stop, period)
+            )
+            for channel, kind, text, start, stop in zip(*columns, strict=True)
+        ]
+        return cls(scheduled, *flown)
+
+    def with_seed(self, seed: int) -> FaultInjector:
+        """Return the same schedule for a flight of another ``seed``."""
+        other = copy(self)
+        other.seed = seed
+        other.reset()
+        return other
+
+    def reset(self) -> None:
+        """Return to the schedule: everything injected or cleared in flight is discarded."""
+        self.known = list(self.scheduled)
+        self._next = 0
+        self._know(self.rows((COMMAND,)))
+        self._link_state = self.link_state()
+
+    def link_state(self) -> np.ndarray:
+        """Return the state of the link with which a flight begins."""
+        return link_state(self.link, N_INPUTS, self._before)
+
+    def rows(self, sides: Sequence[str], earlier: FaultRows | None = None) -> FaultRows:
+        """Return the faults of some sides that are known now; those that were known ``earlier`` keep their memory."""
+        return fault_rows(sides, self.known, self.period, earlier)
+
+    def parameters(self) -> dict[str, list[str] | list[float]]:
+        """Return the faults known now, those injected or cleared in flight included, as :data:`FAULT_PARAMETERS`."""
+        if not self.known:
+            return {"fault.channels": ["none"]}
+        return {
+            "fault.channels": [row.fault.channel for row in self.known],
+            "fault.types": [row.fault.type for row in self.known],
+            "fault.parameters": [written_parameters(row.fault.parameters) for row in self.known],
+            "fault.starts": [row.start * self.period for row in self.known],
+            "fault.stops": [min(row.stop * self.period, NEVER_TIME) for row in self.known],
+        }
+
+    def inject(self, fault: Fault, steps: int = NEVER) -> int:
+        """Start ``fault`` with the next step, for so many, in place of one of its type on its channel.
+
+        Returns:
+            That step.
+        """
+        self.clear(fault.channel, fault.type)
+        start = self._first(fault)
+        self.known.append(ScheduledFault(fault, start, min(start + steps, NEVER)))
+        self._know(self.rows((COMMAND,), self._rows))
+        return start
+
+    def clear(self, channel: str = "", kind: str = "") -> int:
+        """End the faults acting on ``channel`` (all channels if empty), those of a kind alone where one is given.
+
+        Returns:
+            The next step, the first without; of faults of sensors alone, the one after it.
+
+        Raises:
+            ParameterError: Unknown channel or kind.
+        """
+        if channel and channel not in CHANNELS:
+            raise ParameterError(f"channel = {channel!r}: expected one of {', '.join(CHANNELS)}, or empty for all")
+        if kind and kind not in FAULT_KINDS:
+            raise ParameterError(f"type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}, or empty for all")
+        ended = []
+        for i, (fault, start, stop) in enumerate(self.known):
+            if channel in ("", fault.channel) and kind in ("", fault.type) and start <= self._first(fault) < stop:
+                ended.append(self._first(fault))
+                self.known[i] = ScheduledFault(fault, start, ended[-1])
+        self._know(self.rows((COMMAND,), self._rows))
+        return min(ended, default=self._next)
+
+    def step(self, step: int, command: np.ndarray) -> FaultResult:
+        """Return what becomes of ``command`` (2) in ``step``."""
+        actuator = np.array(command, float)
+        link, payload = self.link.pointer, doubles(actuator)
+        lib.hsv_receive(link, doubles(self._link_state), len(self._link_state), step, self.seed, payload, N_INPUTS)
+        lib.hsv_apply_command_faults(self._known.pointer, step, self.seed, payload)
+        self._next = step + 1
+        return FaultResult(actuator, self.acting(step))
+
+    def acting(self, step: int) -> tuple[ActiveFault, ...]:
+        """Return the faults that are due after ``step``, see :class:`FaultResult`."""
+        return tuple(
+            ActiveFault(fault, start)
+            for fault, start, stop in self.known
+            if start <= (step + 1 if fault.kind.side == SENSOR else step) < stop
+        )
+
+    def _first(self, fault: Fault) -> int:
+        """Return the first step in which a fault can still be begun or ended."""
+        return self._next + 1 if fault.kind.side == SENSOR else self._next
+
+    def _know(self, rows: FaultRows) -> None:
+        self._rows = rows
+        self._known = Struct("hsv_faults", rows)
+
+
+def read_parameters(text: str) -> dict[str, float]:
+    """Return the parameters of a fault, SI, written as :func:`written_parameters` does.
+
+    Raises:
+        ParameterError: It is written otherwise.
+    """
+    found = {}
+    for entry in filter(None, text.split(",")):
+        name, equals, number = entry.partition("=")
+        try:
+            found[name.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise ParameterError(f"parameter fault.parameters: {text!r}, expected a form as 'effectiveness=0.9'")
+    return found
+
+
+def written_parameters(parameters: Mapping[str, Any]) -> str:
+    """Return parameters of a fault as text, every bit of them."""
+    return ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())

@@ -1,0 +1,437 @@
+"""Every kind of fault: what may fail in which way, with which parameters; parser, help and documentation read it.
+
+A fault has a side, where it acts: on the command on its way to the actuator, on the actuator's dynamics, on the
+effector that it moves, on the engine, or on a sensor. Faults that act at once are composed in one order whatever the
+order in which they are listed, that of :data:`FAULT_KINDS`; among those that replace the effector's position the newest
+wins. Any kind may come and go, see :data:`OCCURRENCE_PARAMETERS`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+from hsv.base.errors import ParameterError, did_you_mean
+from hsv.base.parameters import Parameter, read_number
+from hsv.base.units import UnitSystem, parse_quantity, readable
+from hsv.core import lib
+from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+
+ENGINE = "engine"
+"""The channel of faults of the engine itself."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """Channel on which faults can act: the SI unit of its signal, and a travel that scales the ranges of parameters."""
+
+    unit: str
+    travel: float
+
+
+_STOP = parse_quantity("30 deg", "rad", "stop")
+"""Stop of the elevator, rad, with the same bits as 30 deg in a file."""
+
+CHANNELS = {
+    **{
+        name: Channel("" if unit == "1" else unit, travel)
+        for name, unit, travel in zip(INPUT_NAMES, INPUT_UNITS, (1.5, _STOP), strict=True)
+    },
+    ENGINE: Channel("", 1.0),
+    **{
+        name: Channel(unit, travel)
+        for name, unit, travel in zip(
+            STATE_NAMES, STATE_UNITS, (3000.0, 300.0, 0.5, 0.5, 1.0, 30.0, 500.0, 30.0, 500.0), strict=True
+        )
+    },
+}
+"""Control inputs, the engine, and the states, whose sensors fail."""
+
+COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effector", "engine", "sensor"
+
+REPLACING = (lib.LOCK, lib.LOCK_AT, lib.FLOAT, lib.HARD_OVER, lib.SOLID_OSCILLATION)
+"""Types that replace the position of an effector; the most recent one applies."""
+
+LONGEST_DELAY = lib.MAX_DELAY
+"""Steps."""
+
+
+@dataclass(frozen=True)
+class FaultParameter:
+    """A parameter of a kind of fault; ``{}`` in its unit is the unit of the channel, whose travel scales the range."""
+
+    name: str
+    description: str
+    unit: str
+    minimum: float
+    maximum: float
+    default: float | None = None
+    """Default value; None: the parameter must be given."""
+    whole: bool = False
+
+    def of(self, channel: str) -> Parameter:
+        """Return it for a ``channel``: unit, range and default in the channel's unit."""
+        described = CHANNELS[channel]
+        own = "{}" in self.unit
+        scale = described.travel if own else 1.0
+        unit = self.unit.replace("{}", described.unit or "1") if own else self.unit
+        return Parameter(
+            self.name,
+            self.minimum * scale if self.default is None else self.default,
+            self.description,
+            "" if unit == "1" else unit,
+            self.minimum * scale,
+            self.maximum * scale,
+            whole=self.whole,
+        )
+
+    def written(self, channel: str, value: float, system: UnitSystem = UnitSystem.metric) -> str:
+        """Return a ``value``, SI, of a fault of ``channel`` in the units of ``system``."""
+        # Everybody has angles in degrees, but natural frequencies in rad/s.
+        given = UnitSystem.si if self.unit == "rad/s" else system
+        return readable(value, self.of(channel).unit or "1", given)
+
+
+@dataclass(frozen=True)
+class FaultKind:
+    """A kind of fault: its code and side, which channels it may have, its meaning and its own parameters."""
+
+    code: int
+    side: str
+    channels: tuple[str, ...]
+    meaning: str
+    parameters: tuple[FaultParameter, ...] = ()
+
+
+_P = FaultParameter
+_EFFECTIVENESS = _P("effectiveness", "share of the command that remains", "", 0.0, 1.0)
+_WIDTH = _P("width", "total width", "{}", 0.0, 1.0)
+_AMPLITUDE = _P("amplitude", "amplitude", "{}", 0.0, 1.0)
+_FREQUENCY = _P("frequency", "frequency", "Hz", 1e-3, 100.0)
+_PHASE = _P("phase", "phase at the start of the fault", "rad", -10.0, 10.0, 0.0)
+_GROWING_OFFSET = (
+    _P("rate", "rate of the offset; its sign is that of the offset", "{}/s", -10.0, 10.0),
+    _P("limit", "largest offset", "{}", 0.0, 1.0),
+)
+_UNSTART = (
+    _P("thrust_factor", "thrust that remains", "", 0.0, 1.0, 0.0),
+    _P("lift_factor", "lift, relative to the started inlet", "", 0.0, 2.0, 0.8),
+    _P("drag_factor", "drag, relative to the started inlet", "", 0.0, 5.0, 1.2),
+    _P("moment_zero", "increment of the pitching moment coefficient", "", -0.5, 0.5, 0.045),
+    _P("moment_alpha", "increment of that coefficient per angle of attack", "1/rad", -5.0, 5.0, 0.0),
+)
+_OUTSIDE = (
+    _P("angle_of_attack", "centre of the region where the inlet stays started", "rad", -0.5, 0.5, 0.0),
+    _P("angle_of_attack_reach", "half axis of that region", "rad", 1e-3, 10.0, 10.0),
+    _P("mach", "centre of that region", "", 0.0, 30.0, 8.0),
+    _P("mach_reach", "half axis of that region", "", 1e-2, 100.0, 100.0),
+    _P("fuel_limit", "fuel equivalence ratio above which the inlet unstarts", "", 0.0, 10.0, 10.0),
+    _P("hysteresis", "share of region and limit that must be regained for a restart", "", 0.0, 0.9, 0.1),
+    _P("restart_time", "least time for which the inlet stays unstarted", "s", 0.0, 1e4, 0.0),
+)
+
+FAULT_KINDS = {
+    "loss_of_effectiveness": FaultKind(
+        lib.LOSS,
+        COMMAND,
+        INPUT_NAMES,
+        "the actuator receives effectiveness times the command (paper eq. 15); effectiveness may be lost over a ramp",
+        (_EFFECTIVENESS, _P("ramp_time", "time over which effectiveness is lost; 0: at once", "s", 0.0, 1e4, 0.0)),
+    ),
+    "reversal": FaultKind(
+        lib.REVERSAL,
+        COMMAND,
+        INPUT_NAMES,
+        "the command is multiplied by -1",
+        (
+            _P(
+                "about_start",
+                "0: the whole command is reversed, 1: only its change since the start of the fault",
+                "",
+                0.0,
+                1.0,
+                0.0,
+            ),
+        ),
+    ),
+    "delay": FaultKind(
+        lib.DELAY,
+        COMMAND,
+        INPUT_NAMES,
+        "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
+        (_P("steps", "delay in control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
+    ),
+    "dead_zone": FaultKind(
+        lib.DEAD_ZONE,
+        COMMAND,
+        INPUT_NAMES,
+        "commands within a dead zone about the one at the start of the fault have no effect",
+        (_WIDTH,),
+    ),
+    "backlash": FaultKind(
+        lib.BACKLASH,
+        COMMAND,
+        INPUT_NAMES,
+        "there is play between command and actuator, centred at the start of the fault",
+        (_WIDTH,),
+    ),
+    "bandwidth": FaultKind(
+        lib.BANDWIDTH,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the natural frequency is reduced; an ideal actuator becomes a first-order lag",
+        (_P("natural_frequency", "largest natural frequency", "rad/s", 0.1, 1e3),),
+    ),
+    "rate_limit": FaultKind(
+        lib.RATE_LIMIT,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the rate of the actuator is limited",
+        (_P("rate", "largest rate", "{}/s", 1e-4, 100.0),),
+    ),
+    "stop_limit": FaultKind(
+        lib.STOP_LIMIT,
+        DYNAMICS,
+        INPUT_NAMES,
+        "the travel of the actuator is limited; from a position beyond the limits it returns at its largest rate",
+        (_P("lower", "least position", "{}", -1.0, 1.0), _P("upper", "largest position", "{}", -1.0, 1.0)),
+    ),
+    "effector_scale": FaultKind(
+        lib.SCALE,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the position of the effector is a multiple of that of the actuator",
+        (_P("factor", "multiple", "", -1.0, 2.0),),
+    ),
+    "bias": FaultKind(
+        lib.BIAS,
+        EFFECTOR,
+        INPUT_NAMES,
+        "a constant offset is added to the position of the effector",
+        (_P("offset", "offset of the position", "{}", -1.0, 1.0),),
+    ),
+    "drift": FaultKind(
+        lib.DRIFT,
+        EFFECTOR,
+        INPUT_NAMES,
+        "an offset that grows at a constant rate up to a limit is added to the position of the effector",
+        _GROWING_OFFSET,
+    ),
+    "oscillation": FaultKind(
+        lib.OSCILLATION,
+        EFFECTOR,
+        INPUT_NAMES,
+        "an oscillation is added to the position of the effector (liquid failure)",
+        (_AMPLITUDE, _FREQUENCY, _PHASE),
+    ),
+    "lock_in_place": FaultKind(
+        lib.LOCK, EFFECTOR, INPUT_NAMES, "the effector stays at its position at the start of the fault"
+    ),
+    "lock_at": FaultKind(
+        lib.LOCK_AT,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector stays at a given position",
+        (_P("position", "position", "{}", -1.0, 1.0),),
+    ),
+    "float": FaultKind(
+        lib.FLOAT,
+        EFFECTOR,
+        INPUT_NAMES[1:],
+        "the effector moves freely: no force at zero deflection, or along the flow",
+        (_P("alignment", "0: zero deflection, 1: minus the angle of attack", "", 0.0, 1.0, 0.0),),
+    ),
+    "hard_over": FaultKind(
+        lib.HARD_OVER,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector moves to a stop and stays there",
+        (_P("rate", "rate of the motion; its sign selects the stop", "{}/s", -100.0, 100.0),),
+    ),
+    "solid_oscillation": FaultKind(
+        lib.SOLID_OSCILLATION,
+        EFFECTOR,
+        INPUT_NAMES,
+        "the effector oscillates about its position at the start of the fault, whatever the command (solid failure)",
+        (_AMPLITUDE, _FREQUENCY, _PHASE),
+    ),
+    "thrust_loss": FaultKind(
+        lib.THRUST_LOSS,
+        ENGINE_SIDE,
+        (ENGINE,),
+        "only a share of the thrust remains",
+        (_P("share", "share that remains", "", 0.0, 1.0),),
+    ),
+    "inlet_unstart": FaultKind(
+        lib.UNSTART, ENGINE_SIDE, (ENGINE,), "the inlet is unstarted: thrust, lift, drag and moment change", _UNSTART
+    ),
+    "inlet_unstart_outside": FaultKind(
+        lib.UNSTART_OUTSIDE,
+        ENGINE_SIDE,
+        (ENGINE,),
+        "the inlet unstarts where angle of attack and Mach number leave an ellipse, or fuel exceeds a limit",
+        (*_UNSTART, *_OUTSIDE),
+    ),
+    "sensor_scale": FaultKind(
+        lib.SENSOR_SCALE,
+        SENSOR,
+        STATE_NAMES,
+        "the output of the sensor is multiplied by a factor",
+        (_P("factor", "factor", "", -1.0, 2.0),),
+    ),
+    "sensor_noise": FaultKind(
+        lib.SENSOR_NOISE,
+        SENSOR,
+        STATE_NAMES,
+        "white noise is added to the output of the sensor",
+        (_P("standard_deviation", "standard deviation of the noise", "{}", 0.0, 1.0),),
+    ),
+    "sensor_bias": FaultKind(
+        lib.SENSOR_BIAS,
+        SENSOR,
+        STATE_NAMES,
+        "a constant offset is added to the output of the sensor",
+        (_P("offset", "offset, measurement minus truth", "{}", -1.0, 1.0),),
+    ),
+    "sensor_runaway": FaultKind(
+        lib.SENSOR_RUNAWAY,
+        SENSOR,
+        STATE_NAMES,
+        "an offset that grows at a constant rate up to a limit is added to the output of the sensor",
+        _GROWING_OFFSET,
+    ),
+    "sensor_drop_out": FaultKind(
+        lib.SENSOR_DROP_OUT,
+        SENSOR,
+        STATE_NAMES,
+        "samples are lost at random; the last one is held",
+        (_P("probability", "probability that a sample is lost", "", 0.0, 1.0),),
+    ),
+    "sensor_freeze": FaultKind(
+        lib.SENSOR_FREEZE, SENSOR, STATE_NAMES, "the output of the sensor stays at its value at the start of the fault"
+    ),
+}
+"""The vocabulary, in the order in which faults that act at once are composed."""
+
+OCCURRENCE_PARAMETERS = (
+    _P("intermittent_period", "the fault comes and goes with this period; 0: it stays", "s", 0.0, 1e4, 0.0),
+    _P("intermittent_duty", "share of the period during which the fault acts", "", 0.0, 1.0, 0.5),
+    _P("random_on", "mean of the random time for which the fault acts; 0: it stays", "s", 0.0, 1e4, 0.0),
+    _P("random_off", "mean of the random time between", "s", 0.0, 1e4, 0.0),
+)
+"""Parameters of faults of all types: permanent between start and stop, periodic, or as a two-state Markov chain."""
+
+
+def fault_parameters(channel: str, kind: str) -> tuple[FaultParameter, ...]:
+    """Return the parameters of a kind of fault and then those of its occurrence.
+
+    Raises:
+        ParameterError: Unknown kind, or a channel that it does not support.
+    """
+    if kind not in FAULT_KINDS:
+        hint = did_you_mean(kind, FAULT_KINDS)
+        raise ParameterError(f"fault.type = {kind!r}: expected one of {', '.join(FAULT_KINDS)}{hint}")
+    described = FAULT_KINDS[kind]
+    if channel not in described.channels:
+        hint = did_you_mean(channel, described.channels)
+        raise ParameterError(
+            f"fault.channel = {channel!r}: expected one of {', '.join(described.channels)} for {kind}{hint}"
+        )
+    return (*described.parameters, *OCCURRENCE_PARAMETERS)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """A fault of one channel: ``values``, SI, are the parameters of its kind and then those of its occurrence.
+
+    Raises:
+        ParameterError: Unknown kind, a channel that the kind does not support, or a value that it does not admit.
+    """
+
+    channel: str
+    type: str
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        table = fault_parameters(self.channel, self.type)
+        for parameter, value in zip(table, self.values, strict=True):
+            described = parameter.of(self.channel)
+            given = float(value) if isinstance(value, int) and not isinstance(value, bool) else value
+            try:
+                described.check(given)
+            except ParameterError as error:
+                raise ParameterError(str(error).replace("parameter ", "fault.", 1)) from error
+        named = dict(zip((p.name for p in table), self.values, strict=True))
+        if named.get("lower", 0.0) > named.get("upper", math.inf):
+            known = {parameter.name: parameter for parameter in table}
+            lower, upper = (known[end].written(self.channel, named[end]) for end in ("lower", "upper"))
+            raise ParameterError(f"fault.lower = {lower}: expected at most upper, {upper}")
+        cycle, on, off = (named[name] for name in ("intermittent_period", "random_on", "random_off"))
+        if cycle and (on or off):
+            raise ParameterError(f"fault.intermittent_period = {cycle:g} s: expected 0 s with random_on or random_off")
+        if bool(on) != bool(off):
+            raise ParameterError(f"fault.random_off = {off:g} s: expected above 0 s where random_on is, and only there")
+
+    @classmethod
+    def of(cls, channel: str, kind: str, parameters: Mapping[str, float]) -> Self:
+        """Return the fault with these ``parameters`` of its kind, by name, SI; those with a default may be left out.
+
+        Raises:
+            ParameterError: As above, or a parameter is missing or not one of the kind.
+        """
+        table = fault_parameters(channel, kind)
+        optional = {p.name: p.default for p in table if p.default is not None}
+        due = [p.name for p in table if p.default is None]
+        for name in parameters:
+            if name not in optional and name not in due:
+                hint = did_you_mean(name, (*due, *optional))
+                raise ParameterError(
+                    f"fault.{name}: unknown parameter, expected one of {', '.join((*due, *optional))} for {kind}{hint}"
+                )
+        for name in due:
+            if name not in parameters:
+                raise ParameterError(f"fault.{name}: missing, expected {' and '.join(due)} for {kind}")
+        given = {**optional, **parameters}
+        return cls(channel, kind, tuple(given[p.name] for p in table))
+
+    def __str__(self) -> str:
+        known = {parameter.name: parameter for parameter in fault_parameters(self.channel, self.type)}
+        said = ", ".join(
+            # A loss of effectiveness is one of effectiveness.
+            ("" if self.type.endswith(name) else f"{name} ") + known[name].written(self.channel, value)
+            for name, value in self.parameters.items()
+        )
+        return f"{self.type} {said + ' ' if said else ''}of {self.channel}"
+
+    @property
+    def kind(self) -> FaultKind:
+        """The kind, as the table has it."""
+        return FAULT_KINDS[self.type]
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters by name, SI, without those at their defaults."""
+        table = fault_parameters(self.channel, self.type)
+        return {p.name: value for p, value in zip(table, self.values, strict=True) if value != p.default}
+
+
+def read_fault(channel: str, kind: str, parameters: Sequence[str]) -> Fault:
+    """Return the fault whose ``parameters`` are written as ``name=quantity``, with units; a single one without name.
+
+    Raises:
+        ParameterError, QuantityError: As :meth:`Fault.of`, or a quantity is none.
+    """
+    known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
+    due = [parameter.name for parameter in FAULT_KINDS[kind].parameters if parameter.default is None]
+    given = {}
+    for text in parameters:
+        name, equals, quantity = text.partition("=")
+        if not equals and len(due) == 1:
+            name, quantity = due[0], text
+        if name not in known:
+            hint = did_you_mean(name, known)
+            raise ParameterError(f"fault.{name}: unknown parameter, expected one of {', '.join(known)}{hint}")
+        given[name] = read_number(known[name], quantity, f"fault.{name}")
+    return Fault.of(channel, kind, given)

@@ -1,0 +1,141 @@
+"""Links of the loop that are not ideal: payloads that come late, are lost or corrupted; see ``core/links.h``.
+
+There is a link from the sensors to the filter, the trajectory and the controller, and one from the controller to the
+fault injector. In every step something is sent and something is taken: the payload alone is withheld, never the message
+of a step, for which the loop waits. The receiver keeps the last payload that came. Before the flight, payloads like its
+first came from the sensors, and the input of the trim from the controller.
+
+A payload that is corrupted has one bit of one of its numbers turned over, of the 64 of a float. With a checksum, or
+where that makes a number that is not finite or beyond :data:`LARGEST`, the receiver notices, and the payload is lost.
+
+The time that the controller computes is told apart: its whole periods delay the link of the command, what remains of it
+is the time in a period from which on the actuators have the command, see :func:`computation`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.core import Data, doubles, lib, vector
+
+LONGEST_DELAY = 50
+"""Steps."""
+
+LARGEST = 1e6
+"""Magnitude (SI) above which a receiver knows that a number is corrupted."""
+
+MEASUREMENT_LINK, COMMAND_LINK = "measurement", "command"
+
+_CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
+"""Place of a link among the streams of its random numbers."""
+
+
+def _parameters(link: str) -> tuple[Parameter, ...]:
+    where, longest = f"link.{link}", float(LONGEST_DELAY)
+    return (
+        Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, longest, whole=True),
+        Parameter(
+            f"{where}.jitter", 0.0, "largest additional random delay, control periods", "", 0.0, longest, whole=True
+        ),
+        Parameter(f"{where}.loss", 0.0, "probability that a payload is lost: the last one is held", "", 0.0, 1.0),
+        Parameter(f"{where}.burst", 0.0, "mean number of consecutive losses; 0: independent losses", "", 0.0, 1e6),
+        Parameter(f"{where}.corruption", 0.0, "probability that a bit of a payload is flipped", "", 0.0, 1.0),
+        Parameter(f"{where}.checksum", False, "true: a corrupted payload is detected and lost"),
+    )
+
+
+COMPUTATION_PARAMETER = Parameter(
+    "link.computational_delay", 0.0, "delay from the measurement to the resulting command", "s", 0.0, 1.0
+)
+MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
+COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
+
+_ACCEPTED = 3
+"""Numbers in the memory of a link before its payloads."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkData(Data):
+    """A link as the core takes it: delays in steps, and probabilities.
+
+    Of a loss: ``loss`` in step 0, then ``loss_after_arrival`` and ``loss_after_loss``.
+    """
+
+    KIND = "hsv_link"
+    channel: int
+    delay: int
+    jitter: int
+    loss: float
+    loss_after_arrival: float
+    loss_after_loss: float
+    corruption: float
+    checksum: bool
+    ideal: bool
+
+
+def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
+    """Return the time that the controller computes in whole periods, and the share of one that remains.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    time = check_all((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
+    periods = round(time / period, 9)  # the rounding of the division allowed for
+    whole = math.floor(periods)
+    return whole, periods - whole
+
+
+def measurement_link(values: Mapping[str, object]) -> LinkData:
+    """Return the link that :data:`MEASUREMENT_LINK_PARAMETERS` describe.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    return _link(MEASUREMENT_LINK, values, 0)
+
+
+def command_link(values: Mapping[str, object], period: float) -> LinkData:
+    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, with the whole periods of the computation.
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    return _link(COMMAND_LINK, values, computation(values, period)[0])
+
+
+def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
+    v = check_all(_parameters(name), values)
+    delay, jitter, loss, burst, corruption, checksum = v.values()
+    # A two-state Gilbert channel with the given mean burst length and loss rate (Gilbert 1960).
+    least = max(1.0, loss / (1.0 - loss)) if loss < 1.0 else 1.0
+    if burst and burst < least:
+        raise ParameterError(f"parameter link.{name}.burst = {burst}: expected 0, or at least {least:.6g}")
+    bursts = burst > 0.0 and loss < 1.0
+    return LinkData(
+        _CHANNELS[name],
+        int(delay) + computing,
+        int(jitter),
+        loss,
+        loss / (burst * (1.0 - loss)) if bursts else loss,
+        1.0 - 1.0 / burst if bursts else loss,
+        corruption,
+        checksum,
+        not (delay or computing or jitter or loss or corruption),
+    )
+
+
+def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> np.ndarray:
+    """Return the memory of a ``link`` of payloads of so many numbers.
+
+    ``before``: what was sent until the flight begins; None: the first payload of the flight.
+    """
+    memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
+    if before is not None:
+        lib.hsv_fill_link(doubles(memory), len(memory), doubles(vector(before)), size)
+    return memory

@@ -1,0 +1,153 @@
+"""Polytopic linear parameter-varying model (paper eq. 11, eq. 12): vertices, weights over altitude and velocity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.core import Data, lib
+from hsv.core.elimination import solve
+
+INTERPOLATIONS = ("linear", "cubic")
+
+BLOCK = lib.SUMS
+"""Entries that the core sums at a time."""
+
+
+class AxisWeights(NamedTuple):
+    """Weights of the vertices along one scheduling variable, as a piecewise polynomial.
+
+    ``breakpoints`` (s), ``coefficients`` (4, s - 1, r): power 3 first, local to each piece, one column per vertex.
+    """
+
+    breakpoints: np.ndarray
+    coefficients: np.ndarray
+
+
+def axis_weights(breakpoints: np.ndarray, samples: np.ndarray, interpolation: str) -> AxisWeights:
+    """Return the interpolated weights of one scheduling variable.
+
+    Args:
+        breakpoints: (s) increasing values of the scheduling variable, SI.
+        samples: (s, r) weights of the r vertices there; rows sum to one.
+        interpolation: ``"linear"`` (a grid of vertices) or ``"cubic"`` (tensor-product weights).
+
+    Raises:
+        DesignError: Wrong shapes, breakpoints that do not increase, or an unknown interpolation.
+    """
+    breakpoints = np.ascontiguousarray(breakpoints, float)
+    samples = np.asarray(samples, float)
+    if samples.ndim != 2 or breakpoints.shape != samples.shape[:1] or len(breakpoints) < 2:
+        raise DesignError(
+            f"weights of shape {samples.shape} at {breakpoints.shape} breakpoints: expected (s, r) at (s)"
+        )
+    if not np.all(np.diff(breakpoints) > 0.0):
+        raise DesignError("breakpoints of the scheduling weights: expected increasing values")
+    if interpolation == "linear":
+        slope = np.diff(samples, axis=0) / np.diff(breakpoints)[:, None]
+        coefficients = np.stack((np.zeros_like(slope), np.zeros_like(slope), slope, samples[:-1]))
+    elif interpolation == "cubic":
+        coefficients = _spline(breakpoints, samples)
+    else:
+        raise DesignError(f"interpolation = {interpolation!r}: expected one of {', '.join(INTERPOLATIONS)}")
+    return AxisWeights(breakpoints, np.ascontiguousarray(coefficients))
+
+
+def _spline(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the coefficients (4, s - 1, r) of the cubic splines through ``y`` (s, r) at ``x`` (s), not-a-knot.
+
+    Two points give a line, three a parabola, four and more piecewise cubics with a continuous third derivative at the
+    second and at the last point but one (de Boor, A Practical Guide to Splines, ch. IV).
+    """
+    n = len(x)
+    step = np.diff(x)
+    secant = np.diff(y, axis=0) / step[:, None]
+    if n == 2:
+        return np.stack((np.zeros_like(secant), np.zeros_like(secant), secant, y[:-1]))
+    # The slopes at the breakpoints: second derivatives are continuous inside.
+    left, right = np.zeros((n, n)), np.empty_like(y)
+    for i in range(1, n - 1):
+        left[i, i - 1 : i + 2] = step[i], 2.0 * (step[i - 1] + step[i]), step[i - 1]
+        right[i] = 3.0 * (step[i] * secant[i - 1] + step[i - 1] * secant[i])
+    if n == 3:
+        left[0, :2] = left[2, 1:] = 1.0
+        right[0], right[2] = 2.0 * secant[0], 2.0 * secant[1]
+    else:
+        for near, far, inner, end in ((0, 1, 1, 0), (n - 2, n - 3, n - 2, n - 1)):
+            both = step[near] + step[far]
+            left[end, inner], left[end, end] = both, step[far]
+            weighted = (step[near] + 2.0 * both) * step[far] * secant[near] + step[near] * step[near] * secant[far]
+            right[end] = weighted / both
+    slope = solve(left, right)
+    bend = (slope[:-1] + slope[1:] - 2.0 * secant) / step[:, None]
+    return np.stack((bend / step[:, None], (secant - slope[:-1]) / step[:, None] - bend, slope[:-1], y[:-1]))
+
+
+def evaluate(weights: AxisWeights, values: np.ndarray) -> np.ndarray:
+    """Return the weights (n, r) at many ``values`` (n), clamped to the breakpoints; for design and plots."""
+    breakpoints, coefficients = weights
+    clamped = np.clip(values, breakpoints[0], breakpoints[-1])
+    piece = np.clip(np.searchsorted(breakpoints, clamped, side="right") - 1, 0, len(breakpoints) - 2)
+    local = (clamped - breakpoints[piece])[:, None]
+    c = coefficients[:, piece]
+    return np.asarray(((c[0] * local + c[1]) * local + c[2]) * local + c[3])
+
+
+@dataclass(frozen=True, eq=False)
+class PolytopeData(Data):
+    """A polytopic model as the core takes it.
+
+    ``S`` (r, e) holds the entries of [A_i, B_i] that are not zero in all vertices, row by row, then zeros up to a
+    multiple of :data:`BLOCK`. ``entries``: their places in the flattened [A_i, B_i] (n (n + m)). ``starts`` (2 n + 1):
+    where those of the rows of A and of B begin, in turn.
+    """
+
+    KIND = "hsv_polytope"
+    S: np.ndarray
+    entries: np.ndarray
+    starts: np.ndarray
+    altitude: AxisWeights
+    velocity: AxisWeights
+
+
+@dataclass(frozen=True)
+class Polytope:
+    """A discrete-time polytopic model (paper eq. 12).
+
+    ``A`` (r, n, n), ``B`` (r, n, m), altitude-major: vertex i * r_velocity + j. Scheduling variables are altitude (m)
+    and velocity (m/s); outside the breakpoints they are clamped.
+    """
+
+    A: np.ndarray
+    B: np.ndarray
+    altitude: AxisWeights
+    velocity: AxisWeights
+
+    def __post_init__(self) -> None:
+        r = self.altitude.coefficients.shape[2] * self.velocity.coefficients.shape[2]
+        n = self.A.shape[1]
+        if self.A.shape != (r, n, n) or self.B.ndim != 3 or self.B.shape[:2] != (r, n):
+            raise DesignError(f"vertices A {self.A.shape}, B {self.B.shape}: expected {r} matrices of matching size")
+
+    def data(self) -> PolytopeData:
+        """Return the form that the core takes."""
+        n, m = self.B.shape[1:]
+        S = np.concatenate((self.A, self.B), axis=2).reshape(len(self.A), -1)
+        entries = np.flatnonzero(S.any(axis=0))
+        packed = np.zeros((len(S), -(-len(entries) // BLOCK) * BLOCK))
+        packed[:, : len(entries)] = S[:, entries]
+        firsts = [row * (n + m) + column for row in range(n) for column in (0, n)]
+        starts = np.searchsorted(entries, [*firsts, n * (n + m)])
+        return PolytopeData(packed, entries, starts, self.altitude, self.velocity)
+
+    def at(self, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return A (n, n) and B (n, m) at ``altitude`` (m) and ``velocity`` (m/s)."""
+        h, v = evaluate(self.altitude, np.array([altitude])), evaluate(self.velocity, np.array([velocity]))
+        A, B = np.zeros(self.A.shape[1:]), np.zeros(self.B.shape[1:])
+        for weight, A_i, B_i in zip(np.outer(h, v).flat, self.A, self.B, strict=True):
+            A += weight * A_i
+            B += weight * B_i
+        return A, B

@@ -1,0 +1,212 @@
+"""Sensors: from the state to its measurement, channel by channel; see ``core/sensors.h``.
+
+A measurement is y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n))))): scale factor and lag of the sensor,
+bias and noise, latency of whole samples, samples that are lost and held, quantisation, range, and at last what fails. A
+channel that is ideal passes to the bit, unless it fails. In step 0 lags rest and delays are full of the first sample.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.base.units import readable
+from hsv.core import dtype
+from hsv.core.elementary import exponential
+from hsv.model.dynamics import N_STATES, STATE_NAMES, STATE_UNITS
+from hsv.model.envelope import FOOT
+
+LONGEST_LATENCY = 50
+"""Steps."""
+
+ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")
+
+
+class Field(NamedTuple):
+    """A property of a sensor; ``{}`` in its unit is the unit of the channel, ``standard`` that of an ideal sensor."""
+
+    name: str
+    description: str
+    unit: str
+    minimum: float
+    maximum: float
+    standard: float
+    whole: bool = False
+
+
+FIELDS = (
+    Field("noise", "standard deviation of white noise", "{}", 0.0, 1e6, 0.0),
+    Field("bias", "constant bias", "{}", -1e6, 1e6, 0.0),
+    Field("bias_sigma", "standard deviation of a bias drawn once per flight", "{}", 0.0, 1e6, 0.0),
+    Field("drift_sigma", "standard deviation of a Gauss-Markov bias", "{}", 0.0, 1e6, 0.0),
+    Field("drift_time", "correlation time of the Gauss-Markov bias", "s", 1e-3, 1e9, 1.0),
+    Field("random_walk", "random walk, after one second", "{}/s^0.5", 0.0, 1e6, 0.0),
+    Field("scale", "relative error of the scale", "", -0.9, 10.0, 0.0),
+    Field("scale_sigma", "standard deviation of a scale error drawn once per flight", "", 0.0, 1.0, 0.0),
+    Field("lag", "bandwidth of a first-order lag; 0: none", "rad/s", 0.0, 1e4, 0.0),
+    Field("latency", "age of a sample, control periods", "", 0.0, float(LONGEST_LATENCY), 0.0, whole=True),
+    Field("drop_out", "probability that a sample is lost", "", 0.0, 1.0, 0.0),
+    Field("quantum", "step of the quantisation; 0: none", "{}", 0.0, 1e6, 0.0),
+    Field("minimum", "least measurement; none unless given", "{}", -1e6, 1e6, -math.inf),
+    Field("maximum", "largest measurement; none unless given", "{}", -1e6, 1e6, math.inf),
+)
+
+
+@dataclass(frozen=True)
+class SensorSet:
+    """Published sensors: fields of the channels that are not ideal, SI and radians, and their source."""
+
+    channels: Mapping[str, Mapping[str, float]]
+    source: str
+    inertial_angle_of_attack: bool = False
+    """Whether the angle of attack is the pitch angle less an inertial path angle, with the error of the former"""
+
+
+_FINE_ANGLE = math.radians(0.005)
+
+SENSOR_SETS = {
+    "ideal": SensorSet({}, "the paper's"),
+    "fine": SensorSet(
+        {
+            "altitude": {"noise": FOOT},
+            "velocity": {"noise": 0.1 * FOOT},
+            "angle_of_attack": {"noise": _FINE_ANGLE},
+            "pitch_angle": {"noise": _FINE_ANGLE},
+            "pitch_rate": {"noise": math.radians(0.01)},
+        },
+        "what this design's feedback turns into half a degree rms of elevator; a tactical-grade gyro has 0.015 deg/s",
+    ),
+    "ghv": SensorSet(
+        {
+            "altitude": {"noise": float(np.sqrt(10.0)) * FOOT},
+            "velocity": {"noise": FOOT},
+            "angle_of_attack": {"noise": 1e-3},
+            "pitch_angle": {"noise": 1e-3},
+            "pitch_rate": {"noise": float(np.sqrt(1e-5))},
+        },
+        "Wiese, generic hypersonic vehicle, MIT thesis 2013: white noise of the research model",
+    ),
+    "inertial": SensorSet(
+        {
+            "altitude": {"drift_sigma": 0.84, "drift_time": 500.0, "noise": 0.25},
+            "velocity": {"noise": 0.03},
+            "pitch_angle": {"bias_sigma": 1e-4, "noise": 5e-5},
+            "pitch_rate": {"bias_sigma": 1e-6, "scale_sigma": 2e-5},
+        },
+        "Zipfel, GHAME hypersonic vehicle, CADAC GHAME6: satellite navigation, star tracker, inertial unit",
+        inertial_angle_of_attack=True,
+    ),
+}
+"""Sensor sets that a scenario can name."""
+
+
+def _unit(pattern: str, unit: str) -> str:
+    return pattern.replace("{}", unit) if "{}" in pattern else pattern
+
+
+SENSOR_PARAMETERS = (
+    Parameter("sensors.set", "ideal", "published sensors", choices=tuple(SENSOR_SETS)),
+    Parameter(
+        "sensors.inertial_angle_of_attack", [], "1: with the error of the pitch angle, too", "", 0.0, 1.0, whole=True
+    ),
+    *(
+        Parameter(f"sensors.{c}.{f.name}", [], f.description, _unit(f.unit, unit), f.minimum, f.maximum, whole=f.whole)
+        for c, unit in zip(STATE_NAMES, STATE_UNITS, strict=True)
+        for f in FIELDS
+    ),
+)
+"""Empty: as the set has it."""
+
+
+class SensorData(NamedTuple):
+    """Sensors as the core takes them, an entry a state (9); ``on`` where a sensor is not ideal.
+
+    Lag and drift as shares that remain over a period, the random walk per root of a period.
+    """
+
+    on: np.ndarray
+    noise: np.ndarray
+    bias: np.ndarray
+    bias_sigma: np.ndarray
+    drift_sigma: np.ndarray
+    drift_decay: np.ndarray
+    walk: np.ndarray
+    scale: np.ndarray
+    scale_sigma: np.ndarray
+    lag_decay: np.ndarray
+    latency: np.ndarray
+    drop_out: np.ndarray
+    quantum: np.ndarray
+    minimum: np.ndarray
+    maximum: np.ndarray
+    inertial_angle_of_attack: bool
+    ideal: bool
+
+
+def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
+    """Return the sensors that :data:`SENSOR_PARAMETERS` describe, read every ``period`` (s).
+
+    Raises:
+        ParameterError: A wrong value, named.
+    """
+    v = check_all(SENSOR_PARAMETERS, values)
+    chosen = SENSOR_SETS[v["sensors.set"]]
+    table = {field.name: np.full(N_STATES, field.standard) for field in FIELDS}
+    for i, channel in enumerate(STATE_NAMES):
+        for field in FIELDS:
+            name = f"sensors.{channel}.{field.name}"
+            standard = chosen.channels.get(channel, {}).get(field.name, field.standard)
+            table[field.name][i] = _one(name, v[name], standard)
+    for channel, unit, low, high in zip(STATE_NAMES, STATE_UNITS, table["minimum"], table["maximum"], strict=True):
+        if not low < high:
+            raise ParameterError(
+                f"parameter sensors.{channel}.minimum = {readable(low, unit)}: "
+                f"expected less than maximum, {readable(high, unit)}"
+            )
+    inertial = _one(
+        "sensors.inertial_angle_of_attack",
+        v["sensors.inertial_angle_of_attack"],
+        float(chosen.inertial_angle_of_attack),
+    )
+    on = np.zeros(N_STATES, np.bool_)
+    for field in FIELDS:
+        if field.name != "drift_time":
+            on |= table[field.name] != field.standard
+    if inertial:
+        on[ALPHA] |= on[PITCH]
+    return SensorData(
+        on,
+        table["noise"],
+        table["bias"],
+        table["bias_sigma"],
+        table["drift_sigma"],
+        np.array([exponential(-period / time) if period < 700.0 * time else 0.0 for time in table["drift_time"]]),
+        table["random_walk"] * np.sqrt(period),
+        table["scale"],
+        table["scale_sigma"],
+        np.array([exponential(-frequency * period) if frequency > 0.0 else 0.0 for frequency in table["lag"]]),
+        table["latency"].astype(np.int64),
+        table["drop_out"],
+        table["quantum"],
+        table["minimum"],
+        table["maximum"],
+        bool(inertial),
+        not on.any(),
+    )
+
+
+def _one(name: str, given: list[float], standard: float) -> float:
+    if len(given) > 1:
+        raise ParameterError(f"parameter {name}: {len(given)} values, expected one, or none for the set's")
+    return float(given[0]) if given else standard
+
+
+def sensor_state() -> np.ndarray:
+    """Return room (9) for what the sensors remember, which step 0 fills."""
+    return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

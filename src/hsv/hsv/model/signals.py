@@ -1,0 +1,55 @@
+"""The signals of the loop: what each is called, its unit and how many numbers it has."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from hsv.model.dynamics import INPUT_UNITS, N_INPUTS, N_STATES, STATE_UNITS
+
+VARYING = -1
+"""Size of a signal that depends on the flight."""
+
+
+class SignalType(NamedTuple):
+    """Numbers that go from block to block."""
+
+    name: str
+    unit: str
+    """SI, "1" without one; several, separated by commas, are repeated number by number; empty: no plain numbers"""
+    size: int
+
+    def of_size(self, size: int) -> SignalType:
+        """Return the same with so many numbers."""
+        return self._replace(size=size)
+
+
+def _state(name: str) -> SignalType:
+    return SignalType(name, ", ".join(STATE_UNITS), N_STATES)
+
+
+def _input(name: str) -> SignalType:
+    return SignalType(name, ", ".join(INPUT_UNITS), N_INPUTS)
+
+
+STATE = _state("state")
+STATUS = SignalType("status", "1", 1)
+FORCES = SignalType("forces", "N, N, N, N m, Pa", 5)
+EFFECTOR = _input("effector")
+AIR = SignalType("air", "m/s, m/s, 1", 3)
+MEASUREMENT = _state("measurement")
+ESTIMATE = _state("estimate")
+FILTERED_PITCH_RATE = SignalType("filtered_pitch_rate", "rad/s", 1)
+FILTER_STATE = SignalType("filter_state", "rad, rad s", VARYING)
+REFERENCE = _state("reference")
+REFERENCE_INPUT = _input("reference_input")
+DEVIATION = _state("deviation")
+NOMINAL_INPUT = _input("nominal_input")
+GAIN = SignalType("gain", "", VARYING)
+GAIN_INDEX = SignalType("gain_index", "1", 1)
+NOMINAL_STATUS = SignalType("nominal_status", "1", 1)
+WANTED_INPUT = _input("wanted_input")
+COMMAND = _input("command")
+SATURATED = SignalType("saturated", "1", N_INPUTS)
+DIAGNOSTICS = SignalType("diagnostics", "", VARYING)
+ACTUATOR = _input("actuator")
+ACTIVE_FAULTS = SignalType("active_faults", "", VARYING)

@@ -1,0 +1,106 @@
+"""Equilibrium of flight at a given altitude and velocity (paper eq. 5): level, or climbing and accelerating."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsv.base.errors import TrimError
+from hsv.core import doubles, lib
+from hsv.core.elementary import arcsine
+from hsv.model.dynamics import INPUT_NAMES, N_INPUTS, N_STATES, derivative, vehicle_struct
+from hsv.model.vehicle_parameters import VehicleParameters
+
+CONVERGED = 1e-9
+"""Largest remaining imbalance of an equilibrium, SI per second; what Newton's method reaches is rounding, far below."""
+
+INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
+"""Angle of attack (rad), fuel equivalence ratio and elevator deflection (rad): good all over the envelope."""
+
+
+@dataclass(frozen=True)
+class Trim:
+    """An equilibrium: ``state`` (9) and ``input`` (2), SI, and the largest remaining imbalance in SI units per second.
+
+    The imbalance is |dx/dt|, less the commanded climb rate and acceleration.
+    """
+
+    state: np.ndarray
+    input: np.ndarray
+    residual: float
+
+
+def balance(
+    rigid: VehicleParameters,
+    path_angle: float,
+    acceleration: float,
+    unknown: np.ndarray,
+    x: np.ndarray,
+    u: np.ndarray,
+    pitch_rate: float = 0.0,
+) -> float:
+    """Complete the equilibrium of ``x`` (9) and ``u`` (2) in place; return the greatest remaining imbalance.
+
+    See ``hsv_balance`` in ``core/trim.h``.
+
+    Args:
+        rigid: Parameters of the decoupled vehicle.
+        path_angle: Flight-path angle (rad), pitch angle less angle of attack.
+        acceleration: dV/dt (m/s^2).
+        unknown: First guess (3), replaced by the best that was found.
+        x: Altitude and velocity given; the others are written.
+        u: Written.
+        pitch_rate: That of a steady pull-up (rad/s), the rate of the flight-path angle.
+    """
+    struct = vehicle_struct(rigid).pointer
+    return float(lib.hsv_balance(struct, path_angle, acceleration, pitch_rate, *map(doubles, (unknown, x, u))))
+
+
+def trim(
+    vehicle: VehicleParameters,
+    altitude: float,
+    velocity: float,
+    climb_rate: float = 0.0,
+    acceleration: float = 0.0,
+    where: str = "",
+) -> Trim:
+    """Return the equilibrium at ``altitude`` (m) and ``velocity`` (m/s) (paper eq. 5), to machine precision.
+
+    Level and unaccelerated, or with V sin(theta - alpha) = ``climb_rate`` (m/s) and dV/dt = ``acceleration`` (m/s^2);
+    angle of attack and pitch rate do not change, the vehicle does not pitch, and its elastic modes rest.
+
+    Errors name the condition in SI, or in the words of ``where``.
+
+    Raises:
+        TrimError: No equilibrium there, or only one outside the input limits.
+    """
+    if not where:
+        where = f"altitude = {altitude:.6g} m, velocity = {velocity:.6g} m/s"
+        if climb_rate or acceleration:
+            where += f", climb rate = {climb_rate:.6g} m/s, acceleration = {acceleration:.6g} m/s^2"
+    if not (np.isfinite(altitude) and np.isfinite(velocity) and velocity > 0.0):
+        raise TrimError(f"{where}: expected a finite altitude and a positive velocity")
+    if not (abs(climb_rate) < velocity and np.isfinite(acceleration)):
+        raise TrimError(f"{where}: expected a climb rate below the velocity and a finite acceleration")
+    x, u = np.zeros(N_STATES), np.zeros(N_INPUTS)
+    x[0], x[1] = altitude, velocity
+    size = balance(vehicle.decoupled(), arcsine(climb_rate / velocity), acceleration, INITIAL_GUESS.copy(), x, u)
+    check_equilibrium(where, size, u, vehicle)
+    rates = derivative(x, u, vehicle)
+    rates[:2] -= climb_rate, acceleration
+    return Trim(x, u, float(np.max(np.abs(rates))))
+
+
+def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
+    """Refuse what :func:`balance` did not balance, or only with an input ``u`` (2) outside the limits of ``vehicle``.
+
+    Raises:
+        TrimError: Says ``where`` and why.
+    """
+    if not size < CONVERGED:
+        raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")
+    limits = vehicle.input_minimum, vehicle.input_maximum
+    for name, unit, value, low, high in zip(INPUT_NAMES, ("", " rad"), u, *limits, strict=True):
+        if not low <= value <= high:
+            raise TrimError(f"{where}: trim needs {name} = {value:.6g}{unit}, expected {low:.6g} to {high:.6g}{unit}")

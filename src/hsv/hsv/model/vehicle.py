@@ -1,0 +1,453 @@
+"""Vehicles as files: coefficients, elastic modes, inertial coupling, envelope, uncertainty and limits in one TOML.
+
+Every quantity carries its unit. A package registers its files as entry points of the group ``hsv.vehicles``; in
+``pyproject.toml``::
+
+    [project.entry-points."hsv.vehicles"]
+    glider = "my_vehicles:glider.toml"
+
+Scenarios and design inputs then say ``vehicle = "glider"``; where nothing is registered, ``vehicle = "glider.toml"``, a
+path from the folder of the file that says so. A file may extend another one (:mod:`hsv.base.inheritance`). The package
+of a registered vehicle is looked up, not imported: reading data runs no code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Self
+
+import tomli_w
+
+from hsv.base.documents import parse_toml, read_text
+from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
+from hsv.base.inheritance import EXTENDS, Tables, follow_extends, is_path
+from hsv.base.parameters import Parameter, check_all
+from hsv.base.units import parse_quantity
+from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+from hsv.model.vehicle_parameters import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
+
+GROUP = "hsv.vehicles"
+"""The entry points of vehicles, ``package:file.toml`` each."""
+
+SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "stiffened")}
+"""The files of this library's by name, which a source tree knows as well; others are entry points."""
+
+DEFAULT_VEHICLE = "parker"
+"""The paper's, where no other is named."""
+
+DERIVED = "derived"
+"""The set of inertial coupling that a number is a multiple of."""
+
+MOST_COUPLING = 2.0
+"""Largest multiple of it: twice the coupling of a beam model is no vehicle of this structure any more."""
+
+MOST_UNCERTAIN = 12
+"""Uncertain parameters at most: a design flies every corner of their bounds."""
+
+LARGEST_UNCERTAINTY = 0.9
+"""Relative bound at most."""
+
+_COUPLING_UNITS = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
+_AXES = {"altitude": "m", "velocity": "m/s"}
+_INPUTS = dict(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
+
+COUPLING_PARAMETER = Parameter(
+    "vehicle.coupling", "paper_like", "set of inertial coupling, or a multiple of the derived"
+)
+
+VEHICLE_PARAMETERS = (
+    Parameter("vehicle.name", DEFAULT_VEHICLE, "name of the vehicle, which provides the values that are not given"),
+    *(
+        Parameter(f"vehicle.{name}", 0.0, name.replace("_", " "), "" if unit == "1" else unit)
+        for name, unit in COEFFICIENT_UNITS.items()
+    ),
+    Parameter("vehicle.coupling_sets.names", [""], "names of the sets of inertial coupling"),
+    Parameter("vehicle.coupling_sets.values", [], "psi_1 and psi_2 of each set", "kg^0.5 m"),
+    *(Parameter(f"vehicle.{axis}_range", [], f"least and largest {axis} of commands", u) for axis, u in _AXES.items()),
+    Parameter(
+        "vehicle.angle_limit",
+        0.0,
+        "|angle of attack| and |pitch angle| beyond which a flight counts as diverged",
+        "rad",
+    ),
+    Parameter("vehicle.input_minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
+    Parameter("vehicle.input_maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
+    Parameter("vehicle.uncertainty.names", [""], "names of the uncertain coefficients"),
+    Parameter("vehicle.uncertainty.bounds", [], "relative bound of each"),
+)
+"""Parameters of a vehicle for the nodes; those that are not given are those of the vehicle of that name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Vehicle:
+    """A vehicle, SI."""
+
+    name: str
+    title: str
+    decoupled: VehicleParameters
+    """Coefficients and limits, without inertial coupling (paper eq. 4)"""
+    couplings: Mapping[str, tuple[float, float]]
+    """psi_1 and psi_2 (kg^0.5 m) of each set of inertial coupling; the first is taken where none is named"""
+    altitude_range: tuple[float, float]
+    """m, where commands may lead"""
+    velocity_range: tuple[float, float]
+    """m/s, where commands may lead"""
+    uncertainty: Mapping[str, float]
+    """Relative bounds of the uncertain coefficients (paper section 5.1)"""
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Altitude (m) and velocity (m/s) at the middle of the envelope."""
+        low, high = zip(self.altitude_range, self.velocity_range, strict=True)
+        return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
+
+    def coupling_name(self, coupling: object = "") -> str:
+        """Return a choice of inertial coupling as it is kept: a set's name, or a multiple of the derived set as text.
+
+        Args:
+            coupling: A name, a number or its text; empty: the first set.
+
+        Raises:
+            QuantityError: No such set, or no number from 0 to :data:`MOST_COUPLING`.
+        """
+        if coupling == "":
+            return next(iter(self.couplings))
+        if isinstance(coupling, str) and coupling in self.couplings:
+            return coupling
+        try:
+            scale = float(coupling) if isinstance(coupling, str | float | int) else math.nan
+        except (ValueError, OverflowError):
+            scale = math.nan
+        if isinstance(coupling, bool) or not 0.0 <= scale <= MOST_COUPLING:
+            raise QuantityError(
+                f"coupling = {coupling!r}: expected one of {', '.join(self.couplings)}, or a multiple of {DERIVED} "
+                f"from 0 to {MOST_COUPLING:g}, such as 0.65"
+            )
+        return repr(scale)
+
+    def coupled(self, coupling: str | float = "") -> VehicleParameters:
+        """Return the coupled model (paper eq. 1) with a set of inertial coupling, or a multiple of the derived.
+
+        Raises:
+            QuantityError: See :meth:`coupling_name`.
+        """
+        name = self.coupling_name(coupling)
+        if name in self.couplings:
+            psi_1, psi_2 = self.couplings[name]
+        else:
+            psi_1, psi_2 = (float(name) * psi for psi in self.couplings[DERIVED])
+        return self.decoupled._replace(inertial_coupling_1=psi_1, inertial_coupling_2=psi_2)
+
+    def coupling_scale(self, coupling: str) -> float:
+        """Return kappa of a set of inertial coupling: its first coefficient as a share of the derived one's."""
+        return self.couplings[coupling][0] / self.couplings[DERIVED][0]
+
+    def check_envelope(self, table: Iterable[Parameter], values: Mapping[str, Any]) -> None:
+        """Refuse altitudes and velocities, the parameters of a ``table`` in m and m/s, outside the flight envelope.
+
+        Raises:
+            ParameterError: Names the parameter.
+        """
+        ranges = {"m": self.altitude_range, "m/s": self.velocity_range}
+        for parameter in table:
+            if parameter.unit in ranges:
+                low, high = ranges[parameter.unit]
+                replace(parameter, minimum=low, maximum=high).check(values[parameter.name])
+
+    def to_parameters(self) -> dict[str, Any]:
+        """Return the flat parameters, :data:`VEHICLE_PARAMETERS`."""
+        p = self.decoupled
+        return {
+            "vehicle.name": self.name,
+            **{f"vehicle.{name}": getattr(p, name) for name in COEFFICIENT_UNITS},
+            "vehicle.coupling_sets.names": list(self.couplings),
+            "vehicle.coupling_sets.values": [psi for pair in self.couplings.values() for psi in pair],
+            "vehicle.altitude_range": list(self.altitude_range),
+            "vehicle.velocity_range": list(self.velocity_range),
+            "vehicle.angle_limit": p.angle_limit,
+            "vehicle.input_minimum": p.input_minimum.tolist(),
+            "vehicle.input_maximum": p.input_maximum.tolist(),
+            "vehicle.uncertainty.names": list(self.uncertainty),
+            "vehicle.uncertainty.bounds": list(self.uncertainty.values()),
+        }
+
+    @classmethod
+    def from_parameters(cls, values: Mapping[str, Any]) -> Self:
+        """Return the vehicle in flat parameters; those that are not there are those of the vehicle of its name.
+
+        Raises:
+            ParameterError: A wrong value, named.
+            VehicleError: Some are missing, and there is no vehicle of that name.
+        """
+        if lacking := [parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in values]:
+            # Parameters may be data of somebody else's, as in a bag or a certificate: no path in them is followed.
+            if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
+                raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
+            values = {**named_parameters(values), **values}
+        v = {name.removeprefix("vehicle."): value for name, value in check_all(VEHICLE_PARAMETERS, values).items()}
+        for name in POSITIVE:
+            if not v[name] > 0.0:
+                raise ParameterError(f"parameter vehicle.{name} = {v[name]}: expected above zero")
+        sets, bounds = v["coupling_sets.names"], v["uncertainty.bounds"]
+        sizes = {"coupling_sets.values": 2 * len(sets), "uncertainty.bounds": len(v["uncertainty.names"])}
+        for name in (*sizes, "altitude_range", "velocity_range", "input_minimum", "input_maximum"):
+            if len(v[name]) != sizes.get(name, 2):
+                raise ParameterError(f"parameter vehicle.{name} = {v[name]}: expected {sizes.get(name, 2)} numbers")
+        if DERIVED not in sets:
+            raise ParameterError(f"parameter vehicle.coupling_sets.names = {sets}: expected one called {DERIVED!r}")
+        for name in v["uncertainty.names"]:
+            if name not in COEFFICIENT_UNITS:
+                raise ParameterError(f"parameter vehicle.uncertainty.names: {name!r}, expected names of coefficients")
+        low, high = ([float(number) for number in v[f"input_{end}"]] for end in ("minimum", "maximum"))
+        ranges = {name: (float(v[name][0]), float(v[name][1])) for name in ("altitude_range", "velocity_range")}
+        for name, pair in {**ranges, **dict(zip(INPUT_NAMES, zip(low, high, strict=True), strict=True))}.items():
+            if not pair[0] < pair[1]:
+                raise ParameterError(
+                    f"parameter vehicle.{name}: {pair[0]} to {pair[1]}, expected a range that increases"
+                )
+        psi = list(map(float, v["coupling_sets.values"]))
+        return cls(
+            name=v["name"],
+            title="",
+            decoupled=_parameters({name: v[name] for name in COEFFICIENT_UNITS}, low, high, v["angle_limit"]),
+            couplings=dict(zip(sets, zip(psi[::2], psi[1::2], strict=True), strict=True)),
+            altitude_range=ranges["altitude_range"],
+            velocity_range=ranges["velocity_range"],
+            uncertainty=dict(zip(v["uncertainty.names"], map(float, bounds), strict=True)),
+        )
+
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 of all but the name; empty for the default vehicle, which old designs are for."""
+        own, default = (_digest(vehicle) for vehicle in (self, load_vehicle()))
+        return "" if own == default else own
+
+
+def _digest(vehicle: Vehicle) -> str:
+    values = vehicle.to_parameters()
+    del values["vehicle.name"]
+    return hashlib.sha256(json.dumps(values).encode()).hexdigest()
+
+
+def named_parameters(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the flat parameters of the vehicle that ``vehicle.name`` in ``values`` names, the default one without.
+
+    Raises:
+        VehicleError: There is none of that name.
+    """
+    return load_vehicle(str(values.get("vehicle.name", DEFAULT_VEHICLE))).to_parameters()
+
+
+def vehicle_names() -> list[str]:
+    """Return the names of all registered vehicles."""
+    return sorted({*SHIPPED_VEHICLES, *_places_elsewhere()})
+
+
+def _places_elsewhere() -> dict[str, str]:
+    """Return the places of vehicles of other packages, by name."""
+    from importlib.metadata import entry_points  # slow
+
+    return {entry.name: entry.value for entry in reversed([*entry_points(group=GROUP)])}
+
+
+def load_vehicle(name: str = DEFAULT_VEHICLE) -> Vehicle:
+    """Return a registered vehicle by name, or one from a file by path.
+
+    Raises:
+        VehicleError: There is none, or a field is wrong; the message names it and what was expected.
+    """
+    return parse_vehicle(vehicle_tables(name), vehicle_label(name)) if is_path(name) else _registered(name)
+
+
+@cache
+def _registered(name: str) -> Vehicle:
+    return parse_vehicle(vehicle_tables(name), name)
+
+
+def vehicle_label(name: str) -> str:
+    """Return what a vehicle, by name or path, is called."""
+    return Path(name).stem if is_path(name) else name
+
+
+def vehicle_tables(name: str) -> Tables:
+    """Return the contents of a vehicle file, by name or path, with those of what it extends.
+
+    Raises:
+        VehicleError: There is none, it is no TOML, or what it extends is not.
+    """
+    return follow_extends(name, _read, lambda file, why: VehicleError(f"vehicle {vehicle_label(file)!r}: {why}"))
+
+
+def vehicle_text(name: str) -> str:
+    """Return the text of a vehicle file, by name or path, with what it extends written out.
+
+    Raises:
+        VehicleError: See :func:`load_vehicle`.
+    """
+    load_vehicle(name)
+    return tomli_w.dumps(vehicle_tables(name)) if EXTENDS in _read(name) else read_text(_path(name))
+
+
+def _read(name: str) -> Tables:
+    path = _path(name)
+    try:
+        return parse_toml(read_text(path))
+    except DocumentError as error:
+        raise VehicleError(f"vehicle {name!r}: {error}, expected a TOML file") from error
+
+
+def _path(name: str) -> Path:
+    if is_path(name):
+        return Path(name)
+    place = SHIPPED_VEHICLES.get(name) or _places_elsewhere().get(name, "")
+    if not place:
+        hint = did_you_mean(name, vehicle_names())
+        raise VehicleError(
+            f"vehicle {name!r}: expected one of {', '.join(vehicle_names())} or the path of a TOML file{hint}"
+        )
+    package, _, file = place.partition(":")
+    spec = find_spec(package)
+    folders = list(spec.submodule_search_locations or ()) if spec else []
+    if not folders or not file:
+        raise VehicleError(f"vehicle {name!r}: registered as {place!r}, expected package:file.toml of an installed one")
+    return Path(folders[0], file)
+
+
+def parse_vehicle(tables: Mapping[str, Any], name: str) -> Vehicle:
+    """Return the vehicle in the ``tables`` of a file, by the ``name`` it is to have.
+
+    Raises:
+        VehicleError: A field is missing, unknown or wrong; the message names it and what was expected.
+    """
+    try:
+        return _parsed(tables, name)
+    except HsvError as error:
+        raise VehicleError(f"vehicle {name!r}: {error}") from error
+
+
+def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
+    _refuse_unknown(tables, ("title", *COEFFICIENTS, "inertial_coupling", "envelope", "input_limits"))
+    title = tables.get("title", "")
+    if not isinstance(title, str):
+        raise QuantityError(f"title = {title!r}: expected text")
+    coefficients: dict[str, float] = {}
+    uncertainty: dict[str, float] = {}
+    for section, units in COEFFICIENTS.items():
+        table = _table(tables, section, units)
+        for coefficient, unit in units.items():
+            field = f"{section}.{coefficient}"
+            row = _table(table, field, ("value", "symbol", "uncertainty"), unit)
+            coefficients[coefficient] = _quantity(row, field, "value", unit)
+            if coefficient in POSITIVE and not coefficients[coefficient] > 0.0:
+                raise QuantityError(f"{field}.value = {row['value']!r}: expected above zero")
+            if "uncertainty" in row:
+                bound = _quantity(row, field, "uncertainty", "1")
+                if not 0.0 <= bound <= LARGEST_UNCERTAINTY:
+                    most = f"{100 * LARGEST_UNCERTAINTY:g} %"
+                    raise QuantityError(f"{field}.uncertainty = {row['uncertainty']!r}: expected 0 % to {most}")
+                if bound > 0.0:  # a vehicle that extends another says so of what it knows better
+                    uncertainty[coefficient] = bound
+    if len(uncertainty) > MOST_UNCERTAIN:
+        raise QuantityError(
+            f"uncertainty: of {len(uncertainty)} coefficients, expected at most {MOST_UNCERTAIN}: a design flies every "
+            "corner of their bounds"
+        )
+    envelope = _table(tables, "envelope", (*_AXES, "angle"))
+    ranges = {axis: _range(envelope, f"envelope.{axis}", unit) for axis, unit in _AXES.items()}
+    if not ranges["velocity"][0] > 0.0:
+        raise QuantityError(f"envelope.velocity.minimum = {envelope['velocity']['minimum']!r}: expected above zero")
+    angle = _table(envelope, "envelope.angle", ("maximum",), "rad")
+    angle_limit = _quantity(angle, "envelope.angle", "maximum", "rad")
+    if not angle_limit > 0.0:
+        raise QuantityError(f"envelope.angle.maximum = {angle['maximum']!r}: expected above zero")
+    inputs = _table(tables, "input_limits", _INPUTS)
+    limits = [_range(inputs, f"input_limits.{field}", unit) for field, unit in _INPUTS.items()]
+    low, high = zip(*limits, strict=True)
+    return Vehicle(
+        name=name,
+        title=title,
+        decoupled=_parameters(coefficients, low, high, angle_limit),
+        couplings=_couplings(tables),
+        altitude_range=ranges["altitude"],
+        velocity_range=ranges["velocity"],
+        uncertainty=uncertainty,
+    )
+
+
+def _parameters(
+    coefficients: Mapping[str, float], low: Iterable[float], high: Iterable[float], angle_limit: float
+) -> VehicleParameters:
+    ends = {"minimum": low, "maximum": high}
+    limits = {f"{name}_{end}": n for end, row in ends.items() for name, n in zip(INPUT_NAMES, row, strict=True)}
+    return VehicleParameters(
+        **coefficients,
+        inertial_coupling_1=0.0,
+        inertial_coupling_2=0.0,
+        **limits,
+        angle_limit=angle_limit,
+    )
+
+
+def _couplings(tables: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
+    table = _table(tables, "inertial_coupling")
+    if DERIVED not in table:
+        raise QuantityError(f"inertial_coupling.{DERIVED}: missing, expected a set, of which numbers are multiples")
+    found = {}
+    for name in table:
+        if not (name.isidentifier() and name.islower()):
+            raise QuantityError(f"inertial_coupling.{name}: expected a name of lower-case letters, digits and _")
+        rows = _table(table, f"inertial_coupling.{name}", _COUPLING_UNITS)
+        psi = []
+        for key, unit in _COUPLING_UNITS.items():
+            field = f"inertial_coupling.{name}.{key}"
+            psi.append(_quantity(_table(rows, field, ("value", "symbol"), unit), field, "value", unit))
+        found[name] = (psi[0], psi[1])
+    return found
+
+
+def _range(table: Mapping[str, Any], field: str, unit: str) -> tuple[float, float]:
+    row = _table(table, field, ("minimum", "maximum"), unit)
+    low, high = (_quantity(row, field, end, unit) for end in ("minimum", "maximum"))
+    if not low < high:
+        raise QuantityError(f"{field}.minimum = {row['minimum']!r}: expected below its maximum, {row['maximum']!r}")
+    return low, high
+
+
+def _table(
+    parent: Mapping[str, Any], field: str, keys: Iterable[str] | None = None, unit: str = ""
+) -> Mapping[str, Any]:
+    """Return the table ``field`` of its ``parent`` with no key but these; ``unit``: of the value that it holds."""
+    first = next(iter(keys or ()), "")
+    quantity = "1.0" if unit == "1" else f"1.0 {unit}"
+    expected = f'expected a table such as {{ {first} = "{quantity}" }}' if unit else "expected a table"
+    key = field.rpartition(".")[2]
+    if key not in parent:
+        raise QuantityError(f"{field}: missing, {expected}")
+    table = parent[key]
+    if not isinstance(table, Mapping):
+        raise QuantityError(f"{field} = {table!r}: {expected}")
+    if keys is not None:
+        _refuse_unknown(table, keys, field)
+    return table
+
+
+def _refuse_unknown(table: Mapping[str, Any], keys: Iterable[str], field: str = "") -> None:
+    for key in table:
+        if key not in keys:
+            raise QuantityError(
+                f"{f'{field}.' if field else ''}{key}: unknown field, expected one of {', '.join(keys)}"
+            )
+
+
+def _quantity(row: Mapping[str, Any], field: str, key: str, unit: str) -> float:
+    if key not in row:
+        quantity = "1.0" if unit == "1" else f"1.0 {unit}"
+        raise QuantityError(f"{field}.{key}: missing, expected a quantity such as {quantity!r}")
+    return parse_quantity(row[key], unit, f"{field}.{key}")

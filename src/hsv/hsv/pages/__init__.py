@@ -1,0 +1,1 @@
+"""Pages of a browser: report, campaigns, resilience and the live page."""

@@ -1,0 +1,102 @@
+"""Commands of the page for a flight, checked before any node is called."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from hsv.bags.description import FAULT_INJECTOR, NodeDescription
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter
+from hsv.base.units import parse_quantity
+from hsv.graph.settable import SETTABLE, parse
+from hsv.model.faults.table import CHANNELS, FAULT_KINDS, Fault, read_fault
+
+
+@dataclass(frozen=True)
+class Inject:
+    """Begin a fault, for so many simulated seconds, or with 0 until it is cleared."""
+
+    fault: Fault
+    duration: float
+    node: NodeDescription = FAULT_INJECTOR
+
+
+@dataclass(frozen=True)
+class Clear:
+    """End the faults of a channel and of a type; of any where that is empty."""
+
+    channel: str
+    type: str
+    node: NodeDescription = FAULT_INJECTOR
+
+
+@dataclass(frozen=True)
+class Change:
+    """Give a parameter that may change in flight another value."""
+
+    node: NodeDescription
+    parameter: Parameter
+    value: bool | float | list[float]
+
+
+Command = Inject | Clear | Change
+
+
+def read_command(fields: Mapping[str, Any]) -> Command:
+    """Return the command in the ``fields`` of a request; quantities are texts with their units.
+
+    Raises:
+        ParameterError, QuantityError: A field that is missing, unknown or wrong, and what was expected.
+    """
+    name = _text(fields, "command")
+    if name not in _COMMANDS:
+        raise ParameterError(f"command = {name!r}: expected one of {', '.join(_COMMANDS)}")
+    return _COMMANDS[name](fields)
+
+
+def _inject(fields: Mapping[str, Any]) -> Command:
+    channel, kind = _choice(fields, "channel", CHANNELS), _choice(fields, "type", FAULT_KINDS)
+    words = filter(str.strip, _text(fields, "parameters", "").split(","))
+    parameters = ["=".join(map(str.strip, word.split("=", 1))) for word in words]
+    duration = parse_quantity(_text(fields, "duration", "") or "0 s", "s", "duration")
+    if duration < 0.0:
+        raise ParameterError(f"duration = {duration:g}: expected at least 0 (seconds; 0: until cleared)")
+    return Inject(read_fault(channel, kind, parameters), duration)
+
+
+def _clear(fields: Mapping[str, Any]) -> Command:
+    channel, kind = _text(fields, "channel", ""), _text(fields, "type", "")
+    return Clear(
+        channel and _choice(fields, "channel", CHANNELS),
+        kind and _choice(fields, "type", FAULT_KINDS),
+    )
+
+
+def _change(name: str, field: str) -> Callable[[Mapping[str, Any]], Command]:
+    node, parameter = SETTABLE[name]
+    return lambda fields: Change(node, parameter, parse(_text(fields, field), parameter))
+
+
+_COMMANDS: dict[str, Callable[[Mapping[str, Any]], Command]] = {
+    "pause": _change("paused", "paused"),
+    "pace": _change("real_time_factor", "real_time_factor"),
+    "tau": _change("feedback.tau", "tau"),
+    "inject": _inject,
+    "clear": _clear,
+}
+
+
+def _text(fields: Mapping[str, Any], name: str, default: str | None = None) -> str:
+    value = fields.get(name, default)
+    if not isinstance(value, str):
+        raise ParameterError(f"{name} = {value!r}: expected a text" if name in fields else f"{name}: expected, missing")
+    return value
+
+
+def _choice(fields: Mapping[str, Any], name: str, known: Mapping[str, Any]) -> str:
+    value = _text(fields, name)
+    if value not in known:
+        raise ParameterError(f"{name} = {value!r}: expected one of {', '.join(known)}")
+    return value

@@ -1,0 +1,75 @@
+"""The paper's panels of a flight in one static figure: trajectory, attitude, elastic rates, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
+from textwrap import fill
+
+import matplotlib
+from matplotlib.figure import Figure
+
+from hsv.base.units import UnitSystem, in_system
+from hsv.flight.metrics import FlightData
+
+_PANELS = (
+    ("altitude", "m", "state", 0),
+    ("velocity", "m/s", "state", 1),
+    ("angle of attack", "rad", "state", 2),
+    ("pitch rate", "rad/s", "state", 4),
+    ("elastic rate 1", "kg^0.5 m/s", "state", 6),
+    ("elastic rate 2", "kg^0.5 m/s", "state", 8),
+    ("fuel equivalence ratio", "1", "command", 0),
+    ("elevator deflection", "rad", "command", 1),
+)
+
+_REMARK_WIDTH = 130
+"""Characters in a line of a remark."""
+
+
+def flight_figure(flights: Mapping[str, FlightData], system: UnitSystem, remarks: Sequence[str] = ()) -> Figure:
+    """Return eight panels over time, one curve per flight; dotted: the reference, shaded: from the first fault on.
+
+    Args:
+        flights: The flights by label.
+        system: Units that are drawn.
+        remarks: Remarks on the flights, such as missing steps, printed above the panels.
+    """
+    with matplotlib.rc_context({"font.size": 9, "axes.spines.top": False, "axes.spines.right": False}):
+        figure = Figure(figsize=(10, 9), layout="constrained")
+        axes = figure.subplots(4, 2, sharex=True).ravel()
+        for axis, (title, unit, group, column) in zip(axes, _PANELS, strict=True):
+            factor, shown = in_system(1.0, unit, system)
+            for name, flight in flights.items():
+                axis.plot(flight.time, factor * getattr(flight, group)[:, column], linewidth=1.1, label=name)
+            first = next(iter(flights.values()))
+            if group == "state" and column < 2:
+                axis.plot(first.time, factor * first.reference[:, column], "k:", linewidth=1.0, label="reference")
+            if first.fault_start is not None:
+                axis.axvspan(first.fault_start, first.time[-1], color="tab:red", alpha=0.06, linewidth=0)
+            axis.set_title(f"{title}{'' if unit == '1' else f' [{_mathtext(shown)}]'}", loc="left", fontsize=9)
+            axis.grid(alpha=0.25, linewidth=0.5)
+            axis.margins(x=0)
+        if remarks:
+            figure.suptitle("\n".join(fill(remark, _REMARK_WIDTH) for remark in remarks), fontsize=8, color="tab:red")
+        axes[0].legend(frameon=False, loc="lower right")
+        for axis in axes[-2:]:
+            axis.set_xlabel("time [s]")
+    return figure
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Save ``figure`` in the format of the file's ending, without a date, so that equal flights give equal files."""
+    metadata: dict[str, str | None] = {}
+    if path.suffix in (".svg", ".pdf"):
+        metadata = {"Date" if path.suffix == ".svg" else "CreationDate": None}
+    with matplotlib.rc_context({"svg.hashsalt": "hsv"}):
+        # Whole before it meets the disk: on a full one matplotlib's own errors depend on the format.
+        whole = BytesIO()
+        figure.savefig(whole, format=path.suffix[1:], dpi=110, metadata=metadata)
+    path.write_bytes(whole.getvalue())
+
+
+def _mathtext(unit: str) -> str:
+    return unit.replace("^0.5", "$^{1/2}$")

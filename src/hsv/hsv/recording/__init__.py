@@ -1,1 +1,0 @@
-"""MCAP bags: writing, reading, recovering."""

@@ -1,1 +1,0 @@
-"""Scenarios, the in-process closed loop and the metrics of a flight."""

@@ -1,1 +1,0 @@
-"""Equations of motion, trim and linearisation of the vehicle."""

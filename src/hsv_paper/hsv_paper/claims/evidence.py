@@ -1,0 +1,153 @@
+"""Sources for measuring claims: designs with their certificates, flights of many vehicles, and the sampled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.base.progress import Progress
+from hsv.control.design_file import find_design, read_parameters
+from hsv.control.notch_filter import NotchSection
+from hsv.flight.assembly import flight_parameters
+from hsv.flight.corners import Corner, corners, screening_corners
+from hsv.flight.scenario import load_scenario
+from hsv.model.actuators import ACTUATOR_SETS, IDEAL
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.corner_flights import Table, corner_table, fly_over
+from hsv_paper.figures.figure import Design
+from hsv_paper.flights import Flights
+from hsv_paper.linear_loop import Hardware, worst_growth
+
+FUEL = ACTUATOR_SETS["fuel_10"]
+"""The fuel delivery that goes with every elevator which is not ideal."""
+
+ELEVATORS = {IDEAL: ()} | {name: (FUEL, ACTUATOR_SETS[name]) for name in ("elevator_150", "elevator_50", "elevator_20")}
+"""Actuators that readings may name, as the linear loop has them; those of the paper are ideal."""
+
+
+class Evidence:
+    """Measurements for the claims; each is computed once, when it is first requested."""
+
+    def __init__(
+        self,
+        folder: Path,
+        progress: Progress = lambda what, done, total: None,
+        over: Sequence[Corner] | None = None,
+        actuators: str = IDEAL,
+        loops: Sequence[Corner] | None = None,
+    ) -> None:
+        """Keep tables in ``folder``.
+
+        Args:
+            folder: Folder of tables and flights.
+            progress: Called with what is measured.
+            over: Vehicles that are flown, the nominal one first; by default all corners.
+            actuators: Actuators in loops and flights, from :data:`ELEVATORS`.
+            loops: Vehicles of the linear loops; by default those that are flown.
+        """
+        self._folder = folder
+        self._progress = progress
+        self.hardware = Hardware(ELEVATORS[actuators])
+        self._equipment = tuple(
+            (f"actuator.{ACTUATOR_SETS[name].channel}.set", name)
+            for name, entry in ACTUATOR_SETS.items()
+            if entry in ELEVATORS[actuators]
+        )
+        self.over = corners(load_vehicle().uncertainty) if over is None else over
+        self._loops = self.over if loops is None else loops
+        self.flights = Flights(folder, graph=False, progress=progress)
+        self.design = cache(Design)
+        self.corners = cache(self._corners)
+        self.changed = cache(self._changed)
+        self.growth = cache(self._growth)
+        self.behind = cache(self._behind)
+
+    @property
+    def vehicles(self) -> int:
+        """Number of vehicles in a table: the nominal one and those at corners."""
+        return len(self.over)
+
+    @cached_property
+    def half_width(self) -> np.ndarray:
+        """Half-widths (5) of the baseline's set, the scales by which errors of different states are compared."""
+        tube = self.design("baseline").flown.tube
+        assert tube is not None
+        return tube.half_width[:5]
+
+    def _behind(self, actuators: str) -> Evidence:
+        """Return the evidence with these actuators: this one if they are ideal, else flights of at most 32 corners."""
+        if actuators == IDEAL:
+            return self
+        over = [corner for corner in screening_corners(load_vehicle().uncertainty) if corner in self.over]
+        return Evidence(self._folder, self._progress, over, actuators, self._loops)
+
+    def _corners(self, scenario: str, *changes: tuple[str, Any]) -> Table:
+        """Return the measurements of a scenario with the nominal vehicle (first) and at all corners."""
+        changes = (*self._equipment, *changes)
+        return corner_table(scenario, self.over, self._folder, self.half_width, self._progress, changes)
+
+    def _changed(self, scenario: str, *changes: tuple[str, Any]) -> dict[str, float]:
+        """Return the measurements of the nominal flight of a scenario with other parameters."""
+        values = {**flight_parameters(load_scenario(scenario)), **dict((*self._equipment, *changes))}
+        return self._flown(values)
+
+    def uncertain(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> float:
+        """Return the magnitude of a measure with the uncertain parameters of Case 1 and 2; nan where not defined.
+
+        The uncertain flight of ``case1_...`` is that of ``case1_uncertain_...``, and so for Case 2.
+        """
+        case, _, rest = scenario.partition("_")
+        flight = self.changed("_".join(filter(None, (case, "uncertain", rest))), *changes)
+        return abs(flight.get(measure, np.nan))
+
+    def magnitudes(self, scenario: str, measure: str, *changes: tuple[str, Any]) -> np.ndarray:
+        """Return the magnitude (vehicles) of a measure, the nominal vehicle first."""
+        return np.abs(self.corners(scenario, *changes)[measure])
+
+    def certified(self, entry: str) -> np.ndarray:
+        """Return the numbers in an entry of a certificate, ``design:path.to.entry``, those of all elements of lists."""
+        design, _, path = entry.partition(":")
+        found = [self.design(design).certificate]
+        for key in path.split("."):
+            found = [item for value in found for item in np.atleast_1d(value[key])]
+        return np.array(found)
+
+    def adjustable_step(self) -> dict[str, float]:
+        """Return the measurements on the step of Case 1 with the adjustable design."""
+        design = read_parameters(find_design("adjustable"))
+        return self._flown({**design, **load_scenario("case1").parameters()})
+
+    def _flown(self, values: dict[str, Any]) -> dict[str, float]:
+        return {name: float(column[0]) for name, column in fly_over(values, [{}], self.half_width).items()}
+
+    def _growth(
+        self, coupling: str, notch: tuple[NotchSection, ...], design: str = "baseline", factor: float = 1.0
+    ) -> np.ndarray:
+        """Return the largest real part, 1/s, of the sampled loop's poles, by vehicle, the nominal one first.
+
+        It is the largest of both ends of the step, before and after the fault. ``factor`` multiplies the feedback.
+        """
+        flown, found = self.design(design).flown, []
+        what = f"poles, {coupling} coupling, {'with' if notch else 'without'} notch"
+        for number, corner in enumerate(self._loops):
+            if number % 50 == 0:
+                self._progress(what, number, len(self._loops))
+            vehicle = load_vehicle().coupled(coupling).perturbed(corner)
+            found.append(worst_growth(vehicle, factor * flown.feedback_gain, notch, flown.period, self.hardware))
+        self._progress(what, len(self._loops), len(self._loops))
+        return np.array(found)
+
+
+def nominal(table: Table, measure: str) -> float:
+    """Return a measure of the nominal vehicle."""
+    return float(table[measure][0])
+
+
+def worst(table: Table, measure: str) -> float:
+    """Return the largest magnitude over all vehicles; infinite where one diverged or does not define it."""
+    values = np.abs(table[measure])
+    return float(np.inf) if np.any(np.isnan(values)) else float(values.max())

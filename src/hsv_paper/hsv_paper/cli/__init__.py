@@ -1,0 +1,13 @@
+"""The hsv-paper command: the paper's figures and claims, and what its choices are sensitive to."""
+
+from __future__ import annotations
+
+from hsv.cli.main import run
+
+COMMANDS = ("figures", "claims", "sensitivity")
+"""Names of the commands; each is in a module of this name."""
+
+
+def main() -> None:
+    """Run the command line."""
+    run("hsv-paper", __name__, COMMANDS, "Draw the figures of the paper, judge its claims, and vary its choices.")

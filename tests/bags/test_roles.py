@@ -1,0 +1,106 @@
+"""Topics of a bag are known by their role, whatever namespace and remappings gave them for names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from changed_bags import changed_bag
+from flown_bags import flown_bag
+
+from hsv.bags.bag_warnings import bag_warnings
+from hsv.bags.compare import compare
+from hsv.bags.description import ACTUATOR, COMMAND, MARKERS, STATE, TOPICS, checked_namespace, resolved
+from hsv.bags.flight import flight_fingerprint
+from hsv.bags.overview import OVERVIEW_TOPIC
+from hsv.bags.reader import Bag
+from hsv.bags.replay.attached import controller_of, flown_parameters
+from hsv.bags.replay.engine import rerun
+from hsv.bags.roles import naming, roles
+from hsv.base.errors import ParameterError, RecordingError
+from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC
+from hsv.pages.viewers import LAYOUTS, layout_for
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return flown_bag(tmp_path_factory.mktemp("bags") / "flown", duration=11.0, fault=1.0)
+
+
+def moved(source: Path, target: Path, names: Callable[[str], str]) -> Path:
+    """Return a copy of a bag whose topics have other names, and which says nothing of that, as ros2 bag record's."""
+    return changed_bag(source, target, lambda topic: replace(topic, name=names(topic.name)))
+
+
+def test_a_bag_in_a_namespace_is_like_any_other(flown: Path, tmp_path: Path) -> None:
+    original, bag = Bag(flown), Bag(moved(flown, tmp_path / "moved", lambda name: f"/lab/veh1{name}"))
+    assert bag.namespace == "/lab/veh1" and bag.name_of(STATE) == "/lab/veh1/hsv/state"
+    assert flight_fingerprint(bag) == flight_fingerprint(original) is not None
+    assert bag_warnings(bag) == bag_warnings(original)
+    for role in TOPICS:
+        assert bag.messages(role) == bag.messages(bag.name_of(role)) == original.messages(role)
+        assert compare(original.track(role), bag.track(role)).identical
+    values = flown_parameters(bag)
+    assert all(result.identical for result in rerun(bag, controller_of(values), values, lambda *_: None))
+
+
+def test_what_a_bag_says_of_its_remappings_is_taken(flown: Path, tmp_path: Path) -> None:
+    others = {STATE: "/truth", COMMAND: "/veh1/wish"}
+    names = {resolved(role): others.get(role, resolved(role, "/veh1")) for role in TOPICS}
+    said = naming({role: names[resolved(role)] for role in TOPICS}, "/veh1")
+    made = changed_bag(flown, tmp_path / "said", lambda topic: replace(topic, name=names[topic.name]), custom_data=said)
+    bag = Bag(made)
+    assert bag.namespace == "/veh1"
+    assert {role: bag.name_of(role) for role in TOPICS} == {role: names[resolved(role)] for role in TOPICS}
+    assert flight_fingerprint(bag) == flight_fingerprint(Bag(flown))
+
+
+def test_an_ordinary_graph_says_nothing() -> None:
+    assert naming({role: resolved(role) for role in TOPICS}, "/") == {}
+
+
+def test_a_remapped_topic_is_told_by_its_type_where_no_other_has_it(flown: Path, tmp_path: Path) -> None:
+    bag = Bag(moved(flown, tmp_path / "truth", lambda name: "/truth" if name == resolved(STATE) else name))
+    assert bag.name_of(STATE) == "/truth" and flight_fingerprint(bag) == flight_fingerprint(Bag(flown))
+    # Two have the type of a command: neither can be told.
+    unknown = {resolved(COMMAND): "/a", resolved(ACTUATOR): "/b"}
+    bag = Bag(moved(flown, tmp_path / "unknown", lambda name: unknown.get(name, name)))
+    assert not {COMMAND, ACTUATOR} & bag.roles.keys()
+    with pytest.raises(RecordingError, match="no topic /hsv/command, only /a, /b"):
+        bag.columns(COMMAND)
+
+
+def test_topics_of_two_graphs_are_refused(flown: Path, tmp_path: Path) -> None:
+    kinds = {resolved(role, space): kind for space in ("/veh1", "/veh2") for role, kind in TOPICS.items()}
+    with pytest.raises(RecordingError, match=r"two\.mcap: holds the topics of 2 graphs, in /veh1, /veh2"):
+        roles(kinds, {}, "two.mcap")
+    # A controller that only looks on makes no second graph.
+    shadow = {resolved(role): kind for role, kind in TOPICS.items()} | {"/shadow/hsv/command": TOPICS[COMMAND]}
+    assert roles(shadow, {}, "one.mcap") == {role: resolved(role) for role in TOPICS}
+
+
+@pytest.mark.parametrize("layout", ["foxglove.json", "plotjuggler.xml"])
+def test_layouts_are_made_for_the_names_of_a_bag(flown: Path, tmp_path: Path, layout: str) -> None:
+    assert layout_for(Bag(flown), layout) == LAYOUTS / layout
+    bag = Bag(moved(flown, tmp_path / "moved", lambda name: f"/lab/veh1{name}"))
+    made = layout_for(bag, layout)
+    assert made.parent == bag.folder
+    text, shipped = made.read_text(encoding="utf-8"), (LAYOUTS / layout).read_text(encoding="utf-8")
+    assert text.replace("/lab/veh1", "") == shipped
+    # Topics of pictures are called the same in every bag.
+    for added in (OVERVIEW_TOPIC, SCENE_TOPIC, TRANSFORMS_TOPIC, resolved(MARKERS)):
+        text, shipped = text.replace(added, ""), shipped.replace(added, "")
+    assert text.count("/lab/veh1/hsv/") == shipped.count("/hsv/") > 30 and '"/hsv/' not in text
+
+
+@pytest.mark.parametrize("text", ["veh1", "/veh1", "/lab/veh_1", "/"])
+def test_namespaces_by_the_rules_of_ros(text: str) -> None:
+    assert checked_namespace(text) in ("/veh1", "/lab/veh_1", "/")
+
+
+@pytest.mark.parametrize("text", ["//veh", "/veh/", "9x", "/a/9x", "a b", "/é", "/a" * 101])
+def test_what_is_no_namespace(text: str) -> None:
+    with pytest.raises(ParameterError, match="namespace"):
+        checked_namespace(text)

@@ -1,0 +1,137 @@
+"""The copy of a bag with pictures: what was recorded, a scene, the frames it moves in and the sums that plots need."""
+
+import json
+
+import numpy as np
+import pytest
+from bag_readers import by_foxglove
+from mcap.reader import make_reader
+from recorded_flight import record_flight
+
+from hsv.bags.overview import OVERVIEW_TOPIC, overview_message
+from hsv.bags.scene import scene_path, write_scene
+from hsv.base.errors import RecordingError
+from hsv.model.airframe.pose import BODY, LEVEL, Sample, transforms
+from hsv.model.airframe.scene import SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms
+from hsv.model.airframe.solids import solids
+
+ADDED = {SCENE_TOPIC, TRANSFORMS_TOPIC, OVERVIEW_TOPIC}
+
+
+@pytest.fixture(scope="module")
+def case1_bag(tmp_path_factory):
+    return record_flight(tmp_path_factory.mktemp("bags") / "flown", duration=6.0, fault=3.0)
+
+
+@pytest.fixture(scope="module")
+def written(case1_bag, tmp_path_factory):
+    path = tmp_path_factory.mktemp("scene") / "case1.mcap"
+    write_scene(case1_bag, path)
+    return path
+
+
+def messages(path, *topics):
+    with path.open("rb") as stream:
+        return [
+            (schema, channel, message) for schema, channel, message in make_reader(stream).iter_messages(topics or None)
+        ]
+
+
+def test_everything_recorded_is_in_it_byte_by_byte(case1_bag, written):
+    found = messages(written)
+    for topic in case1_bag.topics:
+        copied = [(message.log_time, message.data) for _, channel, message in found if channel.topic == topic]
+        assert copied == case1_bag.messages(topic)
+    times = [message.log_time for *_, message in found]
+    assert times == sorted(times)
+    with written.open("rb") as stream:
+        attached = {each.name: each.data for each in make_reader(stream).iter_attachments()}
+    assert attached == case1_bag.attachments
+
+
+def test_the_vehicle_is_there_once_and_its_frames_all_along(case1_bag, written):
+    [(schema, channel, scene)] = messages(written, SCENE_TOPIC)
+    assert (schema.name, schema.encoding, channel.message_encoding) == ("foxglove.SceneUpdate", "protobuf", "protobuf")
+    assert all(solid.name.encode() in scene.data for solid in solids())
+    moved = messages(written, TRANSFORMS_TOPIC)
+    assert {schema.name for schema, *_ in moved} == {"foxglove.FrameTransforms"}
+    times = np.array([message.log_time for *_, message in moved])
+    first, last = case1_bag.span
+    assert times[0] == scene.log_time == first
+    assert last - times[-1] < 4e7 and set(np.diff(times)) == {40_000_000}
+
+
+def test_frames_are_those_of_the_recorded_state(case1_bag, written):
+    moved = messages(written, TRANSFORMS_TOPIC)
+    state, actuator = (case1_bag.columns(topic) for topic in ("hsv/state", "hsv/actuator"))
+    for *_, message in (moved[0], moved[len(moved) // 2], moved[-1]):
+        row = int(np.flatnonzero(state["header.stamp"] == message.log_time)[0])
+        sample = Sample(
+            float(state["angle_of_attack"][row]),
+            float(state["pitch_angle"][row]),
+            *state["elastic_coordinate"][row].tolist(),
+            float(actuator["fuel_equivalence_ratio"][row]),
+            float(actuator["elevator_deflection"][row]),
+        )
+        assert message.data == frame_transforms(sample, message.log_time).encode()
+        assert all(transform.child.encode() in message.data for transform in transforms(sample))
+
+
+def test_edges_of_the_tube_are_those_about_the_nominal_state(case1_bag, written):
+    [state, nominal, status] = (case1_bag.columns(topic) for topic in ("hsv/state", "hsv/nominal", "hsv/tube_status"))
+    for row, (*_, message) in enumerate(messages(written, OVERVIEW_TOPIC)):
+        told = json.loads(message.data)
+        for index, name in enumerate(("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")):
+            # The true state is the nominal one and the error, whose set has this centre and these half-widths.
+            error = state[name][row] - told["nominal"][name]
+            assert error == pytest.approx(status["error"][row, index], abs=1e-9 * max(1.0, abs(state[name][row])))
+            half = status["tube_half_width"][row, index]
+            width = told["upper"][name] - told["lower"][name]
+            assert width == pytest.approx(2.0 * half, abs=1e-14 * abs(state[name][row]))
+            if status["inside"][row]:
+                assert told["lower"][name] <= state[name][row] <= told["upper"][name]
+    assert len(nominal["step"]) == row + 1
+
+
+def test_faults_are_told_while_they_act(case1_bag, written):
+    told = {message.log_time: json.loads(message.data)["faults"] for *_, message in messages(written, OVERVIEW_TOPIC)}
+    active = [bool(fault) for fault in case1_bag.columns("hsv/actuator")["active"]]
+    assert any(active) and not all(active)
+    assert [words != "none" for words in told.values()] == active
+    assert set(told.values()) == {"none", "elevator_deflection: loss_of_effectiveness"}
+
+
+def test_without_a_tube_there_are_no_edges_and_what_is_not_finite_is_left_out():
+    message = json.loads(overview_message(np.array([1.0, np.nan, 3.0, 4.0, np.inf]), [], [], []))
+    assert message == {"nominal": {"altitude": 1.0, "angle_of_attack": 3.0, "pitch_angle": 4.0}, "faults": "none"}
+
+
+def test_a_file_is_not_written_over(case1_bag, written):
+    before = written.read_bytes()
+    with pytest.raises(RecordingError, match="exists already, expected a new file"):
+        write_scene(case1_bag, written)
+    assert written.read_bytes() == before
+    assert scene_path(case1_bag).parent.parent == case1_bag.folder
+
+
+@pytest.mark.viewer
+def test_the_readers_of_foxglove_and_lichtblick_decode_it(case1_bag, written):
+    by_topic = {}
+    for topic, time, message in by_foxglove(written.parent):
+        by_topic.setdefault(topic, []).append((time, message))
+    assert set(by_topic) == {topic for topic in case1_bag.topics if case1_bag.messages(topic)} | ADDED
+    [(_, scene)] = by_topic[SCENE_TOPIC]
+    entities = {entity["id"]: entity for entity in scene["entities"]}
+    frames = {transform.child for transform in transforms(Sample(*[0.0] * 6))}
+    assert {entity["frame_id"] for entity in entities.values()} <= {LEVEL, *frames}
+    assert [text["text"] for text in entities["label"]["texts"]] == ["bending x 40"]
+    for solid in solids():
+        [triangles] = entities[solid.name]["triangles"]
+        points = [[point[axis] for axis in "xyz"] for point in triangles["points"]]
+        np.testing.assert_array_equal(points, solid.triangles.reshape(-1, 3))
+    time, moved = by_topic[TRANSFORMS_TOPIC][-1]
+    state = case1_bag.columns("hsv/state")
+    row = int(np.flatnonzero(state["header.stamp"] == time)[0])
+    [body] = [each for each in moved["transforms"] if each["child_frame_id"] == BODY]
+    assert body["timestamp"] == str(time)
+    assert -2.0 * np.arcsin(body["rotation"]["y"]) == pytest.approx(state["pitch_angle"][row], rel=1e-12)

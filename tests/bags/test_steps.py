@@ -1,0 +1,73 @@
+"""Rows of the same step, and what is said of bags that lack steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from hsv.bags.reader import Bag
+from hsv.bags.recover import RECOVERED
+from hsv.bags.steps import irregularities, joined
+from hsv.bags.writer import BagWriter
+from hsv.base.errors import RecordingError
+
+STATE, FORCES = "/hsv/state", "/hsv/forces"
+KINDS = {STATE: "hsv_msgs/msg/VehicleState", FORCES: "hsv_msgs/msg/VehicleForces"}
+PERIOD = 20_000_000
+LACKS = " lacks 1 of 3 steps, the first at t ="
+
+
+def _bag(kit: SimpleNamespace, path: Path, state: list[int], forces: list[int], **custom: str) -> Bag:
+    writer = BagWriter(path / "bag", [kit.topic(name, kind) for name, kind in KINDS.items()], custom)
+    for topic, steps in ((STATE, state), (FORCES, forces)):
+        for step in steps:
+            time = step * PERIOD
+            writer.write(topic, time, kit.messages.stamped(KINDS[topic], time, step))
+    writer.close()
+    return Bag(path / "bag")
+
+
+def test_a_whole_bag_is_joined_as_it_is(kit: SimpleNamespace, tmp_path: Path) -> None:
+    bag = _bag(kit, tmp_path, list(range(5)), list(range(5)))
+    rows = joined(bag, (STATE, FORCES))
+    assert rows[STATE] is bag.columns(STATE) and rows[FORCES] is bag.columns(FORCES)
+    assert irregularities(bag) == []
+
+
+@pytest.mark.parametrize(
+    ("state", "forces", "common", "said"),
+    [
+        ([0, 1, 2, 3, 4], [0, 1, 3, 4], [0, 1, 3, 4], [f"{FORCES} lacks 1 of 5 steps, the first at t = 0.04 s"]),
+        ([0, 1, 2, 3, 4], [0, 1, 2], [0, 1, 2], [f"{FORCES} lacks 2 of 5 steps, the first at t = 0.06 s"]),
+        ([0, 1, 2, 3], [0, 2, 1, 3], [0, 1, 2, 3], [f"{FORCES} is out of order at t = 0.02 s"]),
+        ([0, 1, 1, 2], [0, 1, 2], [0, 1, 2], [f"{STATE} is out of order at t = 0.02 s"]),
+        ([0, 1], [1, 2], [1], [f"{STATE}{LACKS} 0.04 s", f"{FORCES}{LACKS} 0.00 s"]),
+    ],
+    ids=["hole", "end", "swapped", "twice", "both"],
+)
+def test_rows_are_joined_by_their_steps(
+    kit: SimpleNamespace, tmp_path: Path, state: list[int], forces: list[int], common: list[int], said: list[str]
+) -> None:
+    bag = _bag(kit, tmp_path, state, forces)
+    rows = joined(bag, (STATE, FORCES))
+    for topic in KINDS:
+        assert rows[topic]["step"].tolist() == common
+        assert rows[topic]["header.stamp"].tolist() == [step * PERIOD for step in common]
+    steps = bag.columns(FORCES)["step"].tolist()
+    drag = [bag.columns(FORCES)["drag"][steps.index(step)] for step in common]
+    np.testing.assert_array_equal(rows[FORCES]["drag"], drag)
+    assert irregularities(bag) == said
+
+
+def test_the_end_of_a_bag_that_is_cut_off_may_be_ragged(kit: SimpleNamespace, tmp_path: Path) -> None:
+    assert irregularities(_bag(kit, tmp_path, [0, 1, 2, 3], [0, 1, 2], **RECOVERED)) == []
+    holes = _bag(kit, tmp_path / "more", [0, 1, 2, 3], [0, 2], **RECOVERED)
+    assert irregularities(holes) == [f"{FORCES} lacks 1 of 3 steps, the first at t = 0.02 s"]
+
+
+def test_no_common_step_is_refused(kit: SimpleNamespace, tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="holds no complete step"):
+        joined(_bag(kit, tmp_path, [0], [1]), (STATE, FORCES))

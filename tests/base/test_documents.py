@@ -1,0 +1,108 @@
+"""Files and texts that are not what they should be: an error of one line, in a bounded time."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from hsv.base.documents import MOST_BYTES, MOST_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
+from hsv.base.errors import DocumentError
+
+
+def test_a_text_is_read_whole(tmp_path):
+    path = tmp_path / "text"
+    path.write_bytes("Ünits\r\nμ\n".encode())
+    assert read_text(path) == "Ünits\nμ\n"
+
+
+def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", Path("/dev/zero")):
+        with pytest.raises(DocumentError, match=r"^cannot be read \(not a regular file\)$"):
+            read_bytes(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "why"),
+    [
+        ("absent", None, "No such file or directory"),
+        (".", None, "Is a directory"),
+        ("\0", None, "a zero byte in its name"),
+        ("latin", b"\xe4", "not text"),
+        ("large", b"x" * (MOST_BYTES + 1), f"more than {MOST_BYTES} bytes"),
+    ],
+)
+def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
+    if content:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(DocumentError) as caught:
+        read_text(tmp_path / name)
+    assert str(caught.value) == f"cannot be read ({why})"
+
+
+@pytest.mark.parametrize(
+    ("parse", "opening", "closing"),
+    [
+        (parse_toml, "a = " + "[" * 1200, "]" * 1200),
+        (parse_toml, "a = " + "{b = " * 1200, "1" + "}" * 1200),
+        (parse_toml, "a." * 100_000, "b = 1"),
+        (parse_toml, "['a' . " + '"b". ' * 100_000, "b]"),
+        (parse_toml, "a = " + "[" * (MOST_LEVELS + 1), "]" * (MOST_LEVELS + 1)),
+        (parse_json, "[" * 100_000, "]" * 100_000),
+        (parse_json, '{"a": ' * 200, "1" + "}" * 200),
+        (parse_yaml, "[" * 100_000, "]" * 100_000),
+        (parse_yaml, "{a: " * 100_000, "1" + "}" * 100_000),
+        (parse_yaml, "- " * 1000, "1"),
+    ],
+)
+def test_deep_nesting_is_refused(parse, opening, closing):
+    with pytest.raises(DocumentError, match=f"nested more than {MOST_LEVELS} levels deep"):
+        parse(opening + closing)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["a: &a [*a]", "&a {b: *a}", "a: &a {b: [1, {c: *a}]}", "&a [&b {c: *b}]"],
+    ids=["list", "root", "deep", "two"],
+)
+def test_an_alias_inside_of_what_it_is_for_is_refused(text):
+    with pytest.raises(DocumentError, match=r"the alias '[ab]' stands inside of what it is for at line 1, column \d+$"):
+        parse_yaml(text)
+
+
+def test_aliases_that_multiply_are_refused_and_others_taken():
+    bomb = "x0: &x0 [1]\n" + "".join(f"x{i}: &x{i} [{', '.join([f'*x{i - 1}'] * 9)}]\n" for i in range(1, 30))
+    with pytest.raises(DocumentError, match="more than 1000000 values"):
+        parse_yaml(bomb)
+    assert parse_yaml("a: &a {b: 1}\nc: *a\nd: {<<: *a, e: 2}") == {"a": {"b": 1}, "c": {"b": 1}, "d": {"b": 1, "e": 2}}
+
+
+@pytest.mark.parametrize(
+    ("parse", "text", "why"),
+    [
+        (parse_yaml, "period: 0.02\nperiod: 0.03", "the key 'period' occurs twice at line 2, column 1"),
+        (parse_yaml, "{a: {b: 1, c: 2, b: 3}}", "the key 'b' occurs twice"),
+        (parse_json, '[{"a": 1, "b": 2, "a": 1}]', "the key 'a' occurs twice"),
+        (parse_toml, "a = 1\na = 2", "Cannot overwrite a value"),
+        (parse_yaml, "a: 2026-02-30", "day is out of range for month"),
+        (parse_yaml, "a: !!python/object/apply:os.system [ls]", "could not determine a constructor"),
+        (parse_toml, f"a = {'9' * 5000}", "Exceeds the limit"),
+        (parse_json, "9" * 5000, "Exceeds the limit"),
+        (parse_toml, f"a = 0x{'f' * 5000}", "a whole number of more than 4000 digits"),
+        (parse_yaml, f"a: [-0x{'f' * 5000}]", "a whole number of more than 4000 digits"),
+        (parse_json, "[1, 2", "Expecting"),
+        (parse_json, b"\xff", "can't decode"),
+        (parse_toml, " " * (MOST_BYTES + 1), f"more than {MOST_BYTES} bytes"),
+    ],
+)
+def test_a_text_that_is_none_is_one_line_of_why(parse, text, why):
+    with pytest.raises(DocumentError) as caught:
+        parse(text)
+    assert why in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_numbers_with_many_points_on_a_line_are_no_nested_key():
+    assert parse_toml(f"a = [{', '.join(['1.5'] * 500)}]") == {"a": [1.5] * 500}
+    assert parse_toml(f"a = '{'A sentence of words. ' * 500}'") == {"a": "A sentence of words. " * 500}

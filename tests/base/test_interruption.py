@@ -1,0 +1,105 @@
+"""An interruption is not lost, and leaves nothing half done."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from hsv.bags.description import TUBE_MPC
+from hsv.base.interruption import take_interrupts, uninterrupted
+from hsv.graph.launcher import Launcher
+
+NUMBERS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
+
+SWALLOWED = {
+    "finaliser": """
+class Closed:
+    def __del__(self): signal.raise_signal(signal.SIGINT)
+Closed()
+""",
+    "callback of a library": """
+ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
+""",
+}
+"""Programs that are interrupted where Python only reports an exception, and goes on."""
+
+
+@pytest.mark.parametrize("program", SWALLOWED.values(), ids=SWALLOWED)
+def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
+    begin = "import ctypes, signal\nfrom hsv.base.interruption import take_interrupts\ntake_interrupts()"
+    # Lost for good, it would be waited for in vain: ten seconds of processor time end that.
+    end = "signal.setitimer(signal.ITIMER_PROF, 10.0)\nwhile True: pass"
+    ran = subprocess.run([sys.executable, "-c", f"{begin}{program}{end}"], capture_output=True, text=True)
+    assert ran.returncode == -signal.SIGINT, ran.stderr
+    assert ran.stderr.splitlines()[-1] == "KeyboardInterrupt" and "ignored" not in ran.stderr
+
+
+@pytest.mark.parametrize("code", [0, 2])
+@pytest.mark.parametrize("number", ["SIGINT", "SIGALRM"])
+def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code, number) -> None:
+    # SIGALRM: an interruption that was to come later.
+    program = f"""
+import os, signal, sys
+from hsv.base.interruption import take_interrupts
+take_interrupts()
+class Last:
+    def __del__(self, kill=os.kill, process=os.getpid(), number=signal.{number}): kill(process, number)
+last = Last()
+sys.exit({code})
+"""
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (ran.returncode, ran.stderr) == (code, "")
+
+
+@pytest.fixture
+def interrupted_as_a_command() -> Iterator[None]:
+    """Take Ctrl-C as the commands do."""
+    hook, handlers = sys.unraisablehook, {number: signal.getsignal(number) for number in NUMBERS}
+    take_interrupts()
+    yield
+    sys.unraisablehook = hook
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+
+
+@pytest.mark.usefixtures("interrupted_as_a_command")
+def test_what_is_begun_is_finished():
+    begun, finished = [], []
+
+    @uninterrupted
+    def whole() -> None:
+        begun.append(1)
+        signal.raise_signal(signal.SIGINT)
+        finished.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        whole()
+        time.sleep(10.0)
+    assert begun == finished == [1]
+
+
+@pytest.mark.usefixtures("interrupted_as_a_command")
+def test_a_node_is_ended_that_has_just_been_started(monkeypatch, tmp_path):
+    started = []
+
+    class Popen(subprocess.Popen):
+        def __init__(self, *arguments, **named):
+            super().__init__(*arguments, **named)
+            started.append(self)
+            signal.raise_signal(signal.SIGINT)
+
+    program = tmp_path / "node"
+    program.write_text("#!/bin/sh\nexec sleep 60\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(10**9 + os.getpid()))
+    monkeypatch.setattr("hsv.graph.launcher.executable", lambda node: program)
+    monkeypatch.setattr(subprocess, "Popen", Popen)
+    with pytest.raises(KeyboardInterrupt), Launcher([TUBE_MPC], [], lambda step: None, lambda node, text: None):
+        time.sleep(10.0)
+    assert [process.poll() for process in started] == [-signal.SIGINT]

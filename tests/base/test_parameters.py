@@ -1,0 +1,104 @@
+import math
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import ParameterError
+from hsv.base.parameters import Parameter, check_all
+from hsv.control.controllers import CONTROLLER_PARAMETERS
+from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
+from hsv.control.notch_filter import NOTCH_PARAMETERS
+from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS
+from hsv.model.faults.injector import FAULT_PARAMETERS
+from hsv.model.plant import PLANT_PARAMETERS
+
+TABLES = (
+    PLANT_PARAMETERS,
+    NOTCH_PARAMETERS,
+    NOMINAL_PARAMETERS,
+    CONTROLLER_PARAMETERS,
+    ROBUST_MPC_PARAMETERS,
+    FAULT_PARAMETERS,
+    DESIGN_PARAMETERS,
+)
+PERIOD = Parameter("period", 0.02, "control period", "s", 1e-4, 1.0)
+ARRAY = Parameter("gains", [1.0], "gains", minimum=0.0)
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value"),
+    [
+        (PERIOD, 0.01),
+        (PERIOD, np.float64(0.01)),
+        (Parameter("n", 2, "count"), 5),
+        (Parameter("on", True, "switch"), False),
+        (Parameter("word", "a", "word", choices=("a", "b")), "b"),
+        (ARRAY, [0.0, 2.5]),
+        (ARRAY, []),
+        (Parameter("names", ["none"], "names"), ["x", "y"]),
+    ],
+)
+def test_admissible_values_pass_unchanged(parameter, value):
+    assert parameter.check(value) == value
+
+
+def test_numpy_arrays_are_arrays():
+    assert ARRAY.check(np.array([1.0, 2.0])) == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "message"),
+    [
+        (PERIOD, 1, "parameter period = 1: expected double from 0.0001 to 1 s"),
+        (PERIOD, True, "parameter period = True: expected double"),
+        (PERIOD, "0.02", "parameter period = '0.02': expected double"),
+        (PERIOD, math.nan, "parameter period = nan: expected double"),
+        (PERIOD, math.inf, "parameter period = inf: expected double"),
+        (PERIOD, 2.0, "parameter period = 2.0: expected double from 0.0001 to 1 s"),
+        (Parameter("x", 1.0, "x", "m", 0.0), -1.0, "parameter x = -1.0: expected double of at least 0 m"),
+        (Parameter("x", 1.0, "x", maximum=2.0), 3.0, "parameter x = 3.0: expected double of at most 2"),
+        (Parameter("n", 2, "count"), 2.0, "parameter n = 2.0: expected integer"),
+        (Parameter("n", 2, "count"), True, "parameter n = True: expected integer"),
+        (Parameter("on", True, "switch"), 1, "parameter on = 1: expected bool"),
+        (Parameter("w", "a", "word", choices=("a", "b")), "c", "parameter w = 'c': expected one of a, b"),
+        (ARRAY, 1.0, "parameter gains = 1.0: expected double array of at least 0"),
+        (ARRAY, "1.0", "parameter gains = '1.0': expected double array"),
+        (ARRAY, [1.0, 2], "parameter gains[1] = 2: expected double array"),
+        (ARRAY, [1.0, math.nan], "parameter gains[1] = nan: expected double array"),
+        (ARRAY, [-1.0], "parameter gains[0] = -1.0: expected double array of at least 0"),
+        (Parameter("names", ["none"], "names"), [1.0], "parameter names[0] = 1.0: expected string array"),
+        (ARRAY, {"a": 1}, "parameter gains = {'a': 1}: expected double array"),
+        (ARRAY, [10**400], "parameter gains[0] = 1000"),
+        (PERIOD, 10**400, "parameter period = 1000"),
+        (Parameter("n", 2, "count"), 10**400, "parameter n = 1000"),
+        (ARRAY, None, "parameter gains = None: expected double array"),
+    ],
+)
+def test_others_are_refused_by_name_value_and_expectation(parameter, value, message):
+    with pytest.raises(ParameterError) as caught:
+        parameter.check(value)
+    assert str(caught.value).startswith(message)
+
+
+def test_long_values_are_cut_in_messages():
+    with pytest.raises(ParameterError) as caught:
+        PERIOD.check([0.0] * 1000)
+    assert len(str(caught.value)) < 150
+
+
+def test_a_table_fills_in_defaults_and_ignores_foreign_names():
+    assert check_all((PERIOD, ARRAY), {"period": 0.5, "foreign": "x"}) == {"period": 0.5, "gains": [1.0]}
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table[0].name)
+def test_every_default_is_admissible_described_and_of_one_name(table):
+    check_all(table, {})
+    assert all(parameter.description for parameter in table)
+    assert len({parameter.name for parameter in table}) == len(table)
+
+
+def test_parameters_shared_by_several_tables_are_the_same():
+    seen: dict[str, Parameter] = {}
+    for parameter in (p for table in TABLES for p in table):
+        assert seen.setdefault(parameter.name, parameter) == parameter

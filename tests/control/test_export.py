@@ -1,0 +1,230 @@
+import ctypes
+import dataclasses
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import exported_blocks
+import numpy as np
+import pytest
+from exported_blocks import (
+    FLAGS,
+    ExportedNominalTrajectory,
+    ExportedNotchFilter,
+    ExportedTubeLaw,
+    compile_library,
+    with_exported_blocks,
+    write_source,
+)
+from flights import components, step_by_step
+from numpy.testing import assert_array_equal
+
+import hsv.core
+from hsv.base.errors import DesignError
+from hsv.control.c_block import load_block
+from hsv.control.controller import ControllerInput
+from hsv.control.design_file import find_design, read_design
+from hsv.control.export import CORE_HEADERS, NUMBERS, controller_files, design_header, step_bounds
+from hsv.control.nominal_trajectory import NominalTrajectory
+from hsv.control.notch_filter import NotchFilter
+from hsv.control.reference_trajectory import ReferenceTrajectory
+from hsv.control.tube_law import TubeLaw
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.fingerprint import as_published, fingerprint
+from hsv.flight.scenario import load_scenario
+from hsv.model.vehicle import load_vehicle
+
+DESIGNS = {name: read_design(find_design(name)) for name in ("baseline", "adjustable", "smooth")}
+BLOCKS = ("notch_filter", "nominal_trajectory", "tube_law")
+REFERENCE = ReferenceTrajectory([0.0, 20.0], [26060.4, 26243.28], [2407.92, 2484.12], 0.02, load_vehicle().decoupled)
+
+needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+each_design = pytest.mark.parametrize("design", DESIGNS.values(), ids=DESIGNS)
+each_compiler = pytest.mark.parametrize(
+    "compiler",
+    [pytest.param(c, marks=pytest.mark.skipif(not shutil.which(c), reason=f"no {c}")) for c in ("gcc", "clang")],
+)
+
+
+@pytest.fixture(scope="module", params=DESIGNS.values(), ids=DESIGNS)
+def built(request, tmp_path_factory):
+    return request.param, compile_library(request.param, tmp_path_factory.mktemp("library"))
+
+
+@needs_compiler
+@pytest.mark.parametrize("scenario", ["case1", "case2", "case1_integral_heavy", "case1_smooth"])
+def test_flown_in_place_of_the_blocks_it_has_the_published_fingerprint(scenario, tmp_path):
+    flown = step_by_step(with_exported_blocks(components(scenario), tmp_path))
+    digested = ("state", "filtered_pitch_rate", "deviation", "nominal_input", "command", "actuator")
+    loaded = load_scenario(scenario)
+    digest = DESIGNS[loaded.design].to_parameters()["design.hash"]
+    assert as_published(fingerprint(np.column_stack([flown[name] for name in digested])), loaded, digest) is True
+
+
+@each_design
+@pytest.mark.parametrize("level", ["-O0", "-O2", "-O3"])
+@each_compiler
+def test_it_is_c99_that_calls_nothing_and_keeps_nothing(design, level, compiler, tmp_path):
+    code = tmp_path / "controller.o"
+    stack = ("-Wstack-usage=4096",) if compiler == "gcc" and level != "-O0" else ()
+    # Ubuntu's compiler adds the stack protector's call unless it is told not to.
+    plain = ("-fno-pie", "-fno-stack-protector")
+    command = [compiler, *FLAGS, *stack, level, *plain, "-c", "-o", str(code), str(write_source(design, tmp_path))]
+    subprocess.run(command, check=True)
+    listed = subprocess.run(["nm", "-P", str(code)], check=True, capture_output=True, text=True).stdout
+    symbols = [tuple(line.split()[:2]) for line in listed.splitlines()]
+    # No heap and no libm. Compilers may call these two for any code, on machines without a C library, too.
+    assert {name for name, kind in symbols if kind == "U"} <= {"memcpy", "memset"}
+    # Functions and constants: nothing is kept from step to step but in the state.
+    assert {kind for _, kind in symbols} <= {"T", "t", "R", "r", "U"}
+    assert {name for name, kind in symbols if kind in "TR"} == {*BLOCKS}
+
+
+@needs_compiler
+def test_the_blocks_describe_themselves(built):
+    design, library = built
+    blocks = {name: load_block(library, name) for name in BLOCKS}
+    states = 2 * len(design.notch)
+    sizes = {name: [s.size for s in (*block.inputs, *block.outputs)] for name, block in blocks.items()}
+    assert sizes == {
+        "notch_filter": [1, 1, states],
+        "nominal_trajectory": [9, 9, 9, 9, 2, 1, 1],
+        "tube_law": [9, 1, 9, 2, 9, 2, *([states] if design.filtered else []), 2],
+    }
+    assert {name: block.state_size for name, block in blocks.items()} == {
+        name: bound.state_size for name, bound in step_bounds(design).items()
+    }
+    tau, rate = blocks["tube_law"].parameters
+    assert_array_equal(tau.default, design.tau)
+    assert (tau.minimum, tau.maximum) == (design.tau_minimum.min(), 1.0)
+    assert (rate.default, rate.unit) == (0.0, "1/s")
+
+
+def states(rng, count):
+    """Measured states about the reference: inside the family and the envelope, far outside, and no numbers."""
+    scale = np.array([100.0, 20.0, 0.01, 0.01, 0.05, 0.2, 2.0, 0.2, 2.0])
+    rows = REFERENCE.data.state[0] + rng.normal(size=(count, 9)) * scale * 10.0 ** rng.uniform(-4.0, 1.5, (count, 1))
+    rows[rng.random(rows.shape) < 0.01] = np.nan
+    return rows
+
+
+@needs_compiler
+def test_the_filter_filters_the_same_bits(built):
+    design, library = built
+    ours, exported = NotchFilter(design.notch, design.period), ExportedNotchFilter(library)
+    for rate in np.random.default_rng(1).normal(size=200):
+        a, b = ours.step(rate), exported.step(rate)
+        assert (a.filtered_pitch_rate, a.filter_state.tobytes()) == (b.filtered_pitch_rate, b.filter_state.tobytes())
+
+
+@needs_compiler
+def test_the_nominal_trajectory_is_the_same_in_every_bit(built):
+    design, library = built
+    ours, exported = NominalTrajectory(design, REFERENCE), ExportedNominalTrajectory(library, REFERENCE)
+    seen = set()
+    for measured in np.array_split(states(np.random.default_rng(2), 600), 150):
+        ours.reset()
+        exported.reset()
+        for x in measured:
+            a, b = ours.step(x), exported.step(x)
+            assert_array_equal(a.deviation, b.deviation)
+            assert_array_equal(a.input, b.input)
+            assert (a.gain_index, int(a.status)) == (b.gain_index, b.status)
+            seen |= {("gain", a.gain_index), ("status", int(a.status))}
+    assert seen == {("gain", index) for index in range(len(design.nominal_gains))} | {
+        ("status", status) for status in range(4)
+    }
+
+
+@needs_compiler
+@pytest.mark.parametrize("rate", [0.0, 0.1])
+def test_the_law_answers_the_same_bits(built, rate):
+    design, library = built
+    ours = TubeLaw(design, integral_rate=rate)
+    law = ExportedTubeLaw(library, np.array([*design.tau, rate]), design.input_minimum, design.input_maximum)
+    rng = np.random.default_rng(3)
+    limited = 0
+    for measured in np.array_split(states(rng, 600), 150):
+        ours.reset()
+        law.reset()
+        for k, x in enumerate(measured):
+            s, u_r, u_n = (scale * rng.normal(size=2) for scale in (1e-3, 0.2, 0.05))
+            x_r, x_n = REFERENCE.data.state[0], rng.normal(size=9) * 1e-3
+            inputs = ControllerInput(k, x, 0.9 * x[4], x_r, u_r, x_n, u_n, s)
+            a, b = ours.step(inputs), law.step(inputs)
+            assert_array_equal(a.input, b.input)
+            finite = np.isfinite(a.u_unsaturated)
+            assert_array_equal(a.u_unsaturated[finite], b.u_unsaturated[finite])
+            limited += bool(np.any(a.saturated))
+    assert 100 < limited < 600
+
+
+def test_its_headers_are_those_that_the_core_is_built_from():
+    written = controller_files(DESIGNS["baseline"])
+    core = Path(hsv.core.__file__).parent
+    for name in CORE_HEADERS:
+        assert written[name] == (core / name).read_text(encoding="utf-8")
+    included = set(re.findall(r'^#include "(.*)"$', "".join(written.values()), re.MULTILINE))
+    assert {*written} == included | {"controller.c"}
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
+@each_design
+def test_no_step_takes_more_than_is_stated(design, tmp_path):
+    source = write_source(design, tmp_path).with_name(NUMBERS)
+    program = Path(exported_blocks.__file__).with_name("counted_steps.cpp")
+    counter = tmp_path / "counted_steps"
+    subprocess.run(["g++", "-std=c++20", "-w", f"-I{tmp_path}", "-o", str(counter), str(program)], check=True)
+    counted = subprocess.run([str(counter)], check=True, capture_output=True, text=True).stdout
+    rows = {name: tuple(map(int, numbers)) for name, *numbers in map(str.split, counted.splitlines())}
+    bounds = step_bounds(design)
+    assert rows == {name: dataclasses.astuple(bound)[:3] for name, bound in bounds.items()}
+    stated = re.findall(r"^ \*   (\w+) +(\d+) +(\d+) +(\d+) +(\d+)$", source.read_text(encoding="utf-8"), re.MULTILINE)
+    assert {name: tuple(map(int, row)) for name, *row in stated} == {
+        name: dataclasses.astuple(bound) for name, bound in bounds.items()
+    }
+
+
+@each_design
+def test_lines_are_no_longer_than_a_page_is_wide(design):
+    for name, text in controller_files(design).items():
+        assert not [line for line in text.splitlines() if len(line) > 120 and name != "hsv_block.h"]
+
+
+def test_a_name_does_not_end_the_comment_that_it_stands_in():
+    text = design_header(dataclasses.replace(DESIGNS["baseline"], name="a */ int b;\n/*", coupling='"*/'))
+    assert text.splitlines()[0].endswith('of the design "a __ int b____".')
+    assert "*/ int" not in text
+    assert '"___"' in text
+
+
+def test_a_design_without_a_tube_is_refused():
+    with pytest.raises(DesignError, match=r"tube\.shape: empty, expected a design with a tube"):
+        controller_files(dataclasses.replace(DESIGNS["baseline"], tube=None))
+
+
+@needs_compiler
+def test_the_period_on_the_page_commands_what_the_loop_commands(tmp_path):
+    page = Path(__file__).parents[2] / "docs" / "export.md"
+    [period] = re.findall(r"^```c\n(.*?)^```", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    (tmp_path / "period.c").write_text(period, encoding="utf-8")
+    sources = [str(write_source(DESIGNS["baseline"], tmp_path)), str(tmp_path / "period.c")]
+    subprocess.run(["cc", *FLAGS, "-shared", "-fPIC", "-o", str(tmp_path / "period.so"), *sources], check=True)
+    control = ctypes.CDLL(str(tmp_path / "period.so")).control
+    flight = fly(components(duration=20.0))
+    wanted = np.empty_like(flight.history.u_unsaturated)
+    columns = (flight.history.state, flight.reference, flight.reference_input, flight.defect, wanted)
+    for k in range(len(wanted)):
+        control(ctypes.c_int64(k), *(ctypes.c_void_p(column[k : k + 1].ctypes.data) for column in columns))
+    assert_array_equal(wanted, flight.history.u_unsaturated)
+
+
+@each_compiler
+@pytest.mark.parametrize("scenario", ["case1", "case2"])
+def test_a_scenario_flies_the_law_as_any_controller_in_c(scenario, compiler, tmp_path):
+    compile_library(DESIGNS[load_scenario(scenario).design], tmp_path, compiler)
+    own = tmp_path / "own.toml"
+    own.write_text(f'extends = "{scenario}"\ncontroller = "controller.so:tube_law"\n', encoding="utf-8")
+    assert fly(assemble_flight(load_scenario(str(own)))).fingerprint == fly(components(scenario)).fingerprint

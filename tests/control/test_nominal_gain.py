@@ -1,0 +1,155 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.base.errors import DesignError
+from hsv.control.design_file import find_design, read_design
+from hsv.control.nominal_gain import nested_gains
+from hsv.control.nominal_problem import NominalProblem, certified_cost, decrease_between
+from hsv.design.baseline import initial_deviation
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
+
+
+@pytest.fixture(scope="module")
+def problem(design, inputs):
+    A, B = design.polytope.A[:, :5, :5], design.polytope.B[:, :5]
+    n = inputs.nominal
+    scales = n.state_scale.array(), n.input_scale.array(), n.input_bound.array()
+    return NominalProblem(A, B, design.period, *scales)
+
+
+@pytest.fixture(scope="module")
+def state(inputs):
+    return initial_deviation(inputs)
+
+
+def simulate(design, problem, inputs, state, gains):
+    """Fly x_n over 200 s, scheduled by the nominal point itself; return states (10001, 5), inputs and the cost (s)."""
+    target = inputs.nominal.target
+    reference = trim(load_vehicle().decoupled, target.altitude, target.velocity).state[:5]
+    x, states, applied, cost = state.copy(), [state], [], 0.0
+    for _ in range(10_000):
+        inside = [i for i in range(gains) if x @ design.nominal_ellipsoids[i] @ x <= 1.0]
+        u = design.nominal_gains[inside[-1] if inside else 0, :, :5] @ x
+        cost += problem.period * float(np.sum((x / problem.state_scale) ** 2) + np.sum((u / problem.input_scale) ** 2))
+        A, B = design.polytope.at(*(x + reference)[:2])
+        x = A[:5, :5] @ x + B[:5] @ u
+        states.append(x)
+        applied.append(u)
+    return np.array(states), np.array(applied), cost
+
+
+def settling(states, axis):
+    return np.nonzero(np.abs(states[:, axis]) > 0.02 * abs(states[0, axis]))[0][-1] * 0.02
+
+
+def test_every_ellipsoid_is_invariant_nested_and_within_the_input_bounds(design, problem):
+    Q = np.linalg.inv(design.nominal_ellipsoids)
+    for q, P, K in zip(Q, design.nominal_ellipsoids, design.nominal_gains[:, :, :5], strict=True):
+        factor = np.linalg.cholesky(q)
+        for a, b in zip(problem.A, problem.B, strict=True):
+            assert np.linalg.norm(np.linalg.solve(factor, (a + b @ K) @ factor), 2) < 1.0
+        assert np.all(np.sqrt(np.einsum("ij,jk,ik->i", K, np.linalg.inv(P), K)) <= problem.input_bound)
+    for outer, inner in pairwise(Q):
+        assert np.linalg.eigvals(np.linalg.solve(outer, inner)).real.max() <= 1.0
+
+
+def test_ellipsoids_hold_their_states(design, inputs, state):
+    for scale, P in zip(inputs.nominal.scales, design.nominal_ellipsoids, strict=True):
+        assert 0.99 < scale**2 * state @ P @ state <= 1.0
+
+
+def test_gains_are_those_of_the_reported_matrices(design, result):
+    for K, row in zip(design.nominal_gains, result.report["nominal"], strict=True):
+        assert_allclose(np.array(row["Y"]) @ np.linalg.inv(row["Q"]), K[:, :5], rtol=1e-7)
+        assert np.all(K[:, 5:] == 0.0)
+
+
+def test_certified_cost_is_a_bound_close_to_the_solver_s(design, problem, inputs, state, result):
+    first = result.report["nominal"][0]
+    # Control study, section 6: 1060 s certified for the five rigid states.
+    assert_allclose(first["certified_gamma"], 1060.0, rtol=0.02)
+    for row in result.report["nominal"]:
+        assert_allclose(row["certified_gamma"], row["gamma"], rtol=5e-3)
+        assert min(row["lmi_smallest_eigenvalues"]) >= 0.0
+        assert row["state_residual"] >= 0.0 and min(row["input_residuals"]) >= 0.0
+    _, _, cost = simulate(design, problem, inputs, state, gains=1)
+    assert_allclose(cost, 977.0, rtol=0.02)  # control study, section 6
+    assert cost < first["certified_gamma"]
+
+
+def test_certified_cost_is_tight(design, problem, result):
+    Q, K = np.array(result.report["nominal"][0]["Q"]), design.nominal_gains[0, :, :5]
+    gamma, _ = certified_cost(problem, K, Q, "K")
+    P = gamma * np.linalg.inv(Q)
+    weight = np.diag(1.0 / problem.state_scale**2) + K.T @ np.diag(1.0 / problem.input_scale**2) @ K
+    closed = problem.A + problem.B @ K
+    scale = np.linalg.inv(np.linalg.cholesky(weight))
+
+    def margin(bound):
+        drop = bound * (P - np.swapaxes(closed, 1, 2) @ P @ closed) - problem.period * weight
+        return np.linalg.eigvalsh(scale @ drop @ scale.T).min() / problem.period
+
+    assert margin(1.0) > -1e-6
+    assert margin(1.0 - 1e-3) < -1e-4
+
+
+def test_family_settles_faster_than_one_gain_within_the_bounds(design, problem, inputs, state):
+    states, applied, cost = simulate(design, problem, inputs, state, gains=len(design.nominal_gains))
+    single, _, _ = simulate(design, problem, inputs, state, gains=1)
+    assert_allclose(cost, 820.0, rtol=0.02)  # control study, section 6
+    assert settling(states, 1) < 75.0 < 150.0 < settling(single, 1)
+    assert np.all(np.abs(applied) <= problem.input_bound)
+
+
+def test_unstable_gain_is_refused(problem, result):
+    with pytest.raises(DesignError, match="decrease at vertex"):
+        certified_cost(problem, np.zeros((2, 5)), np.array(result.report["nominal"][0]["Q"]), "K")
+
+
+@pytest.mark.parametrize("scales", [[], [1.0, 1.0], [0.5, 0.6], [1.0, 0.0]])
+def test_scales_must_decrease(problem, state, scales):
+    with pytest.raises(DesignError, match=r"nominal\.scales"):
+        nested_gains(problem, state, scales)
+
+
+def test_unreachable_bound_is_refused_by_name(problem, state):
+    tight = NominalProblem(
+        problem.A, problem.B, problem.period, problem.state_scale, problem.input_scale, 1e-3 * problem.input_bound
+    )
+    with pytest.raises(DesignError, match="nominal gain 1 of 1"):
+        nested_gains(tight, state, [1.0])
+
+
+def test_gains_between_two_of_an_interpolated_family_shrink_the_outer_ellipsoid_and_keep_the_input_bounds(problem):
+    family = read_design(find_design("smooth"))
+    rng = np.random.default_rng(6)
+    for i, outside in enumerate(np.linalg.inv(family.nominal_ellipsoids[:-1])):
+        inner, outer = family.nominal_gains[[i + 1, i], :, :5]
+        factor = np.linalg.cholesky(outside)
+        for share in rng.uniform(size=4):
+            K = share * outer + (1.0 - share) * inner
+            P = share * family.nominal_ellipsoids[i] + (1.0 - share) * family.nominal_ellipsoids[i + 1]
+            for A, B in zip(problem.A, problem.B, strict=True):
+                assert np.linalg.norm(np.linalg.solve(factor, (A + B @ K) @ factor), 2) < 1.0
+            assert np.all(np.sqrt(np.einsum("ij,jk,ik->i", K, np.linalg.inv(P), K)) <= problem.input_bound)
+
+
+def test_the_gains_of_a_switched_family_do_not_shrink_the_ellipsoid_before_them(design, problem):
+    Q = np.linalg.inv(design.nominal_ellipsoids)
+    between = [decrease_between(problem, K[:, :5], q).min() for K, q in zip(design.nominal_gains[1:], Q, strict=False)]
+    assert np.all(np.array(between[:4]) < 0.0)
+
+
+def test_an_interpolated_family_is_certified_between_its_ellipsoids(problem, state):
+    outer, inner = nested_gains(problem, state, [1.0, 0.6], interpolated=True)
+    assert outer.between is None and "between_smallest_eigenvalues" not in outer.report()
+    assert inner.report()["between_smallest_eigenvalues"] == inner.between.tolist()
+    assert_allclose(inner.between, decrease_between(problem, inner.K, outer.Q), rtol=1e-9)
+    assert inner.between.min() > 0.0 and inner.decrease.min() >= 0.0 and inner.nesting >= 0.0
+    switched = nested_gains(problem, state, [1.0, 0.6])[1]
+    # One more inequality cannot make the certified cost less: here it takes a third more.
+    assert switched.gamma < inner.gamma < 1.5 * switched.gamma

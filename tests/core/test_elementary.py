@@ -1,0 +1,144 @@
+"""Every function against mpmath: in units of the last place over its whole range, and what it does outside."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+
+from hsv.core.elementary import arcsine, arctangent2, exponential, logarithm, of_each, sine_cosine, tangent
+
+ANGLE_RANGE, EXPONENT_RANGE, RATIO_RANGE = 1e5, 700.0, 1e140
+
+rng = np.random.default_rng(20070508)
+COUNT = 1500
+
+
+def sine(x):
+    return sine_cosine(x)[0]
+
+
+def cosine(x):
+    return sine_cosine(x)[1]
+
+
+def both_signs(values):
+    return np.concatenate((values, -values))
+
+
+def magnitudes(low, high, count=COUNT):
+    """Return numbers whose logarithms are evenly distributed."""
+    return 10.0 ** rng.uniform(math.log10(low), math.log10(high), count)
+
+
+def near(points, relative=1e-9):
+    """Return numbers around ``points``, those themselves and their neighbours included."""
+    points = np.asarray(points, float)
+    noise = points * (1.0 + relative * rng.uniform(-1.0, 1.0, len(points)))
+    return np.concatenate((points, noise, np.nextafter(points, -np.inf), np.nextafter(points, np.inf)))
+
+
+ANGLES = np.concatenate(
+    (
+        rng.uniform(-0.8, 0.8, 2 * COUNT),
+        rng.uniform(-10.0, 10.0, COUNT),
+        rng.uniform(-ANGLE_RANGE, ANGLE_RANGE, COUNT),
+        both_signs(magnitudes(1e-300, 1.0, 200)),
+        near(np.arange(1, 60000, 97) * (math.pi / 4)),
+        [0.0, ANGLE_RANGE, -ANGLE_RANGE],
+    )
+)
+SINES = np.concatenate(
+    (
+        rng.uniform(-1.0, 1.0, 2 * COUNT),
+        both_signs(magnitudes(1e-300, 1.0, 200)),
+        both_signs(1.0 - magnitudes(1e-16, 0.1, 200)),
+        [0.0, 0.5, -0.5, 1.0, -1.0, np.nextafter(0.5, 1.0), np.nextafter(1.0, 0.0)],
+    )
+)
+EXPONENTS = np.concatenate(
+    (
+        rng.uniform(-1.0, 1.0, COUNT),
+        rng.uniform(-EXPONENT_RANGE, EXPONENT_RANGE, COUNT),
+        both_signs(magnitudes(1e-300, 1.0, 200)),
+        near(np.arange(1, 1000) * (math.log(2.0) / 2.0)),
+        [0.0, EXPONENT_RANGE, -EXPONENT_RANGE],
+    )
+)
+POSITIVE = np.concatenate(
+    (
+        rng.uniform(0.5, 2.0, COUNT),
+        magnitudes(1e-307, 1e308),
+        1.0 + both_signs(magnitudes(1e-16, 0.3, 400)),
+        near(2.0 ** np.arange(-1000.0, 1000.0, 7.0), 1e-3),
+        [1.0, np.finfo(float).tiny, np.finfo(float).max, math.sqrt(0.5), math.sqrt(2.0)],
+    )
+)
+
+
+def largest_error(function, exact, arguments):
+    """Return the largest error in units of the last place of the exact value, and where it is."""
+    worst = 0.0, None
+    with mpmath.workprec(160):
+        for argument in arguments:
+            given = np.atleast_1d(argument).tolist()
+            value = exact(*map(mpmath.mpf, given))
+            unit = max(math.ulp(float(value)), 5e-324)
+            error = float(abs(mpmath.mpf(float(function(*given))) - value) / unit)
+            worst = max(worst, (error, given), key=lambda pair: pair[0])
+    return worst
+
+
+@pytest.mark.parametrize(
+    ("function", "exact", "arguments"),
+    [
+        (sine, mpmath.sin, ANGLES),
+        (cosine, mpmath.cos, ANGLES),
+        (tangent, mpmath.tan, ANGLES),
+        (arcsine, mpmath.asin, SINES),
+        (exponential, mpmath.exp, EXPONENTS),
+        (logarithm, mpmath.log, POSITIVE),
+    ],
+)
+def test_error_is_at_most_one_unit_in_the_last_place(function, exact, arguments):
+    error, where = largest_error(function, exact, arguments)
+    assert error <= 1.0, where
+
+
+def test_error_of_the_arctangent_is_at_most_one_unit_in_the_last_place():
+    angle = rng.uniform(-math.pi, math.pi, 2 * COUNT)
+    radius = magnitudes(1e-100, 1e100, 2 * COUNT)
+    eighths = near(np.tan(np.pi / 8 * np.array([1, 2, 3])), 1e-12)
+    points = [*zip(radius * np.sin(angle), radius * np.cos(angle), strict=True)]
+    points += [*zip(magnitudes(1e-9, 1e9), both_signs(magnitudes(1e-9, 1e9)), strict=False)]
+    points += [(sign * y, x) for y in eighths for x in (1.0, -1.0) for sign in (1.0, -1.0)]
+    points += [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 0.0), (RATIO_RANGE, -1.0 / RATIO_RANGE)]
+    error, where = largest_error(arctangent2, lambda y, x: mpmath.atan2(y, x) if y or x else mpmath.mpf(0), points)
+    assert error <= 1.0, where
+
+
+@pytest.mark.parametrize("function", [sine, cosine, tangent])
+@pytest.mark.parametrize("argument", [1.1 * ANGLE_RANGE, -1e300, math.inf, -math.inf, math.nan])
+def test_angles_out_of_range_give_no_number(function, argument):
+    assert math.isnan(function(argument))
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments"),
+    [
+        (arcsine, (1.0000000000000002, -2.0, math.inf, math.nan)),
+        (exponential, (701.0, -701.0, math.inf, -math.inf, math.nan)),
+        (logarithm, (0.0, -1.0, 1e-310, math.inf, math.nan)),
+    ],
+)
+def test_what_is_out_of_range_gives_no_number(function, arguments):
+    assert all(math.isnan(function(argument)) for argument in arguments)
+
+
+@pytest.mark.parametrize("point", [(1e141, 1.0), (1.0, 1e-141), (math.inf, 1.0), (1.0, math.nan)])
+def test_points_out_of_range_give_no_angle(point):
+    assert math.isnan(arctangent2(*point))
+
+
+def test_a_function_of_each_number_is_that_of_one():
+    assert of_each(logarithm, POSITIVE[:9]).tolist() == [logarithm(x) for x in POSITIVE[:9]]

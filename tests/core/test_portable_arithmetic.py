@@ -1,0 +1,254 @@
+"""What decides a flight is made of exact operations and of our own elementary functions, in Python and in C."""
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hsv
+from hsv.core import _core
+
+SOURCES = Path(hsv.__file__).parent
+
+HARMLESS = re.compile(r"sqrt|memcpy|memmove|memset|_?Py\w+|__\w+|_ITM_\w+")
+"""Functions of the C library that leave no choice about their result, and what Python, compiler and linker bring."""
+
+ON_THE_PATH = (
+    "core/elementary.py",
+    "core/elimination.py",
+    "base/inheritance.py",
+    "model/signals.py",
+    "base/timing.py",
+    "model/links.py",
+    "core/noise.py",
+    "model/sensors.py",
+    "base/units.py",
+    "model/actuators.py",
+    "model/atmosphere.py",
+    "model/dynamics.py",
+    "model/envelope.py",
+    "model/initial.py",
+    "model/vehicle_parameters.py",
+    "model/plant.py",
+    "model/trim.py",
+    "model/vehicle.py",
+    "model/lpv/polytope.py",
+    "control/tube_factor.py",
+    "control/controller.py",
+    "control/controllers.py",
+    "control/effectiveness.py",
+    "control/effectiveness_parameters.py",
+    "control/estimator.py",
+    "control/estimator_parameters.py",
+    "control/governor.py",
+    "control/nominal_law.py",
+    "control/nominal_trajectory.py",
+    "control/notch_filter.py",
+    "control/reference_trajectory.py",
+    "control/robust_mpc.py",
+    "control/tube_law.py",
+    "control/tube_set.py",
+    "model/faults/injector.py",
+    "model/faults/schedule.py",
+    "model/faults/laws.py",
+    "model/faults/table.py",
+    "flight/assembly.py",
+    "flight/blocks.py",
+    "flight/closed_loop.py",
+    "flight/flight.py",
+    "flight/commands.py",
+    "flight/distribution.py",
+    "flight/fields.py",
+    "flight/governed.py",
+    "flight/history.py",
+    "flight/scenario.py",
+    "flight/side_by_side.py",
+    "flight/tables.py",
+    "flight/values.py",
+)
+"""Files that decide a flight, from the scenario's text to the last step."""
+
+MATH = {"isfinite", "isnan", "inf", "nan", "pi", "ceil", "floor", "isqrt", "radians"}
+"""Of :mod:`math`; radians() is a product with pi / 180."""
+
+EXACT_NUMPY = {
+    *("ndarray", "float64", "int64", "complex128", "uint64", "bool_", "intp", "inf", "nan", "finfo", "pi", "newaxis"),
+    "void",
+    *("array", "asarray", "ascontiguousarray", "empty", "empty_like", "zeros", "zeros_like", "ones", "ones_like"),
+    *("full", "eye", "arange", "broadcast_to", "stack", "concatenate", "column_stack", "reshape", "ravel", "copy"),
+    "split",
+    *(
+        "abs",
+        "sqrt",
+        "floor",
+        "clip",
+        "minimum",
+        "maximum",
+        "max",
+        "min",
+        "argmax",
+        "argmin",
+        "ptp",
+        "round",
+        "diff",
+        "outer",
+    ),
+    "iscomplexobj",
+    *("all", "any", "isfinite", "isnan", "where", "flatnonzero", "searchsorted", "array_equal", "count_nonzero"),
+}
+"""Of numpy: what makes and moves arrays, compares, or computes element by element in one exact operation."""
+
+INEXACT_METHODS = {"dot", "sum", "mean", "prod", "std", "var", "cumsum", "cumprod", "trace", "reduce", "accumulate"}
+"""Of arrays and universal functions: what adds or multiplies in an order of its own."""
+
+INEXACT_NAMES = {"sum", "pow", "fsum"}
+"""Functions of Python; sum() of numbers is compensated from 3.12 on."""
+
+EXEMPT = {
+    "flight/metrics.py": "what is said of a flight, after it",
+    "flight/fingerprint.py": "a digest",
+    "base/documents.py": "reads files",
+    "base/threads.py": "runs flights in threads",
+    "control/design_file.py": "reads files",
+    "control/design_parameters.py": "takes arrays from files as they are",
+    "control/design.py": "eigenvalues decide whether a design is refused, not how it flies",
+    "control/coverage.py": "what is said of a flight; no input depends on it",
+    "control/plan_bounds.py": "read by the QP, which is outside the rule",
+    "model/modes.py": "poles, for people",
+    "control/c_block.py": "describes a controller in C, whose arithmetic is its own",
+    "control/library.py": "the same",
+    "control/library_process.py": "the same",
+}
+"""Files that a flight loads all the same, and why they need not be exact."""
+
+
+def problems(source: str) -> list[str]:
+    """Return what in ``source`` is not exact, as "line: what"."""
+    found: list[tuple[int, str]] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult):
+            found.append((node.lineno, "@"))
+        elif isinstance(node, ast.AugAssign) and isinstance(node.op, ast.Pow):
+            found.append((node.lineno, "**="))
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) and not _whole_power(node):
+            found.append((node.lineno, "**"))
+        elif isinstance(node, ast.Attribute):
+            module = node.value.id if isinstance(node.value, ast.Name) else ""
+            inexact = {
+                "math": node.attr not in MATH,
+                "np": node.attr not in EXACT_NUMPY,
+            }.get(module, node.attr in INEXACT_METHODS)
+            if inexact:
+                found.append((node.lineno, f"{module}.{node.attr}"))
+        elif isinstance(node, ast.Name) and node.id in INEXACT_NAMES:
+            found.append((node.lineno, node.id))
+        elif isinstance(node, ast.Import | ast.ImportFrom):
+            found += [(node.lineno, name) for name in _imported(node) if _inexact_import(name)]
+    return [f"{line}: {what}" for line, what in sorted(found)]
+
+
+def _imported(node: ast.Import | ast.ImportFrom) -> list[str]:
+    if isinstance(node, ast.ImportFrom):
+        return [f"{node.module}.{alias.name}" for alias in node.names]
+    return [f"{alias.name} as {alias.asname}" if alias.asname else alias.name for alias in node.names]
+
+
+def _inexact_import(name: str) -> bool:
+    package, _, inside = name.partition(".")
+    if package in {"scipy", "cmath", "random"} or name.startswith("math as"):
+        return True
+    return bool(inside) and (package == "numpy" or (package == "math" and inside not in MATH | {"factorial"}))
+
+
+def _whole_power(node: ast.BinOp) -> bool:
+    """Tell whether this is a power of a whole number by a whole number or a counter, which is exact."""
+    try:
+        if not float(ast.literal_eval(node.left)).is_integer():
+            return False
+    except ValueError:
+        return False
+    if isinstance(node.right, ast.Name):
+        return not isinstance(ast.literal_eval(node.left), float)
+    try:
+        exponent = ast.literal_eval(node.right)
+    except ValueError:
+        return False
+    return float(exponent).is_integer() and exponent >= 0
+
+
+@pytest.mark.parametrize("file", ON_THE_PATH)
+def test_sources_of_a_flight_use_exact_operations(file):
+    assert problems((SOURCES / file).read_text(encoding="utf-8")) == []
+
+
+def test_every_file_that_a_flight_loads_is_looked_through_or_exempt():
+    program = (
+        "import sys; from hsv.flight.assembly import assemble_flight; from hsv.flight.closed_loop import fly; "
+        "from hsv.flight.scenario import load_scenario; "
+        "[fly(assemble_flight(load_scenario(name).model_copy(update={'duration': 200.0}))) "
+        "for name in ('case2', 'case1_rmpc')]; "
+        "files = [getattr(m, '__file__', '') for n, m in sys.modules.items() if n.startswith('hsv.')]; "
+        "print(*[file for file in files if file.endswith('.py')], sep='\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    loaded = {str(Path(line).resolve().relative_to(SOURCES.resolve())) for line in done.stdout.splitlines()}
+    assert {"flight/closed_loop.py", "model/trim.py"} <= loaded
+    unknown = loaded - set(ON_THE_PATH) - EXEMPT.keys() - {"base/errors.py", "base/parameters.py"}
+    assert not {file for file in unknown if not file.endswith("__init__.py")}
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import scipy.linalg",
+        "import math as m",
+        "x **= 2",
+        "x = 10.0**y",
+        "x = 2.0**-0.5",
+        "x = sum(ys)",
+        "x = pow(a, 0.5)",
+        "x = np.add.reduce(y)",
+        "x = y.cumsum()",
+        "x = np.trace(A)",
+        "x = np.arctanh(y)",
+        "from math import sin",
+        "from numpy.linalg import solve",
+        "x = np.linalg.solve(A, b)",
+        "x = A @ b",
+        "A @= b",
+        "x = A.dot(b)",
+        "x = np.exp(y)",
+        "x = math.tan(y)",
+        "x = y.sum()",
+        "x = y**2",
+        "x = y**0.5",
+    ],
+)
+def test_what_is_not_exact_is_found_in_a_source(line):
+    assert problems(line)
+
+
+def inexact_symbols(library: Path) -> list[str]:
+    """Return the names of functions, not exact, that ``library`` takes from elsewhere."""
+    command = ["nm", "--dynamic", "--undefined-only", "--format=posix", str(library)]
+    listed = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    names = [line.split()[0].partition("@")[0] for line in listed.splitlines()]
+    assert names
+    return [name for name in names if not HARMLESS.fullmatch(name)]
+
+
+def test_the_core_takes_nothing_inexact_from_elsewhere():
+    assert inexact_symbols(Path(_core.__file__)) == []
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_what_is_not_exact_is_found_in_a_library(tmp_path):
+    source = tmp_path / "planted.c"
+    source.write_text("#include <math.h>\ndouble f(double x) { return sqrt(x) + sin(x) + fma(x, x, x); }\n")
+    library = source.with_suffix(".so")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(source), "-lm"], check=True)
+    assert sorted(inexact_symbols(library)) == ["fma", "sin"]

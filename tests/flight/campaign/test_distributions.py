@@ -1,0 +1,172 @@
+"""Campaigns over the distributions of a scenario, and their flights flown by themselves."""
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import ScenarioError
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.campaign.campaign import METHODS, Campaign, plan
+from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.sampling import Sampler
+from hsv.flight.campaign.store import ResultStore
+from hsv.flight.campaign.summary import Results
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import parse_scenario
+from hsv.graph.campaign_replay import replay_in_process
+
+SCENARIO = """
+extends = "case1"
+duration = "3 s"
+[[command]]
+altitude_change = { normal = ["60 ft", "5 ft"] }
+start = { uniform = ["0.5 s", "1 s"] }
+[initial]
+velocity = { uniform = ["7890 ft/s", "7910 ft/s"] }
+[integral]
+rate = { uniform = ["0 / s", "0.1 / s"] }
+[vehicle.perturbation]
+mass = { normal = ["0 %", "2 %"] }
+[notch]
+zero_damping = { uniform = [0.04, 0.06] }
+[[fault]]
+channel = "elevator_deflection"
+type = "loss_of_effectiveness"
+effectiveness = { uniform = [0.8, 1.0] }
+start = "2 s"
+[limits]
+"""
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    path = tmp_path_factory.mktemp("scenario") / "drawn.toml"
+    path.write_text(SCENARIO)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def flown(scenario, tmp_path_factory):
+    campaign = plan(scenario, samples=20, seed=5, scale=0.0)
+    out = tmp_path_factory.mktemp("campaign") / "drawn.parquet"
+    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+    return Results(out)
+
+
+def test_every_distribution_is_a_factor_beside_those_of_the_command(scenario):
+    own = {"initial.velocity", "command[0].altitude_change", "command[0].start", "integral.rate", "notch.zero_damping"}
+    assert {f.name for f in plan(scenario, scale=0.0).factors} == own | {"mass", "fault[0].effectiveness"}
+    everything = {f.name: f for f in plan(scenario, factors={"fault[0].effectiveness": (0.9, 1.0)}).factors}
+    assert len(everything) == 10 + len(own) + 1
+    # What the file says of a parameter comes before the bounds of all, what the command says before both.
+    assert (everything["mass"].kind, everything["mass"].high) == ("normal", 0.06)
+    assert everything["fault[0].effectiveness"].low == 0.9
+
+
+@pytest.mark.parametrize("flight", [0, 7, 19])
+def test_a_flight_written_as_a_scenario_flies_by_itself_as_recorded_in_every_bit(flown, flight):
+    alone = fly(assemble_flight(parse_scenario(flown.file(flight), "alone")))
+    assert alone.fingerprint == flown.row(flight)["fingerprint"]
+    assert replay_in_process(flown, flight).differing == []
+
+
+def test_every_number_drawn_is_flown(flown):
+    for flight in range(3):
+        sample, scenario = flown.sample(flight), parse_scenario(flown.file(flight), "alone")
+        assert scenario.initial.velocity == sample["initial.velocity"]
+        # Before them stands the change that leads to the same goal from another start.
+        assert scenario.command[1].altitude_change == sample["command[0].altitude_change"]
+        assert scenario.command[1].start == scenario.command[1].end == sample["command[0].start"]
+        assert scenario.integral.rate == sample["integral.rate"]
+        assert scenario.vehicle.perturbation == {"mass": sample["mass"]}
+        assert scenario.notch.zero_damping == (sample["notch.zero_damping"],)
+        assert scenario.fault[0].parameters["effectiveness"] == sample["fault[0].effectiveness"]
+    assert len(set(flown.column("fingerprint").tolist())) == 20
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_samples_lie_within_the_ends_and_can_be_drawn_alone(scenario, method):
+    campaign = plan(scenario, samples=64, seed=2, scale=0.0, method=method)
+    samples, _ = Sampler(campaign).draw(range(campaign.samples))
+    assert np.all(samples >= [f.low for f in campaign.factors]) and np.all(
+        samples <= [f.high for f in campaign.factors]
+    )
+    one, _ = Sampler(campaign).draw(range(40, 41))
+    assert np.array_equal(one[0], samples[40])
+    if method != "corners":
+        # Two thirds of a normal distribution lie within a standard deviation, a third of a uniform one as long.
+        normal = [i for i, f in enumerate(campaign.factors) if f.kind == "normal"]
+        mean = np.array([f.middle for f in campaign.factors])
+        third = np.array([(f.high - f.low) / 6.0 for f in campaign.factors])
+        within = np.mean(np.abs(samples - mean) < third, axis=0)
+        assert np.all(within[normal] > 0.5) and np.all(np.delete(within, normal) < 0.5)
+
+
+def test_a_campaign_with_distributions_reads_back_as_it_was_written(scenario):
+    campaign = plan(scenario)
+    assert Campaign.from_text(campaign.text) == campaign
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"end": '{ uniform = ["0.2 s", "3 s"] }'}, r"command\[0\].end = 0.2 s: expected no time before start"),
+        ({"altitude_change": '{ uniform = ["0 ft", "2000 ft"] }'}, r"command\[0\].altitude_change leads to 87500 ft"),
+    ],
+)
+def test_ends_that_a_scenario_does_not_admit_are_refused_before_anything_flies(tmp_path, changes, message):
+    path = tmp_path / "drawn.toml"
+    lines = [line for line in SCENARIO.splitlines() if line.partition(" = ")[0] not in changes]
+    at = lines.index("[[command]]") + 1
+    path.write_text("\n".join([*lines[:at], *(f"{key} = {value}" for key, value in changes.items()), *lines[at:]]))
+    with pytest.raises(ScenarioError, match=message):
+        plan(str(path))
+
+
+WHOLE = """
+extends = "case1"
+title = "Steps"
+duration = "3 s"
+[link.command]
+delay = { uniform = [0, 2] }
+[[fault]]
+channel = "elevator_deflection"
+type = "delay"
+start = "2 s"
+steps = { uniform = [1, 3] }
+[limits]
+"""
+
+
+def test_of_numbers_of_steps_whole_ones_are_drawn(tmp_path):
+    path = tmp_path / "drawn.toml"
+    path.write_text(WHOLE)
+    ranges = {"sensors.altitude.latency": ("0", "2")}
+    campaign = plan(str(path), samples=40, scale=0.0, factors=ranges)
+    drawn = Sampler(campaign).draw(range(40))[0]
+    flown = [campaign.flown(flight, sample) for flight, sample in enumerate(drawn)]
+    assert {scenario.equipment["link.command.delay"] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.equipment["sensors.altitude.latency"][0] for scenario in flown} == {0.0, 1.0, 2.0}
+    assert {scenario.fault[0].parameters["steps"] for scenario in flown} == {1.0, 2.0, 3.0}
+    assert Campaign.from_text(campaign.text) == campaign
+    corners = plan(str(path), method="corners", scale=0.0, factors=ranges)
+    assert set(Sampler(corners).draw(range(8))[0].ravel().tolist()) == {0.0, 1.0, 2.0, 3.0}
+
+
+def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out):
+    path = tmp_path / "drawn.toml"
+    ends = 'end = { uniform = ["0.8 s", "1.4 s"] }\naltitude_change'
+    path.write_text(SCENARIO.replace("altitude_change", ends, 1))
+    campaign = plan(str(path), samples=40, scale=0.0)
+    with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
+        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+
+
+def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):
+    path = tmp_path / "drawn.toml"
+    text = 'title = ""\nduration = "2 s"\nvehicle = "stiffened"\n[initial]\naltitude = "85500 ft"\n'
+    path.write_text(text + 'velocity = "7900 ft/s"\n')
+    campaign = plan(str(path), samples=2)
+    sample = [factor.high for factor in campaign.factors]
+    assert campaign.flown(0, sample).vehicle.name == "stiffened"
+    assert campaign.flown(0, sample).vehicle.perturbation == {f.name: f.high for f in campaign.factors}

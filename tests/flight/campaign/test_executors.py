@@ -1,0 +1,212 @@
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from distributed import LocalCluster
+from waiting import wait_until
+
+from hsv.base.errors import CampaignError, RunError
+from hsv.flight.campaign.executors import make_executor
+from hsv.flight.campaign.run import run_campaign
+from hsv.flight.campaign.store import ResultStore
+
+
+def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, results, out):
+    campaign, killed = planned(), []
+
+    with make_executor(2) as workers:
+        pids = workers.pids()
+        assert len(set(pids)) == 2
+
+        def progress(done):
+            if done and not killed:
+                killed.append(pids[0])
+                os.kill(killed[0], signal.SIGKILL)
+
+        assert run_campaign(campaign, ResultStore(out, campaign), workers, progress=progress) == campaign.samples
+    assert killed
+    assert out.read_bytes() == results.path.read_bytes()
+
+
+@pytest.mark.parametrize("address", ["nonsense", "nowhere://x", "tcp://127.0.0.1", "tcp://h:99999", "inproc://x"])
+def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
+    # Without asking anybody: it would take until the end of the tests.
+    monkeypatch.setattr("hsv.flight.campaign.scheduler.ANSWER", 1e6)
+    with (
+        pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"),
+        make_executor(0, address),
+    ):
+        pass
+
+
+def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
+    monkeypatch.setattr("hsv.flight.campaign.scheduler.ANSWER", 0.5)
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(CampaignError, match=f"'{address}': no answer"), make_executor(0, address):
+            pass
+    assert capfd.readouterr().err == ""
+
+
+@pytest.fixture
+def cluster():
+    """A scheduler of its own, without workers."""
+    with LocalCluster(
+        n_workers=0, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL
+    ) as started:
+        yield started
+
+
+def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
+    monkeypatch.setattr("hsv.flight.campaign.scheduler.WORKERS", 0.5)
+    waited = []
+    with (
+        pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
+        make_executor(0, cluster.scheduler_address, lambda: waited.append(True)),
+    ):
+        pass
+    assert waited
+
+
+def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
+    campaign, store = planned(samples=320), ResultStore(out, planned(samples=320))
+    cluster.scale(1)
+
+    def lose(done):
+        if done:
+            cluster.close()
+
+    with (
+        make_executor(0, cluster.scheduler_address) as workers,
+        pytest.raises(RunError, match="the scheduler is lost"),
+    ):
+        run_campaign(campaign, store, workers, progress=lose)
+    with store.opened() as finished:
+        assert finished
+
+
+@contextmanager
+def dask_worker(address, folder, environment, *flags):
+    """A worker started by hand, as on another machine."""
+    module = "-m", "distributed.cli.dask_worker"
+    command = [sys.executable, *flags, *module, "--nthreads", "1", "--no-dashboard", address]
+    popen = subprocess.Popen(command, env=environment, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield
+    finally:
+        popen.terminate()
+        popen.wait()
+
+
+def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_address(cluster, tmp_path):
+    other = tmp_path / "other" / "hsv"
+    (other / "campaign").mkdir(parents=True)
+    (other / "__init__.py").write_text("")
+    (other / "campaign" / "__init__.py").write_text("")
+    (other / "campaign" / "program.py").write_text("def program():\n    return 'hsv 0.0.1, sources 0'\n")
+    path = os.pathsep.join((str(other.parent), os.environ.get("PYTHONPATH", "")))
+    address = cluster.scheduler_address
+    # Isolated, Python does not look where the workspace is.
+    for flags, has in (["-I"], "no hsv"), ([], "hsv 0.0.1, sources 0"):
+        expected = rf"^scheduler = '{address}': worker tcp://127\.0\.0\.1:\d+ has {has}, expected hsv .*, as here$"
+        with (
+            dask_worker(address, tmp_path, os.environ | {"PYTHONPATH": path}, *flags),
+            pytest.raises(CampaignError, match=expected),
+            make_executor(0, address),
+        ):
+            pass
+        wait_until(lambda: not cluster.scheduler.workers)
+
+
+@pytest.mark.parametrize("workers", [-1, 100_000])
+def test_an_impossible_number_of_workers_is_refused(workers):
+    with pytest.raises(CampaignError, match=f"workers = {workers}: expected 0 to 4096"), make_executor(workers):
+        pass
+
+
+def end_of_the_third(text, batch):
+    """Fly a batch; with the third the worker ends."""
+    if batch == 3:
+        os._exit(1)
+    return b""
+
+
+def length_of(text, batch):
+    """Fly a batch."""
+    return str(len(text)).encode()
+
+
+def test_a_batch_that_ends_every_worker_ends_the_campaign_and_not_the_executor():
+    with make_executor(2) as workers:
+        with pytest.raises(RunError, match="several workers died of the same batch"):
+            list(workers.fly(end_of_the_third, "", range(8)))
+        assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+
+
+def a_large_answer(text, batch):
+    """Fly a batch whose content is far more than a pipe holds."""
+    return bytes(3_000_000)
+
+
+def test_workers_killed_in_the_middle_of_an_answer_are_replaced():
+    with make_executor(2) as workers:
+        answers = workers.fly(a_large_answer, "", range(6))
+        next(answers)
+        time.sleep(0.3)  # nobody reads: both are in the middle of the next answer
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGKILL)
+        assert sum(len(content) == 3_000_000 for _, content in answers) == 5
+
+
+class UnportableError(Exception):
+    """An error that cannot be made again of its arguments."""
+
+    def __init__(self, a, b):
+        super().__init__(a + b)
+
+
+def an_unportable_error(text, batch):
+    """Fail with an error that does not arrive in another process."""
+    raise UnportableError("so", "long")
+
+
+def test_an_error_that_cannot_be_pickled_is_told():
+    with make_executor(2) as workers, pytest.raises(RunError, match="UnportableError: solong"):
+        list(workers.fly(an_unportable_error, "", range(2)))
+
+
+def test_batches_that_nobody_took_are_not_taken_for_those_of_the_next_campaign():
+    with make_executor(2) as workers:
+        next(workers.fly(a_large_answer, "", range(6)))
+        assert dict(workers.fly(length_of, "text", range(6))) == dict.fromkeys(range(6), b"4")
+
+
+def test_workers_killed_while_they_wait_are_replaced():
+    with make_executor(2) as workers:
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGKILL)
+            wait_until(lambda pid=pid: not alive(pid))
+        assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
+
+
+def test_an_executor_leaves_environment_and_no_process_behind():
+    before = dict(os.environ)
+    with make_executor(2) as workers:
+        pids = workers.pids()
+    assert dict(os.environ) == before and not any(map(alive, pids))
+
+
+def alive(pid):
+    """Tell whether a process runs, or has ended and is still to be waited for."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False

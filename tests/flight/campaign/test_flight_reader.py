@@ -1,0 +1,86 @@
+"""What is read of flights in pieces, side by side, is what each is alone, in every bit."""
+
+import numpy as np
+import pytest
+from flights import components
+
+from hsv.core import lanes
+from hsv.flight.campaign.flight_reader import PIECE, FlightReader
+from hsv.flight.campaign.tube_levels import TubeLevels
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.side_by_side import FlightGroup
+
+WIDTH = lanes()
+
+pytestmark = pytest.mark.skipif(WIDTH == 1, reason="this processor flies one at a time")
+
+
+def check(reader, flights):
+    """Check what ``reader`` tells of these flights; return in which steps they end."""
+    assert FlightGroup.takes(flights)
+    levels, ends = TubeLevels(flights[0]), []
+    for read, own in zip(reader.read(flights), map(fly, flights), strict=True):
+        data = own.data()
+        assert read.fingerprint == own.fingerprint
+        assert read.level == pytest.approx(levels.worst(data), rel=0, abs=0, nan_ok=True)
+        assert np.array_equal(read.last, data.state[-1], equal_nan=True)
+        assert read.curves.fault_start == own.fault_start
+        for name in ("time", "curves", "saturated"):
+            assert np.array_equal(getattr(read.curves, name), getattr(data, name), equal_nan=True), name
+        assert flight_metrics(read.curves) == own.metrics
+        ends.append(len(own.time))
+    return ends
+
+
+def reader_of(parts):
+    return FlightReader(parts.plant.steps, TubeLevels(parts))
+
+
+@pytest.mark.parametrize("rows", [1, 2, PIECE - 1, PIECE, PIECE + 1, 3 * PIECE + 5])
+def test_flights_of_any_length(rows):
+    parts = components("case1")
+    plant = parts.plant
+    plant.steps = rows - 1
+    check(reader_of(parts), [parts.perturbed({"mass": 0.01 * i}) for i in range(WIDTH)])
+
+
+def test_each_that_diverges_ends_on_its_own():
+    parts = components("case1", duration=20.0)
+    reader = reader_of(parts)
+    some = [parts.perturbed({"moment_elevator": -0.85 + 0.01 * i} if i % 3 else {}) for i in range(WIDTH)]
+    ends = check(reader, some)
+    assert len({end // PIECE for end in ends}) > 1 and max(ends) == 1001
+    # What the first flights left behind is not in the next ones.
+    assert set(check(reader, [parts.perturbed({"mass": 0.01 * i}) for i in range(3)])) == {1001}
+    assert max(check(reader, [parts.perturbed({"moment_elevator": -0.85})] * WIDTH)) < 1001
+
+
+def test_without_a_set_there_is_no_level():
+    parts = components("case1_no_notch", duration=2.0)
+    assert all(read.level is None for read in reader_of(parts).read([parts, parts.perturbed({"mass": 0.05})]))
+
+
+@pytest.mark.parametrize("lane", [0, WIDTH // 2 + 1])
+def test_a_flight_that_ends_with_a_piece(lane):
+    parts = components("case1", duration=20.0)
+
+    def diverging(loss):
+        return parts.perturbed({"moment_elevator": loss})
+
+    early, late, rows = -0.85, -0.2, 0  # the weaker the elevator, the sooner
+    while rows != PIECE:
+        loss = (early + late) / 2
+        assert early < loss < late, "no flight ends there"
+        rows = len(fly(diverging(loss)).time)
+        early, late = (loss, late) if rows < PIECE else (early, loss)
+    flights = [parts] * WIDTH
+    flights[lane] = diverging(loss)
+    assert check(reader_of(parts), flights) == [PIECE if i == lane else 1001 for i in range(WIDTH)]
+    assert check(reader_of(parts), [diverging(loss)] * WIDTH) == [PIECE] * WIDTH
+
+
+def test_flights_of_another_length_are_an_error():
+    first = components("case1", duration=1.0)
+    with pytest.raises(ValueError, match="50 steps: expected 100"):
+        reader_of(components("case1", duration=2.0)).read([first, first])

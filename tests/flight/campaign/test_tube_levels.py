@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+from flights import components
+
+from hsv.control.controller import ControllerInput
+from hsv.flight.campaign.tube_levels import TubeLevels
+from hsv.flight.closed_loop import fly
+
+
+def published_levels(parts, flight):
+    """Return what the controller says of each step."""
+    h, notch, law = flight.history, parts.notch_filter, parts.controller
+    for part in (notch, law):
+        part.reset()
+    levels = []
+    references = zip(flight.reference, flight.reference_input, strict=True)
+    rows = zip(h.state, h.deviation, h.nominal_input, references, strict=True)
+    for k, (x, x_n, u_n, (x_r, u_r)) in enumerate(rows):
+        filtered = notch.step(float(x[4]))
+        q_f, s = filtered.filtered_pitch_rate, filtered.filter_state
+        result = law.step(ControllerInput(k, x, q_f, x_r, u_r, x_n, u_n, s))
+        levels.append(result.level)
+    return levels
+
+
+@pytest.mark.parametrize("scenario", ["case1", "case1_heavy"])
+def test_the_worst_level_is_the_largest_that_the_controller_publishes_in_every_bit(scenario):
+    parts = components(scenario, duration=110.0)
+    flight = fly(parts)
+    worst = TubeLevels(parts).worst(flight.data())
+    assert worst == max(published_levels(parts, flight))
+
+
+def test_without_the_filter_in_the_loop_no_set_holds():
+    flight = fly(components("case1_no_notch", duration=1.0))
+    assert TubeLevels(components("case1_no_notch")).worst(flight.data()) is None
+
+
+def test_a_state_that_is_no_number_has_no_level():
+    data = fly(components("case1", duration=1.0)).data()
+    data.state[20, 4] = np.nan
+    assert np.isnan(TubeLevels(components("case1")).worst(data))

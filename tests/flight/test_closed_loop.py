@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flights import components, step_by_step
+from numpy.testing import assert_array_equal
+
+from hsv.flight.closed_loop import fly
+from hsv.model.plant import FlightStatus
+from hsv.model.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
+
+SHORT = {"duration": 6.0, "fault__starts": [3.0]}
+HISTORIES = (
+    "state",
+    "filtered_pitch_rate",
+    "deviation",
+    "nominal_input",
+    "u_unsaturated",
+    "command",
+    "actuator",
+)
+TWO_NOTCHES = {
+    "notch__zero_frequency": [15.0, 19.5],
+    "notch__zero_damping": [0.02, 0.05],
+    "notch__pole_frequency": [15.0, 19.5],
+    "notch__pole_damping": [0.5, 0.2],
+    # The invariant set of the shipped design is for its own, single section.
+    "tube__centre": [],
+    "tube__shape": [],
+    "tube__half_width": [],
+}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes"),
+    [
+        ("case1", SHORT),
+        ("case1_derived", SHORT),
+        ("case1_no_notch", SHORT),
+        ("case1_single_k", SHORT),
+        ("case1_uncertain", SHORT),
+        ("case1_heavy", SHORT),
+        ("case1", SHORT | {"vehicle__model": "DM"}),
+        ("case1", SHORT | {"substeps": 4}),
+        ("case1", SHORT | TWO_NOTCHES),
+        ("case1", SHORT | {"fault__starts": [0.0], "fault__parameters": ["effectiveness=0.0"]}),
+        ("case1", {"duration": 0.0}),
+        ("case1", {"duration": 0.02}),
+        ("case1_derived_no_notch", {}),
+    ],
+)
+def test_compiled_loop_equals_the_components_step_by_step_bit_for_bit(scenario, changes):
+    compiled = fly(components(scenario, **changes))
+    stepped = step_by_step(components(scenario, **changes))
+    for name in HISTORIES:
+        assert_array_equal(getattr(compiled.history, name), stepped[name], err_msg=name)
+    assert compiled.status == stepped["plant_status"][-1]
+    assert_array_equal(compiled.data().saturated, stepped["saturated"])
+
+
+def test_two_flights_are_bit_identical_and_leave_the_components_as_they_were():
+    parts = components(**SHORT)
+    first, second = fly(parts), fly(parts)
+    third = fly(components(**SHORT))
+    for name in HISTORIES:
+        assert_array_equal(getattr(first.history, name), getattr(second.history, name))
+        assert_array_equal(getattr(first.history, name), getattr(third.history, name))
+
+
+def test_a_flight_has_one_row_more_than_steps_and_finishes():
+    flight = fly(components(duration=1.0))
+    assert len(flight.time) == len(flight.history.state) == 51
+    assert flight.time[-1] == pytest.approx(1.0)
+    assert flight.status is FlightStatus.FINISHED
+    assert flight.fault_start is None
+
+
+def test_fault_acts_from_its_step_on_the_elevator_alone():
+    flight = fly(components(**SHORT))
+    h = flight.history
+    assert flight.fault_start == 3.0
+    assert_array_equal(h.actuator[:150], h.command[:150])
+    assert_array_equal(h.actuator[150:, 1], 0.9 * h.command[150:, 1])
+    assert_array_equal(h.actuator[:, 0], h.command[:, 0])
+
+
+def test_perturbing_the_plant_changes_neither_start_nor_reference():
+    nominal, heavy = fly(components(**SHORT)), fly(components("case1_heavy", **SHORT))
+    assert_array_equal(nominal.history.state[0], heavy.history.state[0])
+    assert_array_equal(nominal.history.deviation[0], heavy.history.deviation[0])
+    assert_array_equal(nominal.reference, heavy.reference)
+    assert np.abs(nominal.history.state[-1] - heavy.history.state[-1]).max() > 1e-3
+
+
+def test_initial_condition_of_the_nominal_trajectory():
+    flight = fly(components(**SHORT))
+    assert_array_equal(flight.history.deviation[0], flight.history.state[0] - flight.reference[0])
+    assert flight.history.filtered_pitch_rate[0] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_without_notch_the_rate_is_used_as_it_is():
+    flight = fly(components("case1_no_notch", **SHORT))
+    assert_array_equal(flight.history.filtered_pitch_rate, flight.history.state[:, 4])
+
+
+def test_unstable_loop_ends_diverged_with_everything_finite_and_limited():
+    flight = fly(components("case1_derived_no_notch"))
+    assert flight.status is FlightStatus.DIVERGED
+    assert flight.time[-1] == pytest.approx(17.6, abs=0.3)
+    assert np.all(np.isfinite(flight.history.state[:-1]))
+    command = flight.history.command
+    assert np.all((command >= LIMITS.input_minimum) & (command <= LIMITS.input_maximum))
+    assert flight.data().saturated.any()
+
+
+def test_a_plant_whose_arithmetic_overflows_still_ends_diverged():
+    # Ten times the natural period a step: the integration itself is unstable.
+    parts = components(duration=200.0, substeps=1)
+    parts.plant.data = replace(parts.plant.data, period=1.0)
+    assert fly(parts).status is FlightStatus.DIVERGED

@@ -1,0 +1,165 @@
+"""Distributions in the place of numbers of a scenario."""
+
+from statistics import NormalDist
+
+import mpmath
+import numpy as np
+import pytest
+import tomli_w
+
+from hsv.base.errors import ScenarioError
+from hsv.base.inheritance import follow_extends
+from hsv.flight.distribution import KINDS, TRUNCATION, Distribution, standard_quantiles
+from hsv.flight.scenario import parse_scenario, scenario_at_means
+
+BASE = {
+    "title": "Distributions",
+    "duration": "4 s",
+    "initial": {"altitude": "85500 ft", "velocity": "7900 ft/s"},
+}
+
+
+def over_base(table):
+    """Return the base scenario with a ``table`` over it."""
+    return BASE | table | {"initial": BASE["initial"] | table.get("initial", {})}
+
+
+def test_normal_quantiles_are_those_of_the_error_function():
+    shares = np.concatenate((np.linspace(0.001, 0.999, 999), [0.075, 0.0750001, 0.925, 0.5, 0.00135]))
+    exact = [float(mpmath.sqrt(2) * mpmath.erfinv(2 * mpmath.mpf(float(share)) - 1)) for share in shares]
+    assert standard_quantiles(shares) == pytest.approx(exact, rel=2e-15, abs=1e-16)
+
+
+def test_a_normal_distribution_ends_at_three_deviations_and_has_the_moments_of_one_that_does():
+    drawn = Distribution(unit="m", low=-20.0, high=40.0, kind="normal")
+    shares = (np.arange(200_000) + 0.5) / 200_000
+    values = drawn.quantiles(shares)
+    assert drawn.quantiles(np.array([0.0, 0.5, 1.0])).tolist() == [-20.0, 10.0, 40.0]
+    assert np.all(np.diff(values) >= 0.0) and values[0] > -20.0 and values[-1] < 40.0
+    assert drawn.middle == 10.0 == pytest.approx(values.mean(), abs=1e-9)
+    normal = NormalDist()
+    cut = 2.0 * TRUNCATION * normal.pdf(TRUNCATION) / (normal.cdf(TRUNCATION) - normal.cdf(-TRUNCATION))
+    assert values.std() == pytest.approx(10.0 * np.sqrt(1.0 - cut), rel=1e-5)
+
+
+def test_a_uniform_distribution_lies_evenly_between_its_ends():
+    drawn = Distribution(unit="m", low=-1.0, high=3.0)
+    assert drawn.quantiles(np.array([0.0, 0.25, 1.0])).tolist() == [-1.0, 0.0, 3.0]
+    assert drawn.middle == 1.0
+
+
+def test_of_whole_numbers_each_between_the_ends_is_drawn_as_often():
+    drawn = Distribution(unit="1", low=1.0, high=4.0, whole=True)
+    assert drawn.quantiles(np.array([0.0, 0.24, 0.26, 0.74, 0.76, 1.0])).tolist() == [1.0, 1.0, 2.0, 3.0, 4.0, 4.0]
+    values, counts = np.unique(drawn.quantiles(np.linspace(0.0, 1.0, 4000, endpoint=False)), return_counts=True)
+    assert values.tolist() == [1.0, 2.0, 3.0, 4.0] and np.ptp(counts) <= 1
+    assert drawn.middle == 2.0
+
+
+@pytest.mark.parametrize(
+    ("table", "field", "unit", "low", "high"),
+    [
+        ({"initial": {"altitude": {"uniform": ["26000 m", "26100 m"]}}}, "initial.altitude", "m", 26000.0, 26100.0),
+        (
+            {"vehicle": {"perturbation": {"mass": {"normal": ["1 %", "1 %"]}}}},
+            "vehicle.perturbation.mass",
+            "1",
+            -0.02,
+            0.04,
+        ),
+        ({"command": [{}, {"start": {"uniform": ["1 s", "2 s"]}}]}, "command[1].start", "s", 1.0, 2.0),
+        ({"duration": {"uniform": ["3 s", "0.1 min"]}}, "duration", "s", 3.0, 6.0),
+        ({"tube": {"tau": [1.0, 1.0, {"uniform": [0.9, 1.0]}, 1.0, 1.0]}}, "tube.tau[2]", "1", 0.9, 1.0),
+        (
+            {"notch": {"zero_frequency": {"uniform": ["15 rad/s", "16 rad/s"]}}},
+            "notch.zero_frequency",
+            "rad/s",
+            15.0,
+            16.0,
+        ),
+        ({"controller": "mine", "mine": {"time": {"uniform": ["1 min", "90 s"]}}}, "mine.time", "s", 60.0, 90.0),
+        ({"controller": "mine", "mine": {"gain": {"normal": [2.0, 0.5]}}}, "mine.gain", "1", 0.5, 3.5),
+        ({"link": {"command": {"delay": {"uniform": [0, 5]}}}}, "link.command.delay", "1", 0.0, 5.0),
+        ({"sensors": {"altitude": {"latency": {"uniform": [1, 2]}}}}, "sensors.altitude.latency", "1", 1.0, 2.0),
+    ],
+)
+def test_any_number_may_be_a_distribution_which_stands_for_its_mean(table, field, unit, low, high):
+    scenario, drawn = scenario_at_means(over_base(table), "mine")
+    [(found, distribution)] = drawn.items()
+    assert found == field
+    assert (distribution.unit, distribution.low, distribution.high) == (unit, pytest.approx(low), pytest.approx(high))
+    assert distribution.kind in KINDS
+    if field == "command[1].start":
+        assert scenario.command[1].start == scenario.command[1].end == 1.5
+
+
+@pytest.mark.parametrize(
+    ("field", "given", "message"),
+    [
+        (
+            "altitude",
+            {"triangular": ["1 m", "2 m"]},
+            r"initial.altitude = .*expected a number or { uniform = \[least, ",
+        ),
+        ("altitude", {"uniform": ["26000 m", "26100 m"], "normal": [0, 1]}, "expected a number or { uniform"),
+        ("altitude", {}, "expected a number or { uniform"),
+        ("altitude", {"uniform": ["26000 m"]}, r"expected uniform = \[least, largest\]"),
+        ("altitude", {"uniform": ["26000 m", "26050 m", "26100 m"]}, r"expected uniform = \[least, largest\]"),
+        ("altitude", {"normal": "26000 m"}, r"expected normal = \[mean, standard deviation\]"),
+        ("altitude", {"uniform": ["26100 m", "26000 m"]}, "expected a least value below the largest"),
+        ("altitude", {"uniform": ["26000 m", "26000 m"]}, "expected a least value below the largest"),
+        ("altitude", {"normal": ["26000 m", "-5 m"]}, "expected a standard deviation above zero"),
+        ("altitude", {"normal": ["26000 m", "0 m"]}, "expected a standard deviation above zero"),
+        ("altitude", {"uniform": ["26000 s", "26100 m"]}, "uniform = '26000 s': wrong unit, expected a finite"),
+        ("altitude", {"uniform": [26000, 26100]}, "uniform = 26000: the unit is missing"),
+        ("altitude", {"uniform": ["26000 m", {"uniform": [1, 2]}]}, "expected a finite quantity"),
+        ("altitude", {"uniform": ["10000 m", "26000 m"]}, "expected 85000 ft to 86500 ft, the flight envelope"),
+        ("altitude", {"normal": ["26000 m", "1000 m"]}, "the flight envelope"),
+    ],
+)
+def test_a_malformed_distribution_is_named_with_what_was_expected(field, given, message):
+    table = BASE | {"initial": {**BASE["initial"], field: given}}
+    with pytest.raises(ScenarioError, match=message) as refused:
+        scenario_at_means(table, "mine")
+    assert str(refused.value).startswith("scenario 'mine': initial.altitude = {")
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"title": {"uniform": [0.0, 1.0]}}, "title = .*expected a text"),
+        ({"robust_mpc": {"gain_index": {"uniform": [0.0, 1.0]}}}, "robust_mpc.gain_index = .*expected a whole number"),
+        ({"notch": {"enabled": {"uniform": [0.0, 1.0]}}}, "notch.enabled = .*expected a valid boolean"),
+        ({"reference": {"uniform": ["1 m", "2 m"]}}, "reference.uniform: unknown key, expected one of trim"),
+        (
+            {"limits": {"altitude_end_error": {"uniform": ["1 m", "2 m"]}}},
+            "limits.altitude_end_error = .*expected a finite",
+        ),
+        ({"controller": "mine", "mine": {"gain": {"even": [1.0, 2.0]}}}, "mine.gain = .*expected a number or {"),
+        (
+            {"controller": "mine", "mine": {"time": {"uniform": ["1 s", "2 m"]}}},
+            "mine.time = .*uniform = '2 m': wrong unit",
+        ),
+    ],
+)
+def test_where_no_number_stands_there_is_no_distribution(table, message):
+    with pytest.raises(ScenarioError, match=message):
+        scenario_at_means(over_base(table), "mine")
+
+
+def test_a_flight_of_a_distribution_is_refused_with_its_field():
+    text = tomli_w.dumps(over_base({"initial": {"velocity": {"uniform": ["7890 ft/s", "7910 ft/s"]}}}))
+    with pytest.raises(
+        ScenarioError, match=r"^scenario 'mine': initial.velocity: a distribution, which hsv montecarlo"
+    ):
+        parse_scenario(text, "mine")
+
+
+def test_an_inherited_distribution_is_replaced_whole():
+    files = {
+        "base": {"x": {"a": {"uniform": [0, 1]}, "b": {"uniform": [0, 1]}, "c": {"uniform": [0, 1]}}},
+        "own": {"extends": "base", "x": {"a": {"normal": [0, 1]}, "b": 3}},
+    }
+    merged = follow_extends("own", files.__getitem__, lambda name, why: ScenarioError(why), values=KINDS)
+    assert merged == {"x": {"a": {"normal": [0, 1]}, "b": 3, "c": {"uniform": [0, 1]}}}

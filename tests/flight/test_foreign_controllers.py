@@ -1,0 +1,236 @@
+"""Custom controllers in the loop: Python classes and functions in C."""
+
+import threading
+
+import numpy as np
+import pytest
+from c_libraries import step_function
+
+from hsv.base.errors import RunError, ScenarioError
+from hsv.base.parameters import Parameter, check_all
+from hsv.control.controller import ControllerInput, StepKernel
+from hsv.flight.assembly import assemble_flight, scenario_parameters
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import parse_scenario
+from hsv.model.vehicle import load_vehicle
+
+LIMITS = load_vehicle().decoupled
+
+SCENARIO = """
+title = "Case 1 by another controller"
+design = "{design}"
+controller = "{controller}"
+duration = "{duration}"
+[initial]
+altitude = "85500 ft"
+velocity = "7900 ft/s"
+[[command]]
+altitude_change = "60 ft"
+[{table}]
+{settings}
+"""
+FEEDBACK = np.array([[-1e-3, -2e-3, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 3.0, 1.2]])
+RATE = 0.05
+
+
+def flight(controller="Leaky", design="", settings="", table="leaky", duration="4 s"):
+    if controller in globals():
+        controller = f"{__name__}:{controller}"
+    text = SCENARIO.format(controller=controller, design=design, settings=settings, table=table, duration=duration)
+    return assemble_flight(parse_scenario(text, "own"))
+
+
+class Leaky:
+    """Proportional feedback with a leaky integral of the pitch angle: memory, parameters, the filtered pitch rate."""
+
+    PARAMETERS = (
+        Parameter("leaky.gain", 1.0, "times the feedback", "", 0.0, 10.0),
+        Parameter("leaky.time", 2.0, "of the leak", "s", 0.1, 100.0),
+    )
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        made = cls()
+        made.own = check_all(cls.PARAMETERS, values)
+        made.design = design
+        return made
+
+    def reset(self):
+        self.leaking = 0.0
+
+    def step(self, inputs):
+        error = inputs.estimate[:5] - inputs.reference[:5]
+        error[4] = inputs.filtered_pitch_rate - inputs.reference[4]
+        wanted = [0.0, 0.0]
+        for i in range(2):
+            total = 0.0
+            for j in range(5):
+                total += FEEDBACK[i, j] * error[j]
+            wanted[i] = inputs.reference_input[i] + self.own["leaky.gain"] * total
+        wanted[1] += RATE * self.leaking
+        self.leaking += 0.02 * (error[3] - self.leaking / self.own["leaky.time"])
+        return wanted
+
+
+class CompiledLeaky(Leaky):
+    """The same as a function in C, given by its address."""
+
+    fails_at = silent_at = -1
+
+    @property
+    def kernel(self):
+        own = self.own
+        settings = [own["leaky.gain"], own["leaky.time"], self.fails_at, self.silent_at]
+        return StepKernel(step_function("leaky"), np.zeros(1), np.array(settings))
+
+
+class Late(Leaky):
+    """Answers well up to step 20."""
+
+    answer = np.nan, 0.0
+
+    def step(self, inputs):
+        return super().step(inputs) if inputs.step < 20 else self.answer
+
+
+class Raising(Leaky):
+    def step(self, inputs):
+        raise ZeroDivisionError("no gain")
+
+
+def test_python_and_compiled_controller_fly_the_same_bits_alone_and_stepped():
+    own, compiled = flight(), flight("CompiledLeaky")
+    one, other = fly(own), fly(compiled)
+    assert len(one.time) > 100
+    assert one.fingerprint == other.fingerprint
+    inputs = ControllerInput(
+        0, one.history.state[0], 0.0, one.reference[0], one.reference_input[0], np.zeros(9), np.zeros(2), np.zeros(2)
+    )
+    for parts, flown in ((own, one), (compiled, other)):
+        parts.controller.reset()
+        inputs = inputs._replace(filtered_pitch_rate=flown.history.filtered_pitch_rate[0])
+        assert parts.controller.step(inputs).input.tolist() == flown.history.command[0].tolist()
+    assert not one.history.deviation.any() and not one.history.nominal_input.any()
+
+
+def test_answers_are_limited_and_the_limits_are_told(monkeypatch):
+    monkeypatch.setattr(Late, "answer", (5.0, -3.0))
+    flown = fly(flight("Late"))
+    assert flown.history.u_unsaturated[20].tolist() == [5.0, -3.0]
+    assert flown.history.command[20].tolist() == [
+        LIMITS.input_maximum[0],
+        LIMITS.input_minimum[1],
+    ]
+    assert flown.data().saturated[20].all() and not flown.data().saturated[19].any()
+
+
+def test_settings_reach_the_controller_in_si_units():
+    scenario = parse_scenario(
+        SCENARIO.format(
+            controller=f"{__name__}:Leaky",
+            design="baseline",
+            settings='time = "1.5 min"',
+            table="leaky",
+            duration="1 s",
+        ),
+        "own",
+    )
+    assert scenario_parameters(scenario)["leaky.time"] == 90.0
+    parts = assemble_flight(scenario)
+    assert fly(parts).history.deviation.any()  # with a design there is a nominal trajectory, too
+
+
+@pytest.mark.parametrize(
+    ("controller", "answer", "message"),
+    [
+        ("Late", (np.nan, 0.0), r"Late, step 20: answered \[nan, 0.0\], expected 2 finite"),
+        ("Late", (0.3,), r"Late, step 20: answered \(0.3,\), expected 2 finite numbers: fuel"),
+        ("Late", None, r"Late, step 20: answered None"),
+        ("Raising", None, r"Raising, step 0: ZeroDivisionError: no gain"),
+    ],
+)
+def test_a_controller_that_fails_is_named_with_its_step(controller, answer, message, monkeypatch):
+    monkeypatch.setattr(Late, "answer", answer)
+    parts = flight(controller)
+    with pytest.raises(RunError, match=message):
+        fly(parts)
+
+
+def test_a_compiled_controller_that_fails_is_named_with_its_step(monkeypatch):
+    monkeypatch.setattr(CompiledLeaky, "fails_at", 33)
+    with pytest.raises(RunError, match=r"CompiledLeaky, step 33: returned 7, expected 0$"):
+        fly(flight("CompiledLeaky"))
+
+
+def test_a_compiled_controller_that_leaves_a_step_out_is_named(monkeypatch):
+    monkeypatch.setattr(CompiledLeaky, "silent_at", 5)
+    with pytest.raises(RunError, match=r"CompiledLeaky, step 5: answered \[nan, nan\]"):
+        fly(flight("CompiledLeaky"))
+
+
+class Listed(Leaky):
+    """Parameters that are none."""
+
+    PARAMETERS = ("gain",)
+
+
+class Without:
+    """Nothing to step."""
+
+    PARAMETERS = Leaky.PARAMETERS
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        return object()
+
+
+class Leaving(Leaky):
+    """Wants to end the process."""
+
+    def reset(self):
+        raise SystemExit(5)
+
+
+def test_a_controller_that_ends_the_process_in_its_reset_is_named():
+    with pytest.raises(RunError, match=r"Leaving, reset: SystemExit: 5"):
+        fly(flight("Leaving"))
+
+
+def test_flights_in_threads_share_no_state():
+    parts = flight()
+    alone = fly(parts).fingerprint
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(fly(parts.perturbed({})).fingerprint)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [alone] * 4
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"controller": "7"}, r"controller = '7': expected one of .*package.module:Class or path/lib.so:symbol"),
+        ({"controller": "7:lqr"}, r"controller = '7:lqr': '7' is no module, expected package.module:Class or path/"),
+        ({"controller": ":lqr"}, r"controller = ':lqr': '' is no module, expected package.module:Class or path/"),
+        ({"controller": "./build/lqr"}, r"controller = './build/lqr': no symbol, expected path/lib.so:symbol"),
+        ({"controller": "lqr.so"}, r"controller = 'lqr.so': no symbol, expected path/lib.so:symbol"),
+        ({"controller": "./7:lqr"}, r"controller = '\./7:lqr': cannot be read \(No such .*expected a shared library"),
+        ({"controller": "tube_mcp"}, r"controller = 'tube_mcp': expected one of .*did you mean 'tube_mpc'"),
+        ({"controller": "nowhere:Class"}, r"cannot be loaded, ModuleNotFoundError: No module named 'nowhere'"),
+        ({"controller": "math:nothing"}, r"cannot be loaded, AttributeError"),
+        ({"controller": "math:cos"}, r"has no PARAMETERS, from_parameters, expected a class of a controller"),
+        ({"controller": f"{__name__}:Listed"}, r"Listed': PARAMETERS: expected hsv.base.parameters.Parameter, each"),
+        ({"controller": f"{__name__}:Without"}, r"Without': has no reset, step, expected a controller"),
+        ({"settings": "gian = 1.0"}, r"leaky.gian: unknown key, expected one of gain, time"),
+        ({"settings": "gain = -1.0"}, r"leaky.gain = -1.0: expected from 0 to 10"),
+        ({"settings": 'time = "3 m"'}, r"leaky.time = '3 m': wrong unit"),
+        ({"table": "lucky", "settings": "gain = 1.0"}, r"lucky: unknown key, expected one of leaky"),
+        ({"controller": "tube_mpc"}, r"leaky: unknown key"),
+        ({"controller": "tube_mpc", "table": "tube"}, r"design = '': expected one, tube_mpc flies with its gains"),
+    ],
+)
+def test_what_cannot_be_flown_is_named(changes, message):
+    with pytest.raises(ScenarioError, match=message):
+        flight(**changes)

@@ -1,0 +1,92 @@
+"""300 random flights of commit b8ecf8c, whose kernels numba compiled: alone, step by step and in lanes the same bits.
+
+They cover every type and occurrence of faults, sensors, actuators, links, air, estimator, active law, notch filters,
+designs and references; see tests/golden/README.md.
+"""
+
+import hashlib
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+from hsv.core import lanes
+from hsv.flight.assembly import assemble, flight_parameters
+from hsv.flight.blocks import steps
+from hsv.flight.closed_loop import fly
+from hsv.flight.fingerprint import fingerprint
+from hsv.flight.scenario import parse_scenario
+from hsv.flight.side_by_side import FlightGroup, fly_group
+
+LINES = (Path(__file__).parents[1] / "golden" / "scenarios.jsonl").read_text().splitlines()
+PARTS = 20
+
+
+def golden(index):
+    """Return the components of a golden flight, and its expected digests."""
+    line = json.loads(LINES[index])
+    parsed = parse_scenario(tomli_w.dumps(line["scenario"]), line["name"])
+    return assemble({**flight_parameters(parsed), **line.get("parameters", {})}), line["expected"]
+
+
+def digest(array):
+    return hashlib.sha256(np.ascontiguousarray(array, "<f8").tobytes()).hexdigest()
+
+
+def check(flight, expected):
+    history = flight.history
+    found = flight.fingerprint, len(history.flown), flight.status.name, digest(history.beside), digest(history.estimate)
+    assert found == tuple(expected[name] for name in ("fingerprint", "rows", "status", "beside", "estimate"))
+
+
+def stepwise(parts):
+    """Return the fingerprint of the flight that the blocks fly one at a time."""
+    rows = []
+    for s in steps(parts):
+        mine = s.state, s.filtered_pitch_rate, s.deviation, s.nominal_input, s.command, s.actuator
+        rows.append(np.concatenate([np.ravel(each) for each in mine]))
+    return fingerprint(np.array(rows))
+
+
+def variants(parts):
+    """Return as many flights as the core has lanes: that of ``parts``, and others of other vehicles and seeds."""
+    group = [parts]
+    for i in range(1, lanes()):
+        seed = parts.plant.data.seed + 7 * i
+        plant = parts.plant.varied(parts.plant.vehicle.perturbed({"mass": 0.01 * i, "lift_alpha": -0.02 * i}), seed)
+        group.append(replace(parts, plant=plant, fault_injector=parts.fault_injector.with_seed(seed)))
+    return group[::-1]
+
+
+def compare_three_ways(indices):
+    for index in indices:
+        parts, expected = golden(index)
+        check(fly(parts), expected)
+        assert stepwise(parts) == expected["fingerprint"], index
+        if lanes() > 1:
+            group = variants(parts)
+            assert FlightGroup.takes(group)
+            *others, same = fly_group(FlightGroup(parts.plant.steps + 1), group)
+            check(same, expected)
+            assert [each.fingerprint for each in others] == [fly(each).fingerprint for each in group[:-1]], index
+
+
+@pytest.mark.parametrize("part", range(PARTS))
+def test_golden_flights_have_the_bits_that_they_had(part):
+    for index in range(part, len(LINES), PARTS):
+        parts, expected = golden(index)
+        check(fly(parts), expected)
+
+
+@pytest.mark.parametrize("part", range(4))
+def test_some_have_them_step_by_step_and_in_lanes(part):
+    compare_three_ways(range(part, len(LINES), 40))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", range(PARTS))
+def test_all_have_them_step_by_step_and_in_lanes(part):
+    compare_three_ways(range(part, len(LINES), PARTS))

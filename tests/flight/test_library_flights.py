@@ -1,0 +1,301 @@
+"""Controllers in C in the loop: the same bits as in Python, and what they do wrong ends their own process only."""
+
+import multiprocessing
+import re
+import shutil
+import subprocess
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+from c_libraries import PROBE, build_probe
+
+from hsv.base.errors import ControllerError, ScenarioError
+from hsv.base.parameters import Parameter
+from hsv.control.c_block import include_folder
+from hsv.control.controller import ControllerInput
+from hsv.control.library import library_digest, library_record
+from hsv.control.library_process import SharedMemory
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.library_child import LoadedLibrary
+from hsv.flight.repeatability import findings, from_copied_state
+from hsv.flight.scenario import load_scenario, scenario_text
+from hsv.graph.preparation import prepare
+
+SCENARIO = """
+title = "Case 1 by a library"
+design = "{design}"
+controller = "{controller}"
+duration = "4 s"
+[initial]
+altitude = "85500 ft"
+velocity = "7900 ft/s"
+[[command]]
+altitude_change = "60 ft"
+[probe]
+{settings}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with the library and its source."""
+    folder = tmp_path_factory.mktemp("probe")
+    build_probe(folder)
+    shutil.copy(PROBE, folder)
+    return folder
+
+
+@pytest.fixture
+def flight(folder):
+    """Assemble the flight of a scenario beside the library."""
+
+    def assemble(settings="", controller="probe.so:probe", design=""):
+        path = folder / "scenario.toml"
+        path.write_text(SCENARIO.format(settings=settings, controller=controller, design=design))
+        return assemble_flight(load_scenario(str(path)))
+
+    return assemble
+
+
+class Probe:
+    """What ``probe.c`` does, in Python."""
+
+    PARAMETERS = (Parameter("probe.weight", [0.5, 0.02, 0.5], "of the integral", "1/s"),)
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        made = cls()
+        made.weight = values.get("probe.weight", cls.PARAMETERS[0].default)
+        return made
+
+    def reset(self):
+        self.integral = 0.0
+
+    def step(self, inputs):
+        fuel, elevator = inputs.reference_input
+        elevator += self.weight[0] * self.integral
+        error = inputs.estimate[3] - inputs.reference[3]
+        self.integral += self.weight[1] * (error - self.weight[2] * self.integral)
+        return fuel, elevator
+
+
+@pytest.mark.parametrize(("design", "settings"), [("", ""), ("baseline", 'weight = ["0.6 1/s", "1 1/s", "0 1/s"]')])
+def test_c_and_python_fly_the_same_bits(flight, folder, design, settings):
+    ours, other = flight(settings, design=design), flight(settings, f"{__name__}:Probe", design)
+    one = fly(ours)
+    assert one.fingerprint == fly(other).fingerprint == fly(ours).fingerprint
+    assert len(one.time) == 201 and one.history.command[:, 1].std() > 0.0
+    # The library is never loaded here.
+    assert str(folder) not in Path("/proc/self/maps").read_text()
+
+
+def test_c_and_python_answer_the_same_stepwise(flight):
+    ours, other = flight(), flight(controller=f"{__name__}:Probe")
+    state = ours.plant.initial.state.copy()
+    state[3] += 0.01
+    for _ in range(2):
+        for parts in (ours, other):
+            parts.controller.reset()
+        for k in range(5):
+            given = ControllerInput(
+                k, state, 0.0, ours.plant.initial.state, np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
+            )
+            answers = [parts.controller.step(given).input.tolist() for parts in (ours, other)]
+            assert answers[0] == answers[1]
+            assert (answers[0][1] == 0.2) == (k == 0)
+
+
+def test_a_copy_goes_on_from_the_state_of_the_first(flight):
+    assert from_copied_state(flight(), fly(flight())) == ""
+
+
+def _fingerprint(parts):
+    return fly(parts).fingerprint
+
+
+def test_a_forked_process_has_a_child_of_its_own(flight):
+    parts = flight()
+    alone = fly(parts).fingerprint
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply(_fingerprint, (parts,)) == alone
+    assert fly(parts).fingerprint == alone
+
+
+def test_flights_in_threads_share_no_state(flight):
+    parts = flight()
+    alone = fly(parts).fingerprint
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(fly(parts.perturbed({})).fingerprint)) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == [alone] * 3
+
+
+def test_what_a_library_keeps_beside_its_state_is_found(tmp_path):
+    path = tmp_path / "static.toml"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    build_probe(tmp_path, "-DSTATIC")
+    found = next(findings(load_scenario(str(path))))
+    assert found.check == "flown twice" and found.difference.startswith("u_unsaturated from step 0 on")
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("crash_at = 33", r"probe.so:probe, step 33: crashed \(SIGSEGV\)$"),
+        ("exit_at = 200", r"probe.so:probe, step 200: ended its process with exit code 3$"),
+        ("hang_at = 7", r"probe.so:probe, step 7: no answer for 1 s$"),
+        ("fail_at = 20", r"probe.so:probe, step 20: returned 7, expected 0$"),
+        ("silent_at = 20", r"probe.so:probe, step 20: answered \[nan, nan\]"),
+    ],
+)
+def test_what_goes_wrong_is_named_with_its_step_and_the_next_flight_flies(flight, settings, message, monkeypatch):
+    monkeypatch.setattr("hsv.control.library_process.NO_PROGRESS", 1.0)
+    with pytest.raises(ControllerError, match=message):
+        fly(flight(settings))
+    assert len(fly(flight()).time) == 201
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("crash_at = 3", r"probe.so:probe, step 3: crashed \(SIGSEGV\)$"),
+        ("fail_at = 3", r"probe.so:probe, step 3: RunError: returned 7$"),
+        ("silent_at = 3", r"probe.so:probe, step 3: answered \[nan, nan\]"),
+    ],
+)
+def test_what_goes_wrong_stepwise_is_named_with_its_step(flight, settings, message):
+    parts = flight(settings)
+    given = ControllerInput(
+        3, np.zeros(9), 0.0, np.zeros(9), np.array([0.4, 0.2]), np.zeros(9), np.zeros(2), np.zeros(2)
+    )
+    with pytest.raises(ControllerError, match=message):
+        parts.controller.step(given)
+    parts.controller.step(given._replace(step=4))
+
+
+def test_a_library_that_is_built_anew_is_loaded_anew(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    build_probe(tmp_path)
+    assert fly(assemble_flight(load_scenario(str(path)))).history.command.std() > 0.0
+    build_probe(tmp_path, "-DSTATE_SIZE=2", '-DWEIGHT="weights"')
+    with pytest.raises(ScenarioError, match=r"probe.weight: unknown key, expected one of weights, crash"):
+        assemble_flight(load_scenario(str(path), {"probe.weight": [0.1, 0.1, 0.1]}))
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["-DABI=2"], r"^scenario 'mine': controller = '.*/probe.so:probe': abi_version = 2, expected 1"),
+        (['-DOUTPUTS={"u","1",2}'], r": outputs\[0\] = u, 2 in '1', expected wanted_input, 2 in '1, rad'$"),
+        (
+            ['-DINPUTS={"estimate","m",9}'],
+            r": inputs\[0\] = estimate, 9 in 'm', expected estimate, 9 in 'm, m/s, rad, ",
+        ),
+        (
+            ["-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)"],
+            r": inputs\[6\] = filter_state, 4 in 'rad, rad s', expected filter_state, 2 in",
+        ),
+    ],
+)
+def test_a_library_that_is_no_controller_is_refused(tmp_path, flags, message, monkeypatch):
+    build_probe(tmp_path, "-w", *flags)
+    # As in the library's process, without starting one for each.
+    library = LoadedLibrary(tmp_path / "probe.so", SharedMemory(-1))
+    monkeypatch.setattr("hsv.control.library_process._in_this_process", lambda path: library)
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design="baseline"))
+    with pytest.raises(ScenarioError, match=message):
+        assemble_flight(load_scenario(str(path)))
+
+
+def test_a_library_that_crashes_while_it_is_loaded_is_refused(tmp_path):
+    build_probe(tmp_path, "-DCRASHES_ON_LOADING")
+    path = tmp_path / "mine.toml"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    with pytest.raises(ScenarioError, match=r"': crashed \(SIGSEGV\) while it was loaded$"):
+        assemble_flight(load_scenario(str(path)))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ("wieght = 1.0", r"probe.wieght: unknown key, expected one of weight, crash_at"),
+        ("weight = ['1 1/s', '2 1/s']", r"probe.weight: 2 numbers, expected 3"),
+        ("weight = ['1 1/s', '2 1/s', '11 1/s']", r"probe.weight\[2\] = '11 1/s': expected from -10 to 10"),
+        ('crash_above = "3 s"', r"probe.crash_above = '3 s': wrong unit"),
+    ],
+)
+def test_a_wrong_setting_is_named(flight, settings, message):
+    with pytest.raises(ScenarioError, match=message):
+        flight(settings)
+
+
+def test_settings_reach_the_library_in_si_units(flight):
+    parameters = flight('crash_above = "1000 ft"\nweight = ["0.005 1/ms", "2 1/s", "0 1/s"]').controller.parameters
+    assert parameters.tolist() == [5.0, 2.0, 0.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, 304.8]
+
+
+@pytest.mark.parametrize("climbing", ["../probe.so", "sub/../../probe.so", "/usr/lib/probe.so", "link/probe.so"])
+def test_a_path_out_of_the_folder_is_refused(tmp_path, climbing):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "link").symlink_to(tmp_path)
+    path = tmp_path / "mine" / "scenario.toml"
+    path.write_text(SCENARIO.format(settings="", controller=f"{climbing}:probe", design=""))
+    with pytest.raises(ScenarioError, match=r"controller = '.*probe.so:probe': expected a path inside the scenario's"):
+        load_scenario(str(path))
+
+
+def test_a_path_is_from_the_folder_of_the_file_that_says_it(folder, tmp_path):
+    base, own = folder / "base.toml", tmp_path / "own.toml"
+    base.write_text(SCENARIO.format(settings="", controller="./probe.so:probe", design=""))
+    own.write_text(f'extends = "{base}"\nduration = "1 s"\n')
+    assert load_scenario(str(own)).controller == f"{folder}/probe.so:probe"
+    assert f'controller = "{folder}/probe.so:probe"' in scenario_text(str(base))
+
+
+def test_a_library_that_is_not_there_is_named(flight):
+    with pytest.raises(ScenarioError, match=r"controller = '.*/absent.so:probe': cannot be read \(No such file"):
+        flight(controller="absent.so:probe")
+
+
+def test_what_a_recorded_flight_keeps_is_the_library_s_hash_and_its_source(flight, folder):
+    name = flight().controller.name
+    kept = library_record(name)
+    assert (kept.source_name, kept.source) == ("probe.c", PROBE.read_bytes())
+    before = library_digest(name)
+    assert before == kept.sha256 and len(before) == 64
+    (folder / "other.so").write_bytes((folder / "probe.so").read_bytes() + b"\0")
+    assert library_digest(name.replace("probe.so", "other.so")) != before
+    assert library_record("tube_mpc") is None and library_digest("package.module:Class") == ""
+
+
+def test_a_library_without_its_source_is_prepared_for_a_run_as_it_flies_in_process(tmp_path):
+    build_probe(tmp_path)
+    path, files = tmp_path / "mine.toml", tmp_path / "files"
+    path.write_text(SCENARIO.format(settings="", controller="probe.so:probe", design=""))
+    assert len(fly(assemble_flight(load_scenario(str(path)))).time) == 201
+    prepare(str(path), bag=tmp_path / "bag", folder=files)
+    assert {file.name for file in files.iterdir()} == {"scenario.toml", "scenario.yaml", "design.yaml", "run.yaml"}
+    assert f"controller_sha256={library_digest(f'{tmp_path}/probe.so:probe')}" in (files / "run.yaml").read_text()
+
+
+def test_the_controller_in_the_header_s_comment_is_built_and_flies(tmp_path):
+    comment = (include_folder() / "hsv_block.h").read_text().partition("*/")[0]
+    lines = re.findall(r"^ \*     (.*)$|^ \*()$", comment, re.MULTILINE)
+    code = [line for line, _ in lines]
+    [command] = [line for line in code if line.startswith("cc ")]
+    (tmp_path / "trimmed.c").write_text("\n".join(code[: code.index(command)]))
+    subprocess.run(command, shell=True, check=True, cwd=tmp_path)
+    path = tmp_path / "mine.toml"
+    text = SCENARIO.format(settings="share = 0.5", controller="trimmed.so:trimmed", design="")
+    path.write_text(text.replace("[probe]", "[trimmed]"))
+    flown = fly(assemble_flight(load_scenario(str(path))))
+    assert np.allclose(flown.history.command, flown.reference_input * [1.0, 0.5], rtol=1e-15, atol=0.0)
+    assert library_record(load_scenario(str(path)).controller).source_name == "trimmed.c"

@@ -1,0 +1,193 @@
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flights import components
+from numpy.testing import assert_allclose
+
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import METRICS, FlightData, flight_metrics
+
+PERIOD = 0.02
+REFERENCE = np.array([1000.0, 500.0, 0.02, 0.03, 0.0, 1.0, 0.0, 0.8, 0.0])
+
+
+def flight(duration=100.0, fault=None, **columns):
+    """A flight that rests at its reference, with the given columns (functions of time) laid over it."""
+    time = np.arange(round(duration / PERIOD) + 1) * PERIOD
+    state = np.tile(REFERENCE, (len(time), 1))
+    deviation = np.zeros_like(state)
+    command = np.tile([0.3, 0.2], (len(time), 1))
+    saturated = np.zeros_like(command, bool)
+    places = {
+        "altitude": (state, 0),
+        "velocity": (state, 1),
+        "alpha": (state, 2),
+        "theta": (state, 3),
+        "rate_1": (state, 6),
+        "rate_2": (state, 8),
+        "nominal_alpha": (deviation, 2),
+        "fuel": (command, 0),
+        "elevator": (command, 1),
+        "fuel_limited": (saturated, 0),
+        "elevator_limited": (saturated, 1),
+    }
+    for name, function in columns.items():
+        array, column = places[name]
+        array[:, column] = array[:, column] + function(time)
+    unlimited = np.where(saturated, np.nan, command)
+    return FlightData(
+        time, state, np.tile(REFERENCE, (len(time), 1)), deviation, command, unlimited, np.zeros(len(time)), fault
+    )
+
+
+def test_exponential_response_has_the_textbook_times():
+    tau = 5.0
+    m = flight_metrics(flight(altitude=lambda t: -100.0 * np.exp(-t / tau)))
+    assert m["altitude_rise_time"] == pytest.approx(tau * math.log(9.0), abs=2 * PERIOD)
+    assert m["altitude_settling_time"] == pytest.approx(tau * math.log(50.0), abs=2 * PERIOD)
+    assert m["altitude_overshoot"] == 0.0
+    assert m["altitude_integral_absolute_error"] == pytest.approx(100.0 * tau, rel=1e-4)
+    assert m["altitude_end_error"] == pytest.approx(-100.0 * math.exp(-100.0 / tau), rel=1e-6)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_second_order_response_overshoots_as_the_textbook_says_up_and_down(sign):
+    zeta, omega = 0.5, 1.0
+    damped = omega * math.sqrt(1 - zeta**2)
+
+    def error(t):
+        decay = np.exp(-zeta * omega * t)
+        return -sign * 10.0 * decay * (np.cos(damped * t) + zeta * omega / damped * np.sin(damped * t))
+
+    m = flight_metrics(flight(velocity=error))
+    assert m["velocity_overshoot"] == pytest.approx(math.exp(-math.pi * zeta / math.sqrt(1 - zeta**2)), abs=1e-4)
+    assert m["velocity_settling_time"] == pytest.approx(8.1, abs=0.1)
+    assert m["velocity_rise_time"] == pytest.approx(1.64, abs=0.05)
+
+
+def test_what_is_never_reached_is_left_out():
+    m = flight_metrics(flight(altitude=lambda t: -100.0 + 0.5 * t))
+    assert "altitude_settling_time" not in m
+    assert "altitude_rise_time" not in m
+    assert "velocity_rise_time" not in m
+    assert m["altitude_end_error"] == pytest.approx(-50.0)
+
+
+def test_without_fault_there_are_no_metrics_after_it():
+    m = flight_metrics(flight())
+    assert not [name for name in m if "post_fault" in name or "decay" in name]
+
+
+def test_response_metrics_stop_at_the_fault_but_errors_do_not():
+    def error(t):
+        return np.where(t < 50.0, -100.0 * np.exp(-t), 30.0)
+
+    m = flight_metrics(flight(fault=50.0, altitude=error))
+    assert m["altitude_settling_time"] < 5.0
+    assert m["altitude_overshoot"] == 0.0
+    assert m["altitude_end_error"] == 30.0
+    assert m["altitude_integral_absolute_error"] == pytest.approx(100.0 + 30.0 * 50.0, rel=1e-2)
+
+
+def test_attitude_deviation_is_from_the_mean_before_the_fault_or_from_nominal():
+    def alpha(t):
+        # Swings about 0.001 in the last five seconds before the fault, was elsewhere earlier, jumps by 0.004 after it.
+        return np.select([t < 45.0, t < 50.0], [0.1, 0.001 + 1e-4 * np.sin(2 * math.pi * t)], 0.005)
+
+    m = flight_metrics(flight(fault=50.0, alpha=alpha, nominal_alpha=lambda t: 0.002 + 0 * t))
+    assert m["post_fault_attitude_deviation"] == pytest.approx(0.004, abs=1e-6)
+    assert m["post_fault_attitude_from_nominal"] == pytest.approx(0.003, abs=1e-9)
+    assert m["attitude_from_nominal"] == pytest.approx(0.098, abs=1e-9)
+
+
+def test_pitch_angle_counts_as_angle_of_attack_does():
+    m = flight_metrics(flight(fault=50.0, theta=lambda t: np.where(t < 50.0, 0.0, -0.006)))
+    assert m["post_fault_attitude_deviation"] == pytest.approx(0.006, abs=1e-9)
+
+
+def test_decay_time_is_that_of_the_envelope_and_the_slower_mode_counts():
+    def ring(tau):
+        return lambda t: np.where(t < 50.0, 5.0, np.exp(-(t - 50.0) / tau) * np.cos(15.0 * (t - 50.0)))
+
+    m = flight_metrics(flight(fault=50.0, rate_1=ring(2.0), rate_2=ring(4.0)))
+    half_swing = math.pi / 15.0
+    assert m["elastic_rate_1_decay_time"] == pytest.approx(2.0 * math.log(20.0), abs=half_swing)
+    assert m["elastic_rate_2_decay_time"] == pytest.approx(4.0 * math.log(20.0), abs=half_swing)
+    assert m["elastic_decay_time"] == m["elastic_rate_2_decay_time"]
+
+
+def test_modes_at_rest_decay_at_once():
+    m = flight_metrics(flight(fault=50.0))
+    assert m["elastic_decay_time"] == 0.0
+
+
+def test_fault_at_the_first_step_leaves_out_what_needs_a_before():
+    m = flight_metrics(flight(fault=0.0, altitude=lambda t: -np.exp(-t)))
+    assert "post_fault_attitude_deviation" not in m
+    assert "altitude_rise_time" not in m
+    assert "altitude_end_error" in m
+
+
+def test_input_ranges_and_saturated_steps():
+    m = flight_metrics(
+        flight(
+            fuel=lambda t: 0.1 * np.sin(t),
+            elevator=lambda t: -0.05 * (t > 3.0),
+            fuel_limited=lambda t: t < 0.09,
+            elevator_limited=lambda t: (t > 0.05) & (t < 0.15),
+        )
+    )
+    assert_allclose([m["fuel_equivalence_ratio_minimum"], m["fuel_equivalence_ratio_maximum"]], [0.2, 0.4], atol=1e-4)
+    assert_allclose([m["elevator_deflection_minimum"], m["elevator_deflection_maximum"]], [0.15, 0.2])
+    # Steps 0-4 and 3-7: a step in which both are limited counts once.
+    assert m["saturated_steps"] == 8
+
+
+def test_a_flight_that_ended_in_numbers_that_are_none_still_has_metrics():
+    def gone(t):
+        return np.where(t > 99.0, np.nan, np.exp(-t))
+
+    m = flight_metrics(flight(fault=50.0, altitude=gone, velocity=gone, alpha=gone, rate_1=gone, rate_2=gone))
+    assert math.isnan(m["altitude_end_error"])
+    assert m["elastic_rate_1_decay_time"] == pytest.approx(50.0)
+
+
+def test_one_row_is_a_flight_too():
+    m = flight_metrics(flight(duration=0.0))
+    assert m["altitude_integral_absolute_error"] == 0.0
+
+
+def test_order_and_names_are_those_of_the_table():
+    m = flight_metrics(flight(fault=50.0, altitude=lambda t: -np.exp(-t), velocity=lambda t: -np.exp(-t)))
+    assert list(m) == list(METRICS)
+
+
+@pytest.mark.parametrize(("scenario", "limited"), [("case1", False), ("case1_derived_no_notch", True)])
+def test_a_flight_that_was_recorded_has_the_same_metrics_in_every_bit(scenario, limited):
+    flown = fly(components(scenario, duration=110.0)).data()
+    columns = {name: getattr(flown, name).copy() for name in ("state", "reference", "deviation", "command")}
+    recorded = replace(flown, **columns, unlimited=np.where(flown.saturated, np.nan, flown.command))
+    assert flown.saturated.any() == limited
+    assert np.array_equal(flown.saturated, recorded.saturated)
+    assert np.array_equal(flown.curves, recorded.curves)
+    assert flight_metrics(flown) == flight_metrics(recorded)
+
+
+def test_sums_and_extremes_are_those_of_numpy_over_whole_columns():
+    flown = fly(components("case1", duration=110.0)).data()
+    m = flight_metrics(flown)
+    before, after = flown.time < 100.0 - 1e-9, flown.time >= 100.0 - 1e-9
+    for axis, column in (("altitude", 0), ("velocity", 1)):
+        error = np.abs(flown.state[:, column] - flown.reference[:, column])
+        integral = np.sum(0.5 * (error[1:] + error[:-1]) * np.diff(flown.time))
+        assert m[f"{axis}_integral_absolute_error"] == integral
+        assert m[f"{axis}_error_maximum"] == error.max()
+    attitude = flown.state[:, 2:4]
+    nominal = np.abs(attitude - flown.reference[:, 2:4] - flown.deviation[:, 2:4])
+    assert m["attitude_from_nominal"] == nominal.max()
+    assert m["post_fault_attitude_from_nominal"] == nominal[after].max()
+    mean = attitude[before & (flown.time >= 95.0 - 1e-9)].mean(axis=0)
+    assert m["post_fault_attitude_deviation"] == np.abs(attitude[after] - mean).max()
+    assert m["saturated_steps"] == np.any(flown.saturated, axis=1).sum()

@@ -1,0 +1,54 @@
+"""A ramp of both commands, flown along climbing trims and along static ones."""
+
+import numpy as np
+import pytest
+from flights import components, step_by_step
+from numpy.testing import assert_array_equal
+
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import flight_metrics
+from hsv.model.envelope import FOOT
+
+LIKE_EQ_48 = {"nominal.filtered": True, "feedback.tau_minimum": [0.5]}
+TAU = {"feedback.tau": [0.8], "tau_change.starts": [10.0, 30.0], "tau_change.values": [0.6, 0.9]}
+
+
+@pytest.mark.parametrize("changes", [{}, {"reference.trim": "static"}, LIKE_EQ_48, LIKE_EQ_48 | TAU], ids=str)
+def test_the_compiled_loop_flies_what_the_parts_fly_step_by_step(changes):
+    parts = components("case2_baseline", duration=40.0, **changes)
+    flight, stepped = fly(parts), step_by_step(parts)
+    for name in ("state", "deviation", "nominal_input", "u_unsaturated", "actuator"):
+        assert_array_equal(getattr(flight.history, name), stepped[name], err_msg=name)
+
+
+def test_climbing_trims_are_followed_closely_and_static_ones_from_far_behind():
+    errors = {}
+    for trim in ("climbing", "static"):
+        metrics = flight_metrics(fly(components("case2_baseline", **{"reference.trim": trim})).data())
+        errors[trim] = [metrics[f"{axis}_error_maximum"] / FOOT for axis in ("altitude", "velocity")]
+    assert errors["climbing"][0] < 20.0 < 45.0 < errors["static"][0]
+    assert errors["climbing"][1] < 2.0 < 45.0 < errors["static"][1]
+
+
+def test_the_nominal_system_follows_the_nominal_vehicle():
+    """Without fault, coupling and filter the vehicle is the nominal one: the tube has nothing to do."""
+    parts = components(
+        "case2_baseline",
+        **{"vehicle.model": "DM", "notch.enabled": False, "fault.channels": ["none"], "duration": 100.0},
+    )
+    flight = fly(parts)
+    error = flight.history.state - flight.reference - flight.history.deviation
+    # What is left is linearisation about trims while x_n is not zero; the climb alone would be 600 ft and 250 ft/s.
+    assert np.abs(error[:, 0]).max() < 0.5 and np.abs(error[:, 1]).max() < 0.1
+
+
+def test_a_step_in_flight_moves_the_nominal_state_and_not_the_vehicle():
+    step = {
+        "reference.times": [5.0, 5.0],
+        "reference.altitudes": [26060.4, 26090.88],
+        "reference.velocities": [2407.92, 2407.92],
+    }
+    flight = fly(components("case2_baseline", duration=6.0, **step))
+    planned = flight.reference + flight.history.deviation
+    assert np.abs(np.diff(flight.reference[:, 0])).max() == pytest.approx(30.48)
+    assert np.abs(np.diff(planned[:, 0])).max() < 0.05

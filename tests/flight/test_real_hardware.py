@@ -1,0 +1,101 @@
+"""Flights with actuators, noisy sensors, wind and faults: the same in every bit however they are flown."""
+
+import numpy as np
+import pytest
+from flights import step_by_step
+from real_hardware import HARDWARE, RANDOM, SHORT
+
+from hsv.base.errors import ScenarioError
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario
+from hsv.model.plant import FlightStatus
+
+
+def parts(name, **changes):
+    return assemble_flight(load_scenario("case1", SHORT | HARDWARE[name] | changes))
+
+
+@pytest.mark.parametrize("name", HARDWARE)
+def test_steps_equal_the_compiled_loop_bit_for_bit(name):
+    flown = parts(name)
+    compiled, stepwise = fly(flown), step_by_step(flown)
+    assert stepwise["plant_status"][-1] == compiled.status
+    for column, values in compiled.history.columns().items():
+        assert np.array_equal(values, stepwise[column]), column
+    assert compiled.fingerprint != fly(assemble_flight(load_scenario("case1", SHORT))).fingerprint
+
+
+@pytest.mark.parametrize("name", HARDWARE)
+def test_the_seed_decides_all_that_is_random_and_nothing_else(name):
+    first = fly(parts(name)).fingerprint
+    assert fly(parts(name)).fingerprint == first
+    assert (fly(parts(name, seed=8)).fingerprint != first) == (name in RANDOM)
+
+
+def flown_with(link, **changes):
+    return fly(assemble_flight(load_scenario("case1", SHORT | {"link": link} | changes)))
+
+
+def test_computing_for_whole_periods_is_a_delay_of_the_command_to_the_bit():
+    computing, trim = flown_with({"computational_delay": "60 ms"}), parts("air").plant.initial.input
+    assert computing.fingerprint == flown_with({"command": {"delay": 3}}).fingerprint
+    assert computing.fingerprint == flown_with({"computational_delay": "20 ms", "command": {"delay": 2}}).fingerprint
+    history = computing.history
+    assert np.array_equal(history.actuator[:3], np.tile(trim, (3, 1)))
+    assert np.array_equal(history.actuator[3:], history.command[:-3])
+
+
+def test_time_of_computation_has_no_jump_at_a_whole_period():
+    def elevator(delay):
+        return flown_with({"computational_delay": delay}).history.command[:, 1]
+
+    whole = elevator("20 ms")
+    assert np.abs(elevator("19.999 ms") - whole).max() < 1e-3 * np.abs(elevator("15 ms") - whole).max()
+    assert np.abs(elevator("20.001 ms") - whole).max() < 1e-3 * np.abs(elevator("25 ms") - whole).max()
+
+
+def test_the_loop_bears_the_delay_that_the_linear_one_does():
+    # docs/study/hardware.md: 116 ms with ideal actuators.
+    def elevator_rms(delay):
+        changes = {"fault": [], "duration": "160 s", "link": {"computational_delay": delay}}
+        history = fly(assemble_flight(load_scenario("case1", changes))).history
+        return np.degrees(history.command[-1000:, 1].std())
+
+    assert elevator_rms("100 ms") < 1e-3
+    assert elevator_rms("130 ms") > 1.0
+
+
+def test_what_the_controller_hears_is_the_state_of_steps_before():
+    history = flown_with({"measurement": {"delay": 2}}).history
+    assert np.array_equal(history.estimate[2:], history.state[:-2])
+    assert np.array_equal(history.estimate[:2], history.state[[0, 0]])
+
+
+def test_an_estimator_makes_the_hard_sensors_flyable():
+    def elevator_rms(**changes):
+        flight = fly(assemble_flight(load_scenario("case1", {"sensors": {"set": "ghv"}, "seed": 1} | changes)))
+        assert flight.status is FlightStatus.FINISHED
+        before_fault = (flight.time >= 60.0) & (flight.time < 95.0)
+        return np.degrees(flight.history.actuator[before_fault, 1].std())
+
+    # Measured: 5.16 deg and 0.32 deg.
+    assert elevator_rms() > 4.0
+    assert elevator_rms(estimator={"enabled": True}) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"enabled": 1}, r"estimator.enabled = 1: expected bool"),
+        (
+            {"enabled": True},
+            r"estimator.enabled = true: no noise of altitude, .* or sensors with noise, such as sensors.set = .fine",
+        ),
+        ({"noise": {"altitude": "3 s"}}, r"estimator.noise.altitude = '3 s': wrong unit"),
+        ({"process": {"thrust": 1.0}}, r"estimator.process.thrust: unknown key"),
+    ],
+)
+def test_a_malformed_estimator_is_refused(table, message):
+    with pytest.raises(ScenarioError, match=message):
+        assemble_flight(load_scenario("case1", {"estimator": table}))

@@ -1,0 +1,211 @@
+"""Controllers that do not fly the same bytes every time, and those that do."""
+
+import os
+import random
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from c_libraries import step_function
+
+from hsv.base.errors import RunError, ScenarioError
+from hsv.control.controller import StepKernel
+from hsv.flight import repeatability
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.repeatability import findings, from_copied_state, scenario_of, under_load
+from hsv.flight.scenario import load_scenario
+
+FEEDBACK = np.array([[-1e-3, -2e-3, 0.0, 0.0, 0.0], [0.0, 0.0, -2.0, 3.0, 1.2]])
+STEPS = 100
+
+
+class Steady:
+    """Feedback with an integral of the pitch angle, all of it forgotten in reset."""
+
+    PARAMETERS = ()
+
+    @classmethod
+    def from_parameters(cls, values, design):
+        return cls()
+
+    def __init__(self):
+        self.memory = SimpleNamespace(integral=0.0)
+
+    def reset(self):
+        self.memory.integral = 0.0
+
+    def step(self, inputs):
+        error = inputs.estimate[:5] - inputs.reference[:5]
+        self.memory.integral += 0.02 * error[3]
+        integral = np.array([0.0, 0.05 * self.memory.integral + self.more(inputs)])
+        return inputs.reference_input + FEEDBACK @ error + integral
+
+    def more(self, inputs):
+        return 0.0
+
+
+class NotReset(Steady):
+    """Keeps its integral from one run to the next."""
+
+    def reset(self):
+        pass
+
+
+class Random(Steady):
+    """Adds noise from step 30 on."""
+
+    def more(self, inputs):
+        return 1e-9 * random.random() if inputs.step >= 30 else 0.0
+
+
+class Timed(Steady):
+    """Goes by the clock on the wall."""
+
+    def more(self, inputs):
+        return 1e-9 * (time.perf_counter() % 1.0)
+
+
+class Shared(Steady):
+    """Keeps the integral of all instances in one place."""
+
+    everybodys = SimpleNamespace(integral=0.0)
+
+    def __init__(self):
+        self.memory = self.everybodys
+
+    def __deepcopy__(self, memo):
+        return type(self)()
+
+
+class OfTheProcess(Steady):
+    """Depends on the process that it is in."""
+
+    def more(self, inputs):
+        return 1e-12 * os.getpid()
+
+
+class Greedy(Steady):
+    """Changes what it is given, which is its own."""
+
+    def step(self, inputs):
+        wanted = super().step(inputs)
+        for array in inputs[1:]:
+            if isinstance(array, np.ndarray):
+                array[:] = 0.0
+        return wanted
+
+
+class NotCopied(Steady):
+    """Holds what cannot be copied."""
+
+    def __init__(self):
+        super().__init__()
+        self.generator = (number for number in range(3))
+
+
+class Failing(Steady):
+    """Fails in the second flight of the process."""
+
+    flights = 0
+
+    def reset(self):
+        super().reset()
+        Failing.flights += 1
+
+    def more(self, inputs):
+        return np.nan if inputs.step == 12 and self.flights > 1 else 0.0
+
+
+class Compiled(Steady):
+    """Counts steps in its state."""
+
+    outside = 0.0
+
+    def __init__(self):
+        self.kernel = StepKernel(step_function("counting"), np.zeros(1), np.array([0.0, self.outside]))
+
+
+class CompiledStatic(Compiled):
+    """Counts steps outside of its state, among its parameters."""
+
+    outside = 1.0
+
+
+def scenario(controller):
+    name = controller if isinstance(controller, str) else f"{__name__}:{controller.__name__}"
+    return load_scenario("case1", {"controller": name, "duration": "2 s", "fault": []})
+
+
+@pytest.fixture
+def found(monkeypatch):
+    """Return what differs, by check, without the processes of the load."""
+    monkeypatch.setattr(repeatability, "under_load", lambda *_: repeatability.Finding("under load", 0, ""))
+
+    def differing(controller):
+        return {f.check: f.difference for f in findings(scenario(controller)) if f.difference}
+
+    return differing
+
+
+@pytest.mark.parametrize("controller", [Steady, Greedy, Compiled, "tube_mpc", "robust_mpc"])
+def test_one_that_keeps_its_state_to_itself_is_the_same_in_every_way(found, controller):
+    assert found(controller) == {}
+
+
+def test_one_that_is_not_reset_is_found_with_its_first_step(found):
+    assert found(NotReset).keys() == {"after a reset"}
+    assert found(NotReset)["after a reset"].startswith("u_unsaturated from step 0 on: [")
+
+
+def test_one_that_draws_numbers_is_found_from_the_step_on_in_which_it_does(found):
+    differing = found(Random)
+    assert differing.keys() == {"flown twice", "after a reset", "from a copied state"}
+    assert differing["flown twice"].startswith("u_unsaturated from step 30 on: [")
+    assert differing["from a copied state"].startswith("the controller: u_unsaturated from step 30 on: [")
+
+
+def test_one_that_goes_by_the_clock_is_found(found):
+    assert found(Timed).keys() == {"flown twice", "after a reset", "from a copied state"}
+
+
+@pytest.mark.parametrize("controller", [Shared, CompiledStatic])
+def test_one_that_shares_its_state_is_found_beside_its_copy(found, controller):
+    differing = found(controller)["from a copied state"]
+    assert differing.startswith(f"its copy: u_unsaturated from step {STEPS // 2} on: [")
+
+
+def test_one_that_cannot_be_copied_is_told(found):
+    [(check, difference)] = found(NotCopied).items()
+    assert check == "from a copied state"
+    assert difference == "the controller cannot be copied: TypeError: cannot pickle 'generator' object"
+
+
+def test_a_failure_in_a_later_flight_is_a_difference_and_one_in_the_first_an_error(found, monkeypatch):
+    monkeypatch.setattr(Failing, "flights", 0)
+    assert "Failing, step 12: answered" in found(Failing)["flown twice"]
+    with pytest.raises(RunError, match="Failing, step 12"):
+        found(Failing)
+
+
+def test_several_flights_at_a_time_in_several_processes_are_compared():
+    flown = scenario(OfTheProcess)
+    finding = under_load(flown, fly(assemble_flight(flown)))
+    assert finding.flights >= 4
+    assert finding.difference.startswith("u_unsaturated from step 0 on: [")
+
+
+def test_a_copy_of_one_with_memory_goes_on_from_where_it_was():
+    flown = scenario("tube_mpc").model_copy(update={"integral": load_scenario("case1_integral_heavy").integral})
+    parts = assemble_flight(flown)
+    assert from_copied_state(parts, fly(parts)) == ""
+
+
+def test_a_name_is_that_of_a_scenario_or_of_a_controller_in_the_default_one(tmp_path):
+    assert scenario_of("case2").name == "case2"
+    assert (scenario_of("robust_mpc").name, scenario_of("robust_mpc").controller) == ("case1", "robust_mpc")
+    (tmp_path / "own.toml").write_text('extends = "case1"\ncontroller = "robust_mpc"\n')
+    assert scenario_of(str(tmp_path / "own.toml")).controller == "robust_mpc"
+    with pytest.raises(ScenarioError, match="controller = 'nix': expected one of"):
+        list(findings(scenario_of("nix")))

@@ -1,0 +1,298 @@
+import pytest
+
+from hsv.base.errors import ScenarioError
+from hsv.control.design_file import find_design
+from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_names, scenario_text
+
+CASE1 = scenario_text("case1")
+
+
+def refusal(text):
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text, "mine")
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith("scenario 'mine': ")
+    return message.removeprefix("scenario 'mine': ")
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_shipped_scenario_loads_and_assembles(name):
+    scenario = load_scenario(name)
+    assert scenario.name == name
+    assert scenario.title
+    assemble(flight_parameters(scenario))
+
+
+def test_case1_is_the_flight_of_the_paper():
+    values = load_scenario("case1").parameters()
+    foot = 0.3048
+    assert values["initial.altitude"] == pytest.approx(85500 * foot)
+    assert values["initial.velocity"] == pytest.approx(7900 * foot)
+    assert values["reference.altitudes"] == pytest.approx([86100 * foot])
+    assert values["reference.velocities"] == pytest.approx([8150 * foot])
+    assert values["duration"] == 200.0
+    assert values["fault.channels"] == ["elevator_deflection"]
+    assert values["fault.parameters"] == ["effectiveness=0.9"]
+    assert values["fault.starts"] == [100.0]
+    assert values["vehicle.coupling"] == "paper_like"
+    assert not any(name.startswith("vehicle.perturbation") for name in values)
+
+
+def test_uncertain_scenarios_perturb_all_ten_parameters():
+    for name in ("case1_uncertain", "case1_heavy"):
+        assert len(load_scenario(name).vehicle.perturbation) == 10
+
+
+@pytest.mark.parametrize(
+    ("altitude", "step"),
+    [("85000 ft", "1500 ft"), ("86500 ft", "-1500 ft"), ("85950 ft", "550 ft"), ("85030 ft", "-30 ft")],
+)
+def test_edges_of_the_envelope_belong_to_it(altitude, step):
+    text = CASE1.replace('"85500 ft"', f'"{altitude}"').replace('"600 ft"', f'"{step}"')
+    assemble(flight_parameters(parse_scenario(text, "edge")))
+
+
+def test_metres_serve_as_well_as_feet():
+    text = CASE1.replace('"85500 ft"', '"26060.4 m"').replace('"250 ft/s"', '"76.2 m/s"')
+    assert parse_scenario(text, "case1").parameters() == load_scenario("case1").parameters()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[vehicle]", "[vehicle]\nwings = 2", "vehicle.wings: unknown key, expected one of name, definition, model"),
+        ('title = "', 'wings = 2\ntitle = "', "wings: unknown key, expected one of title, design, "),
+        ('title = "', 'name = "x"\ntitle = "', "name: unknown key"),
+        ('title = "', 'controller = ["tube_mpc"]\ntitle = "', "controller = ['tube_mpc']: expected a name or a path"),
+        (
+            "effectiveness = 0.9",
+            "effectiveness = 0.9\nwhen = 3",
+            "fault[0].when: unknown key, expected one of effective",
+        ),
+        ('"600 ft"', '"600 s"', "command[0].altitude_change = '600 s': wrong unit, expected a finite quantity such as"),
+        ('"600 ft"', "600", "command[0].altitude_change = 600: the unit is missing"),
+        ('"600 ft"', '"nan ft"', "command[0].altitude_change = 'nan ft': "),
+        ('"600 ft"', '"6e999 ft"', "command[0].altitude_change = '6e999 ft': expected a finite quantity"),
+        ('"600 ft"', '"6000 ft"', "command[0].altitude_change leads to 91500 ft at 0 s: expected 85000 ft to 86500 ft"),
+        (
+            '"250 ft/s"',
+            '"2500 ft/s"',
+            "command[0].velocity_change leads to 10400 ft/s at 0 s: expected 7700 ft/s to 8300 ft/s",
+        ),
+        ('"85500 ft"', '"865000 ft"', "initial.altitude = '865000 ft': expected 85000 ft to 86500 ft, the flight env"),
+        ('"7900 ft/s"', '"7900 ft"', "initial.velocity = '7900 ft': wrong unit"),
+        ('duration = "200 s"', 'duration = "-1 s"', "duration = '-1 s': expected a time from 0 s to 100000 s"),
+        ('duration = "200 s"', "", "duration: missing"),
+        ('"CM"', '"XM"', "vehicle.model = 'XM': expected 'CM' or 'DM'"),
+        ('"paper_like"', '"strong"', "vehicle.coupling = 'strong': expected one of paper_like, derived, or a "),
+        ("effectiveness = 0.9", "effectiveness = nan", "fault[0].effectiveness = nan: expected a finite quantity"),
+        ("effectiveness = 0.9", "effectiveness = 1.9", "fault[0].effectiveness = 1.9: expected from 0 to 1"),
+        ("effectiveness = 0.9", 'effectiveness = "9 deg"', "fault[0].effectiveness = '9 deg': wrong unit"),
+        ("loss_of_effectiveness", "melted", "fault[0].type = 'melted': expected one of loss_of_effectiveness"),
+        ('"elevator_deflection"', '"rudder"', "fault[0].channel = 'rudder': expected one of fuel_equivalence_ratio"),
+        ('"100 s"', '"-1 s"', "fault[0].start = '-1 s': expected a time"),
+        ('"100 s"', '"200 s"', "fault[0].start = 200 s: expected a time before the flight's end, 200 s"),
+        ('"600 ft"', '"600 ft"\nstart = "250 s"', "command[0].start = 250 s: expected a time before the flight's end"),
+        (
+            "[[fault]]",
+            '[[tube.change]]\nstart = "999 s"\ntau = 1.0\n[[fault]]',
+            "tube.change[0].start = 999 s: expected a time before the flight's end, 200 s",
+        ),
+        ("[[fault]]", "[fault]", "fault = {"),
+        ("saturated_steps", "stalls", "limits.stalls: no such metric, expected one of altitude_rise_time"),
+        ('"8 ft"', '"8 s"', "limits.altitude_end_error = '8 s': wrong unit"),
+        ('"8 ft"', '"-8 ft"', "limits.altitude_end_error = '-8 ft': expected the largest magnitude"),
+        ("[limits]", "[notch]\nenabled = 1\n[limits]", "notch.enabled = 1: expected a valid boolean"),
+        ("[limits]", "[notch]\nzero_frequency = 15\n[limits]", "notch.zero_frequency = 15: the unit is missing"),
+        ("[limits]", '[notch]\nzero_damping = "1 s"\n[limits]', "notch.zero_damping = '1 s': wrong unit"),
+        ('[vehicle]\nmodel = "CM"', "[vehicle]\nmodel = 3", "vehicle.model = 3: expected 'CM' or 'DM'"),
+        ("[vehicle]", "[vehicle", "Expected ']' at the end of a table declaration (at line"),
+        ('title = "', 'title = 3 # "', "title = 3: expected a text"),
+    ],
+)
+def test_a_wrong_field_is_named_with_value_and_expectation(old, new, message):
+    assert CASE1.count(old) >= 1
+    assert refusal(CASE1.replace(old, new, 1)).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ('mas = "+10 %"', "vehicle.perturbation.mas = 0.1: no such parameter, expected one of mass, moment_of"),
+        ('mass = "+10 ft"', "vehicle.perturbation.mass = '+10 ft': wrong unit"),
+        ('mass = "-95 %"', "vehicle.perturbation.mass = '-95 %': expected -90 % to +1000 %"),
+        ("mass = nan", "vehicle.perturbation.mass = nan: expected a finite quantity"),
+        ("mass = true", "vehicle.perturbation.mass = True: expected a finite quantity"),
+        ("mass = 5", "vehicle.perturbation.mass = 5: the unit is missing, expected one such as '+5 %'"),
+        ('mass = "0.05"', "vehicle.perturbation.mass = '0.05': the unit is missing"),
+        ("mass = { uniform = [-0.1, 0.1] }", "vehicle.perturbation.mass = -0.1: the unit is missing"),
+    ],
+)
+def test_a_wrong_perturbation_is_named(line, message):
+    assert refusal(CASE1.replace("[initial]", f"[vehicle.perturbation]\n{line}\n[initial]")).startswith(message)
+
+
+def test_an_empty_file_lacks_its_first_field():
+    assert refusal("") == "title: missing"
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [
+        ("case9", "expected a path or one of case1, case1_active"),
+        ("./absent.toml", "cannot be read (No such file or directory), expected a TOML file"),
+        ("/", "cannot be read (Is a directory), expected a TOML file"),
+    ],
+)
+def test_a_scenario_that_is_not_there_is_named(name, problem):
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name)
+    assert str(caught.value).startswith(f"scenario {name!r}: {problem}")
+
+
+def test_what_is_not_text_is_refused(tmp_path):
+    path = tmp_path / "binary.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ScenarioError, match=r"binary.toml': cannot be read \(not text\)"):
+        load_scenario(str(path))
+
+
+def test_a_scenario_from_a_file_is_called_after_it(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(CASE1)
+    assert load_scenario(str(path)).name == "mine"
+
+
+def test_a_design_that_is_not_there_is_named():
+    from hsv.base.errors import DesignError
+
+    scenario = parse_scenario(CASE1.replace('"baseline"', '"absent"'), "mine")
+    with pytest.raises(DesignError, match=r"design = 'absent': no such file"):
+        flight_parameters(scenario)
+
+
+def test_a_flight_may_have_another_notch_filter_than_its_design():
+    table = '[notch]\nzero_frequency = ["15 rad/s", "19.5 rad/s"]\npole_frequency = ["15 rad/s", "19.5 rad/s"]\n'
+    scenario = parse_scenario(CASE1 + table + "zero_damping = [0.02, 0.02]\npole_damping = [0.5, 0.4]\n", "two")
+    flown = assemble(flight_parameters(scenario)).notch_filter.sections
+    assert [(s.zero_frequency, s.pole_damping) for s in flown] == [(15.0, 0.5), (19.5, 0.4)]
+
+
+STEEP = """[[command]]
+velocity_change = "100 ft/s"
+start = "1 s"
+end = "1.1 s"
+[limits]"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[limits]", "[tube]\ntau = 2\n[limits]", r"tube\.tau\[0\] = 2\.0: expected double array from 0 to 1"),
+        ("[limits]", "[tube]\ntau = [1, 0.5]\n[limits]", r"tube\.tau: 2 values, expected 1 or 5"),
+        (
+            "[limits]",
+            '[[tube.change]]\nstart = "5 s"\ntau = 1\n[[tube.change]]\nstart = "6 s"\ntau = 0.01\n[limits]',
+            r"tube\.change\[1\]\.tau\[0\] = 0\.01: expected .*certified",
+        ),
+        ("[limits]", "[notch]\nzero_damping = [-1, 2]\n[limits]", r"notch\.zero_damping\[0\] = -1\.0: expected"),
+        (
+            "[limits]",
+            '[notch]\nzero_frequency = ["15 rad/s", "19 rad/s"]\n[limits]',
+            r"notch\.zero_frequency: 2 values, expected as many as notch\.zero_damping, 1 ",
+        ),
+        (
+            'title = "',
+            'controller = "robust_mpc"\nrobust_mpc.gain_index = 40\ntitle = "',
+            r"robust_mpc\.gain_index = 40: expected -\d+ to \d+",
+        ),
+        ("[limits]", STEEP, r"command: reference at 1 s: altitude = .* no equilibrium"),
+        ('"200 s"', '"200.01 s"', r"duration = 200\.01 s: expected a whole number of periods, 0\.02 s each"),
+        ('"200 s"', '"0.009 s"', r"duration = 0\.009 s: expected at least a period, 0\.02 s"),
+        ('title = "', 'design = "absent"\ntitle = "', r"design = 'absent': no such file"),
+    ],
+)
+def test_what_the_design_does_not_admit_is_named_as_the_scenario_calls_it(old, new, message):
+    text = CASE1.replace('design = "baseline"\n', "").split("[[fault]]")[0] + "[limits]\n"
+    text = text.replace(old, new, 1)
+    with pytest.raises(ScenarioError, match=f"^scenario 'mine': {message}"):
+        assemble_flight(parse_scenario(text, "mine"))
+
+
+def test_a_wrong_design_is_told_from_a_wrong_scenario(tmp_path):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(find_design("baseline").read_text().replace("zero_damping: [0.02]", "zero_damping: [-1.0]", 1))
+    scenario = parse_scenario(CASE1.replace('"baseline"', f'"{path}"'), "mine")
+    with pytest.raises(ScenarioError, match=rf"^scenario 'mine': {path}: parameter notch\.zero_damping"):
+        assemble_flight(scenario)
+
+
+def test_commands_add_up_to_breakpoints():
+    def scenario(*commands):
+        text = scenario_text("case1").split("[[command]]")[0]
+        return parse_scenario(text + "".join(f"[[command]]\n{c}\n" for c in commands), "x").parameters()
+
+    def shown(values):
+        columns = (values[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))
+        return [(t, round(h / 0.3048, 6), round(v / 0.3048, 6)) for t, h, v in zip(*columns, strict=True)]
+
+    assert shown(scenario()) == [(0.0, 85500.0, 7900.0)]
+    ramp = 'altitude_change = "600 ft"\nvelocity_change = "250 ft/s"\nstart = "20 s"\nend = "80 s"'
+    assert shown(scenario(ramp)) == [(20.0, 85500.0, 7900.0), (80.0, 86100.0, 8150.0)]
+    step = 'altitude_change = "-100 ft"\nstart = "50 s"'
+    assert shown(scenario(ramp, step)) == [
+        (20.0, 85500.0, 7900.0),
+        (50.0, 85800.0, 8025.0),
+        (50.0, 85700.0, 8025.0),
+        (80.0, 86000.0, 8150.0),
+    ]
+    at_once = 'velocity_change = "10 ft/s"'
+    assert shown(scenario(at_once, ramp))[0] == (0.0, 85500.0, 7910.0)
+    assert scenario(ramp)["reference.trim"] == "climbing"
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        ('start = "20 s"\nend = "10 s"', "command[0].end = 10 s: expected no time before start, 20 s"),
+        ('start = "20"', "command[0].start = '20': "),
+        ('altitude_change = "-600 ft"\nend = "60 s"', "command[0].altitude_change leads to 84900 ft at 60 s: expected"),
+        ('altitude_step = "600 ft"', "command[0].altitude_step: unknown key, expected one of altitude_change, vel"),
+    ],
+)
+def test_a_wrong_command_is_named(command, message):
+    text = scenario_text("case1").split("[[command]]")[0] + f"[[command]]\n{command}\n"
+    with pytest.raises(ScenarioError) as caught:
+        parse_scenario(text, "x")
+    assert message in str(caught.value)
+
+
+def test_tau_and_its_changes_become_parameters():
+    tube = '[tube]\ntau = 0.8\n[[tube.change]]\nstart = "5 s"\ntau = [0.6, 0.6, 0.7, 0.8, 1.0]\n'
+    text = CASE1 + tube + '[[tube.change]]\nstart = "9 s"\ntau = 0.9\n'
+    values = parse_scenario(text, "x").parameters()
+    assert values["feedback.tau"] == [0.8]
+    assert values["tau_change.starts"] == [5.0, 9.0]
+    assert values["tau_change.values"] == [0.6, 0.6, 0.7, 0.8, 1.0, 0.9, 0.9, 0.9, 0.9, 0.9]
+    assert not {"feedback.tau", "tau_change.starts"} & parse_scenario(CASE1, "x").parameters().keys()
+    assert "tube.change[1].tau: 2 values, expected 1 or 5" in refusal(text.replace("tau = 0.9", "tau = [0.9, 0.9]"))
+
+
+@pytest.mark.parametrize(
+    ("controller", "table", "expected"),
+    [
+        ("robust_mpc", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
+        ("robust_mpc", "[tube]\ntau = 0.8", "controller tube_mpc"),
+        ("robust_mpc", "[tube]", "controller tube_mpc"),
+        ("robust_mpc", '[nominal]\nlaw = "qp"', "one that follows the nominal state"),
+        ("tube_mpc", "[robust_mpc]\ngain_index = 1", "controller robust_mpc"),
+        ("one.of:Ours", '[integral]\nrate = "0.1 / s"', "controller tube_mpc"),
+        ("one.of:Ours", "[robust_mpc]", "controller robust_mpc"),
+    ],
+)
+def test_a_table_that_the_controller_does_not_read_is_refused(controller, table, expected):
+    name = table[1 : table.index("]")]
+    said = refusal(f'controller = "{controller}"\n{CASE1}\n{table}\n')
+    assert f"{name}: {controller} does not read it, expected {expected}" in said

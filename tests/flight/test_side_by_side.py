@@ -1,0 +1,130 @@
+"""Flights side by side: each has the bits that it has alone, whatever flies in the other lanes."""
+
+from dataclasses import replace
+from itertools import cycle
+
+import numpy as np
+import pytest
+from flights import components
+
+from hsv.core import lanes
+from hsv.flight.campaign.campaign import plan
+from hsv.flight.campaign.sample_runner import SampleRunner
+from hsv.flight.closed_loop import fly
+from hsv.flight.metrics import flight_metrics
+from hsv.flight.side_by_side import FlightGroup, fly_group
+
+WIDTH = lanes()
+SHORT = 112.0
+
+pytestmark = pytest.mark.skipif(WIDTH == 1, reason="this processor flies one at a time")
+
+
+def check(flights):
+    """Check that these flights are the same side by side and alone; return them alone."""
+    assert FlightGroup.takes(flights)
+    alone = [fly(own) for own in flights]
+    for together, own in zip(fly_group(FlightGroup(flights[0].plant.steps + 1), flights), alone, strict=True):
+        assert together.fingerprint == own.fingerprint
+        assert together.status == own.status and len(together.time) == len(own.time)
+        for name, column in own.history.columns().items():
+            assert np.array_equal(together.history.columns()[name], column, equal_nan=True), name
+        assert together.metrics == own.metrics
+    return alone
+
+
+@pytest.mark.parametrize(
+    "scenario", ["case1", "case2", "case1_smooth", "case1_integral_heavy", "case1_governed", "case1_active"]
+)
+def test_corners_of_a_scenario_are_the_same_in_every_lane(scenario):
+    names = ("mass", "moment_of_inertia", "lift_alpha", "moment_elevator", "natural_frequency_1")
+    random = np.random.default_rng(3)
+    parts = components(scenario, duration=SHORT)
+    corners = [dict(zip(names, random.uniform(-0.1, 0.1, len(names)), strict=True)) for _ in range(WIDTH)]
+    flown = check([parts.perturbed(corner) for corner in corners])
+    assert len({own.fingerprint for own in flown}) == WIDTH
+
+
+def test_fewer_flights_than_lanes_are_the_same():
+    parts = components("case1", duration=5.0)
+    check([parts.perturbed({"mass": 0.01 * i}) for i in range(2)])
+
+
+def test_a_flight_that_diverges_ends_alone_and_disturbs_no_other():
+    parts = components("case1", duration=20.0)
+    flown = check([parts.perturbed({"moment_elevator": -0.85 if i in (1, WIDTH - 1) else 0.0}) for i in range(WIDTH)])
+    lengths = [len(own.time) for own in flown]
+    assert lengths[1] == lengths[-1] < lengths[0] == 1001
+    assert all(length == 1001 for i, length in enumerate(lengths) if i not in (1, WIDTH - 1))
+
+
+COMMAND_FAULTS = (
+    ("loss_of_effectiveness", "effectiveness=0.9"),
+    ("loss_of_effectiveness", "effectiveness=0.8,ramp_time=1.0,random_on=0.3,random_off=0.2"),
+    ("delay", "steps=2"),
+    ("dead_zone", "width=0.002"),
+    ("backlash", "width=0.002,intermittent_period=0.6"),
+    ("loss_of_effectiveness", "effectiveness=0.7,random_on=0.1,random_off=0.4"),
+    ("dead_zone", "width=0.001"),
+    ("loss_of_effectiveness", "effectiveness=0.5"),
+)
+
+
+def test_faults_on_the_command_begin_and_act_in_each_lane_on_their_own():
+    changes = [
+        {"seed": 100 + i, "fault__starts": [2.0 + 0.5 * i], "fault__types": [kind], "fault__parameters": [text]}
+        for i, (kind, text) in zip(range(WIDTH), cycle(COMMAND_FAULTS), strict=False)
+    ]
+    flown = check([components("case1", duration=12.0, **change) for change in changes])
+    assert len({own.fingerprint for own in flown}) == WIDTH
+
+
+def test_beginnings_references_and_factors_of_the_gain_may_differ():
+    flights = [
+        components(
+            "case2",
+            duration=30.0,
+            feedback__tau=[0.9 + 0.005 * i],
+            initial__altitude=26060.4 + i,
+            reference__times=[0.0, 10.0 + i],
+            reference__altitudes=[26100.0, 26243.28],
+            reference__velocities=[2410.0 + i, 2484.12],
+        )
+        for i in range(WIDTH)
+    ]
+    check(flights)
+
+
+@pytest.mark.parametrize("scenario", ["case1_realistic", "case1_hard_sensors", "case1_active"])
+def test_equipment_and_its_noise_are_each_lanes_own(scenario):
+    parts = components(scenario, duration=20.0)
+    flights = []
+    for i in range(WIDTH):
+        plant = parts.plant.varied(parts.plant.vehicle.perturbed({"mass": 0.01 * i}), 100 + i)
+        flights.append(replace(parts, plant=plant, fault_injector=parts.fault_injector.with_seed(100 + i)))
+    assert len({own.fingerprint for own in check(flights)}) == WIDTH
+
+
+@pytest.mark.parametrize("scenario", ["case1_qp", "case1_kothare_online"])
+def test_laws_that_solve_in_flight_are_not_taken(scenario):
+    parts = components(scenario, duration=1.0)
+    assert not FlightGroup.takes([parts, parts.perturbed({"mass": 0.05})])
+
+
+def test_flights_of_different_lengths_or_designs_are_not_taken():
+    first = components("case1", duration=1.0)
+    assert not FlightGroup.takes([first, components("case1", duration=2.0)])
+    assert not FlightGroup.takes([first, components("case1_smooth", duration=1.0)])
+    assert not FlightGroup.takes([first])
+
+
+def test_a_campaign_flies_its_samples_as_each_alone():
+    campaign = plan("case2", method="sobol", samples=2 * WIDTH, factors={"tube.tau": (0.9, 1.0)})
+    runner = SampleRunner(campaign)
+    flights = range(2 * WIDTH)
+    samples, _ = runner.sampler.draw(flights)
+    for flight, sample, flown in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
+        alone = runner.fly(flight, sample)
+        assert flown.fingerprint == alone.fingerprint
+        assert flown.level == runner.level(alone.data())
+        assert flight_metrics(flown.curves) == alone.metrics

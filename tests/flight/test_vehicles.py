@@ -1,0 +1,178 @@
+"""Flights of other vehicles: named in a scenario, read from beside it, taken along, not taken for certified."""
+
+import shutil
+import tomllib
+
+import numpy as np
+import pytest
+import tomli_w
+
+from hsv.base.errors import ScenarioError
+from hsv.control.tube_law import TubeStatusCode
+from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
+from hsv.flight.blocks import steps
+from hsv.flight.campaign.factors import factors_of, flown_table
+from hsv.flight.closed_loop import fly
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
+from hsv.model.vehicle import load_vehicle
+
+SHORT = {"duration": "4 s", "fault[0].start": "2 s", "limits": {}}
+
+MINE = """extends = "stiffened"
+[rigid_body]
+mass = { value = "4600 kg", uncertainty = "5 %" }
+[geometry]
+thrust_moment_arm = { uncertainty = "2 %" }
+[lift]
+lift_alpha = { uncertainty = "4 %" }
+[envelope]
+velocity = { minimum = "2350 m/s", maximum = "2600 m/s" }
+[inertial_coupling.measured]
+inertial_coupling_1 = { value = "-150 kg^0.5 m" }
+inertial_coupling_2 = { value = "110 kg^0.5 m" }
+"""
+
+FLIGHT = 'extends = "case1"\ntitle = "mine"\nvehicle = "{}"\n'
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A vehicle beside a scenario that names it."""
+    (tmp_path / "mine.toml").write_text(MINE)
+    (tmp_path / "flight.toml").write_text(FLIGHT.format("mine.toml"))
+    return tmp_path
+
+
+def test_the_default_vehicle_by_name_is_the_flight_of_the_scenario_that_names_none():
+    named, plain = (fly(assemble_flight(load_scenario("case1", SHORT | c))) for c in ({"vehicle": "parker"}, {}))
+    assert named.fingerprint == plain.fingerprint
+
+
+def test_a_vehicle_beside_its_scenario_is_flown_from_any_folder_and_taken_along(folder, monkeypatch):
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    scenario = load_scenario(str(folder / "flight.toml"), SHORT)
+    text = scenario_text(str(folder / "flight.toml"))
+    flight = fly(assemble_flight(scenario))
+    shutil.move(folder / "mine.toml", folder / "gone.toml")
+    assert str(folder) not in text
+    taken = parse_scenario(text, "flight")
+    assert (
+        taken.vehicle.described.digest
+        == scenario.vehicle.described.digest
+        not in ("", load_vehicle("stiffened").digest)
+    )
+    assert taken.vehicle.name == "mine" and taken.vehicle.described.decoupled.mass == 4600.0
+    assert flight.fingerprint != fly(assemble_flight(load_scenario("case1", SHORT))).fingerprint
+    # Flat parameters, which a bag keeps, repeat the flight.
+    assert fly(assemble(flight_parameters(scenario))).fingerprint == flight.fingerprint
+    with pytest.raises(ScenarioError, match=r"scenario 'flight': vehicle '.*mine.toml': cannot be read \(No such file"):
+        load_scenario(str(folder / "flight.toml"))
+
+
+def test_a_vehicle_that_is_named_replaces_that_of_the_scenario_before(folder):
+    (folder / "next.toml").write_text('extends = "flight.toml"\ntitle = "next"\nvehicle = "stiffened"\n')
+    (folder / "other.toml").write_text('extends = "flight.toml"\ntitle = "other"\n[vehicle]\ncoupling = "measured"\n')
+    following, other = (load_scenario(str(folder / f"{name}.toml")).vehicle for name in ("next", "other"))
+    assert following.described.digest == load_vehicle("stiffened").digest and following.definition == {}
+    assert (other.name, other.coupling, other.described.decoupled.mass) == ("mine", "measured", 4600.0)
+    (folder / "written.toml").write_text(scenario_text(str(folder / "flight.toml")))
+    (folder / "last.toml").write_text('extends = "written.toml"\ntitle = "last"\nvehicle = "parker"\n')
+    assert load_scenario(str(folder / "last.toml")).vehicle.described.digest == ""
+
+
+def test_envelope_and_uncertainty_are_those_of_the_vehicle(folder):
+    path = str(folder / "flight.toml")
+    assert load_scenario(path, {"initial.velocity": "2595 m/s", "command": []}).initial.velocity == 2595.0
+    with pytest.raises(ScenarioError, match=r"initial.velocity = '7700 ft/s': expected 7710 ft/s to 8530 ft/s, the"):
+        load_scenario(path, {"initial.velocity": "7700 ft/s"})
+    with pytest.raises(ScenarioError, match=r"command\[0\].altitude_change leads to 87100 ft at 0 s: .* to 87000 ft"):
+        load_scenario(path, {"command[0].altitude_change": "1600 ft"})
+    assert load_scenario(path, {"vehicle.perturbation.lift_alpha": "4 %"}).vehicle.perturbation == {"lift_alpha": 0.04}
+    with pytest.raises(ScenarioError, match=r"vehicle.perturbation.gravity = 0.04: no such parameter, expected one of"):
+        load_scenario(path, {"vehicle.perturbation.gravity": "4 %"})
+    with pytest.raises(ScenarioError, match=r"vehicle.perturbation.lift_alpha = 0.04: no such parameter"):
+        load_scenario("case1", {"vehicle.perturbation.lift_alpha": "4 %"})
+    bounds = {factor.name: factor.high for factor in factors_of(tomllib.loads(scenario_text(path)), "flight", 1.0)}
+    assert bounds["mass"] == 0.05 and bounds["thrust_moment_arm"] == 0.02 and bounds["lift_alpha"] == 0.04
+
+
+def test_a_sampled_scenario_takes_its_vehicle_along(folder):
+    table = tomllib.loads(scenario_text(str(folder / "flight.toml")))
+    table["vehicle"]["coupling"] = {"uniform": [0.2, 0.65]}
+    (folder / "mine.toml").unlink()
+    factors = factors_of(table, "flight", 1.0)
+    for end, coupling in (("low", "0.2"), ("high", "0.65")):
+        text = tomli_w.dumps(flown_table(table, "flight", factors, [getattr(factor, end) for factor in factors], 0))
+        sampled = parse_scenario(text, "sampled").vehicle
+        assert sampled.described.decoupled.mass == 4600.0 and sampled.coupling == coupling
+        assert abs(sampled.perturbation["mass"]) == 0.05
+
+
+def test_a_number_couples_as_the_set_it_is():
+    by_name = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": "derived"}))
+    by_number = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": 1}))
+    assert by_name.plant.vehicle == by_number.plant.vehicle
+    assert fly(by_name).fingerprint == fly(by_number).fingerprint
+    stronger = assemble_flight(load_scenario("case1", SHORT | {"vehicle.coupling": 0.65})).plant.vehicle
+    assert stronger.inertial_coupling_1 == 0.65 * by_name.plant.vehicle.inertial_coupling_1
+
+
+@pytest.mark.parametrize(
+    ("design", "changes", "status"),
+    [
+        ("baseline", {}, TubeStatusCode.OK),
+        ("baseline", {"vehicle.coupling": 0.65}, TubeStatusCode.UNCERTIFIED_VEHICLE),
+        ("baseline", {"vehicle": "stiffened"}, TubeStatusCode.UNCERTIFIED_VEHICLE),
+        ("stiffened", {"vehicle": "stiffened"}, TubeStatusCode.OK),
+        ("stiffened", {}, TubeStatusCode.UNCERTIFIED_VEHICLE),
+    ],
+)
+def test_a_tube_is_certified_for_its_own_vehicle(design, changes, status):
+    parts = assemble_flight(load_scenario("case1", SHORT | {"design": design} | changes))
+    assert next(steps(parts)).diagnostics.status is status
+
+
+def test_input_limits_are_those_of_the_vehicle(folder):
+    (folder / "mine.toml").write_text(
+        MINE + '[input_limits]\nelevator_deflection = { minimum = "5 deg", maximum = "13 deg" }\n'
+    )
+    (folder / "hard.py").write_text(
+        "class Hard:\n"
+        "    PARAMETERS = ()\n"
+        "    @classmethod\n"
+        "    def from_parameters(cls, values, design):\n"
+        "        return cls()\n"
+        "    def reset(self):\n"
+        "        pass\n"
+        "    def step(self, inputs):\n"
+        "        return inputs.reference_input[0], 1.0\n"
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        own = SHORT | {"controller": "hard:Hard", "design": "", "duration": "0.2 s", "fault": []}
+        flight = fly(assemble_flight(load_scenario(str(folder / "flight.toml"), own)))
+    assert np.all(flight.history.command[:, 1] == np.radians(13.0))
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "message"),
+    [
+        ('vehicle = "parkr"', "vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file (did you"),
+        ("vehicle = 3", "vehicle = 3: expected a name, a path, or a table"),
+        ("[vehicle]\nname = 3", "vehicle.name = 3: expected a name or a path"),
+        ("[vehicle]\ndefinition = 3", "vehicle.definition = 3: expected the tables of a vehicle file"),
+        ("[vehicle]\ndefinition = { wings = 2 }", "vehicle 'parker': wings: unknown field, expected one of title"),
+        ("[vehicle]\ncoupling = { uniform = [-1, 1] }", "vehicle.coupling = -1.0: expected one of paper_like, derived"),
+        (
+            f"[vehicle]\ncoupling = 1{400 * '0'}",
+            f"vehicle.coupling = 1{400 * '0'}: expected one of paper_like, derived, or",
+        ),
+        ("[vehicle]\ncoupling = -1", "vehicle.coupling = -1: expected one of paper_like, derived, or a multiple of"),
+    ],
+)
+def test_a_wrong_vehicle_is_named(tmp_path, vehicle, message):
+    (tmp_path / "mine.toml").write_text(f'extends = "case1"\ntitle = "mine"\n{vehicle}\n')
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(str(tmp_path / "mine.toml"))
+    assert str(caught.value).startswith(f"scenario 'mine': {message}")

@@ -1,0 +1,183 @@
+import json
+import math
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hsv.cli.claims import _as_json
+
+from hsv.flight.assembly import flight_parameters
+from hsv.flight.corners import corners
+from hsv.flight.scenario import load_scenario
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.claims import tracking
+from hsv_paper.claims.catalogue import GROUPS, judge
+from hsv_paper.claims.claim import Judged
+from hsv_paper.claims.evidence import Evidence, nominal, worst
+from hsv_paper.claims.finding import Finding, Reading, Verdict, shown
+from hsv_paper.claims.page import page
+from hsv_paper.claims.ranking import METRICS, Rank, ranking
+
+CLAIMS = [claim for claims in GROUPS.values() for claim in claims]
+PUBLISHED = (Path(__file__).parents[2] / "docs" / "claims.md").read_text(encoding="utf-8")
+OVER_VEHICLES = re.compile(r"corner|vehicles|flights")
+"""What is read of all vehicles, of which the tests fly few: what is published is at least as bad."""
+NOISE = 1e-8
+"""In the page's units: smaller numbers are rounding, and differ between processors."""
+
+
+class Row(NamedTuple):
+    """A reading as the page has it: whether it is of the statement itself, numbers in the page's units, its yes."""
+
+    what: str
+    leads: bool
+    measured: float
+    threshold: float
+    kept: bool
+
+
+def number(text):
+    """Return the number in a cell: 'at most 0.5 deg', 'unbounded'."""
+    found = re.search(r"-?\d[\d.]*(e[-+]?\d+)?", text)
+    return float(found[0]) if found else math.inf
+
+
+def published(claim, text=PUBLISHED):
+    """Return the verdict that a page prints of a claim, and its rows."""
+    section = text.split(f"\n### {claim.name[0].upper()}{claim.name[1:]}\n")[1].split("\n## ")[0].split("\n### ")[0]
+    verdict = re.search(r"\. \*\*(.*?)\.\*\*", section)[1].lower()
+    cells = [re.split(r"(?<!\\) \| ", line.strip("| ")) for line in section.splitlines() if line.startswith("| ")][2:]
+    rows = [
+        Row(what.strip("*"), what.startswith("**"), number(measured), number(threshold), kept == "yes")
+        for what, *_, measured, threshold, kept in cells
+    ]
+    return verdict, rows
+
+
+@pytest.fixture(scope="module")
+def evidence(tmp_path_factory):
+    """On the nominal vehicle and two corners: one at which robust MPC is lost with each gain beyond the fourth."""
+    over = corners(load_vehicle().uncertainty)
+    return Evidence(tmp_path_factory.mktemp("evidence"), over=[over[0], over[36], over[-1]])
+
+
+def finding(*values, leading=1):
+    readings = tuple(Reading(f"reading {i}", value, "1", at_most=1.0) for i, value in enumerate(values))
+    return Finding(readings, "why", leading)
+
+
+def test_there_are_twenty_claims_and_more_each_quoted_once():
+    assert len(CLAIMS) >= 20
+    assert len({claim.name for claim in CLAIMS}) == len(CLAIMS)
+    for claim in CLAIMS:
+        assert len(claim.quote) > 20
+        assert claim.location
+
+
+def test_the_verdict_follows_from_the_readings():
+    assert finding(0.5, 1.0).verdict is Verdict.HOLDS
+    assert finding(0.5, 1.1).verdict is Verdict.CONDITIONS
+    assert finding(1.1, 0.5).verdict is Verdict.FAILS
+    assert finding(0.5, 1.1, 0.5, leading=2).verdict is Verdict.FAILS
+    assert finding(0.5, 0.5, 1.1, leading=2).verdict is Verdict.CONDITIONS
+    assert finding(math.nan).verdict is Verdict.FAILS
+    assert Reading("x", 1.0, "1", at_least=1.0).holds
+    assert not Reading("x", 0.9, "1", at_least=1.0).holds
+
+
+def test_numbers_are_shown_in_the_paper_s_units():
+    assert shown(0.3048, "m") == "1 ft"
+    assert shown(math.pi / 360.0, "rad") == "0.5 deg"
+    assert shown(math.inf, "s") == "not by the end"
+    assert shown(math.inf, "1") == "unbounded"
+    assert shown(math.nan, "s") == "not defined"
+    assert Reading("x", 0.0, "rad", at_most=math.pi / 360.0).threshold() == "at most 0.5 deg"
+    assert Reading("x", 0.0, "dB", at_least=20.0).threshold() == "at least 20 dB"
+
+
+def test_a_lost_flight_has_no_worst_value():
+    assert worst({"x": np.array([1.0, -3.0])}, "x") == 3.0
+    assert worst({"x": np.array([1.0, np.nan])}, "x") == math.inf
+    assert nominal({"x": np.array([1.0, 2.0])}, "x") == 1.0
+
+
+def test_the_page_holds_every_claim_and_the_ranking():
+    judged = {group: [Judged(claim, finding(0.5, 2.0)) for claim in claims] for group, claims in GROUPS.items()}
+    ranks = {metric: {"tube": Rank(1.0, 2.0, 1, 1)} for metric in METRICS}
+    text = page(judged, ranks)
+    for claim in CLAIMS:
+        assert f"> {claim.quote}" in text
+    assert f"Of {len(CLAIMS)} claims, 0 hold, {len(CLAIMS)} hold under conditions, and 0 do not hold." in text
+    assert all(what in text for what, _ in METRICS.values())
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+def test_every_claim_is_measured_and_says_why(claim, evidence):
+    result = claim.measure(evidence)
+    assert 1 <= result.leading <= len(result.readings)
+    assert len(result.why) > 20
+    assert len({(r.what, r.threshold(), r.actuators) for r in result.readings}) == len(result.readings)
+    for reading in result.readings:
+        # Infinite is what grows without bound or has not decayed by the end, and is shown as that.
+        assert not math.isnan(reading.value), reading.what
+    json.dumps(_as_json("group", Judged(claim, result)))
+    verdict, rows = published(claim)
+    assert [row.leads for row in rows] == [i < result.leading for i in range(len(result.readings))]
+    for reading, row in zip(result.readings, rows, strict=True):
+        assert row.kept == reading.holds or OVER_VEHICLES.search(row.what), row.what
+        measured, threshold = number(reading.measured()), number(reading.threshold())
+        if not OVER_VEHICLES.search(row.what):
+            assert row.measured == pytest.approx(measured, rel=2e-3, abs=NOISE), row.what
+            assert row.threshold == pytest.approx(threshold, rel=2e-3, abs=NOISE), row.what
+        elif "with notch relative to without" in row.what:
+            continue  # a quotient of two worst vehicles: with more of them it may grow or fall
+        elif reading.at_most is not None:
+            assert row.measured >= measured * (1.0 - math.copysign(2e-3, measured)) - NOISE, row.what
+        else:
+            assert row.measured <= measured * (1.0 + math.copysign(2e-3, measured)) + NOISE, row.what
+    if not any(OVER_VEHICLES.search(row.what) for row in rows):
+        assert verdict == result.verdict
+
+
+def test_the_robust_mpc_that_is_flown_has_the_tightest_gain_that_loses_none(evidence):
+    lost = tracking.losses(evidence)
+    assert (
+        min(lost) == tracking.FLOWN_GAIN == flight_parameters(load_scenario(tracking.FAMILY))["robust_mpc.gain_index"]
+    )
+    assert lost.pop(tracking.FLOWN_GAIN) == 0
+    assert all(lost.values())
+
+
+def test_the_page_of_the_docs_holds_these_claims():
+    headings = re.findall(r"^### (.*)\n> (.*)\n\n(.*?)\. \*\*", PUBLISHED, flags=re.MULTILINE)
+    assert headings == [(claim.name[0].upper() + claim.name[1:], claim.quote, claim.location) for claim in CLAIMS]
+
+
+def test_published_verdicts_follow_from_the_published_readings():
+    verdicts = [published(claim)[0] for claim in CLAIMS]
+    for claim, verdict in zip(CLAIMS, verdicts, strict=True):
+        rows = published(claim)[1]
+        kept = [row.kept for row in rows if row.leads], [row.kept for row in rows]
+        assert kept[0]
+        assert verdict == (
+            "does not hold" if not all(kept[0]) else "holds" if all(kept[1]) else "holds under conditions"
+        )
+        assert f"| {claim.name} | {claim.location} | {verdict} |" in PUBLISHED
+    counts = [verdicts.count(verdict) for verdict in Verdict]
+    said = "Of {} claims, {} hold, {} hold under conditions, and {} do not hold."
+    assert said.format(len(CLAIMS), *counts) in PUBLISHED
+
+
+@pytest.mark.long
+def test_the_page_of_the_docs_is_what_all_vehicles_give(tmp_path):
+    evidence = Evidence(tmp_path)
+    text = page(judge(evidence), ranking(evidence))
+    for claim in CLAIMS:
+        (verdict, rows), (published_verdict, published_rows) = published(claim, text), published(claim)
+        assert verdict == published_verdict, claim.name
+        assert [row.what for row in rows] == [row.what for row in published_rows]
+        for row, other in zip(rows, published_rows, strict=True):
+            assert (row.leads, row.threshold, row.kept) == (other.leads, other.threshold, other.kept), row.what
+            assert row.measured == pytest.approx(other.measured, rel=2e-3, abs=NOISE), row.what

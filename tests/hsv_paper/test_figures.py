@@ -1,0 +1,123 @@
+import re
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+
+from hsv.base.units import to_paper
+from hsv.control.notch_filter import notch_response
+from hsv.flight.scenario import load_scenario, scenario_names
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.figures import case1
+from hsv_paper.figures.catalogue import FIGURES
+from hsv_paper.figures.figure import Material
+from hsv_paper.figures.page import page
+from hsv_paper.figures.readings import gain_switches, in_words
+from hsv_paper.figures.style import RC, save
+from hsv_paper.flights import Flights
+
+PAGES = Path(__file__).parents[2] / "docs/figures"
+
+NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+@pytest.fixture(scope="module")
+def flights(tmp_path_factory):
+    return Flights(tmp_path_factory.mktemp("flights"), graph=False)
+
+
+@pytest.fixture(scope="module")
+def draw(flights):
+    """Each figure is drawn once; the flights in process are those of the graph, bit for bit."""
+
+    @cache
+    def drawn(number):
+        with matplotlib.rc_context(RC):
+            return FIGURES[number].draw(Material(flights))
+
+    return drawn
+
+
+def test_the_catalogue_is_in_the_paper_s_order_and_flies_shipped_scenarios():
+    assert list(FIGURES) == sorted(FIGURES)
+    for number, figure in FIGURES.items():
+        assert figure.number == number
+        assert set(figure.scenarios) <= set(scenario_names())
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_a_figure_is_written_as_pdf_and_png_of_bearable_size_with_its_page(number, draw, tmp_path):
+    figure, drawing = FIGURES[number], draw(number)
+    pdf, png = save(drawing.figure, tmp_path / figure.stem)
+    assert pdf.read_bytes().startswith(b"%PDF")
+    assert pdf.stat().st_size < 600_000
+    assert png.read_bytes().startswith(b"\x89PNG")
+    for axis in drawing.figure.axes:
+        assert axis.get_lines()
+    text = page(figure, drawing)
+    assert f"({figure.stem}.png)" in text
+    assert figure.caption in text
+    assert all(f"hsv run {name}`" in text for name in figure.scenarios)
+    assert "nan" not in text
+    assert "^" not in text.replace("(omega_p/omega_z)^2", "")
+
+
+@pytest.mark.parametrize("number", FIGURES)
+def test_the_page_in_the_docs_says_what_the_drawing_says(number, draw):
+    figure = FIGURES[number]
+    ours = page(figure, draw(number))
+    theirs = (PAGES / f"{figure.stem}.md").read_text(encoding="utf-8")
+    assert NUMBER.sub("#", theirs) == NUMBER.sub("#", ours)
+    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (theirs, ours)]
+    assert numbers[0] == pytest.approx(numbers[1], rel=0.02)  # the last digit of two
+
+
+def test_the_docs_hold_a_page_and_a_picture_of_every_figure_and_no_other():
+    for ending in ("md", "png"):
+        assert {path.stem for path in PAGES.glob(f"figure_*.{ending}")} == {figure.stem for figure in FIGURES.values()}
+
+
+def test_every_sample_of_a_flight_is_drawn(flights, draw):
+    flight = flights["case1_no_notch"]
+    whole, closer = draw(13).figure.axes[2:]
+    for axis, (start, end) in ((whole, (0.0, 200.0)), (closer, closer.get_xlim())):
+        inside = (flight.time >= start) & (flight.time <= end)
+        rate = [to_paper(value, "kg^0.5 m/s")[0] for value in flight.state[inside, 8]]
+        assert axis.get_lines()[0].get_ydata() == pytest.approx(rate)
+
+
+def test_the_limits_of_the_inputs_are_drawn_where_they_are_near(draw):
+    def levels(axis):
+        return {float(line.get_ydata()[0]) for line in axis.get_lines() if len(line.get_ydata()) == 2}
+
+    fuel, _, elevator, _ = draw(12).figure.axes
+    assert {0.0, 1.5} <= levels(fuel)
+    assert 30.0 in {round(level, 9) for level in levels(elevator)}
+    assert elevator.get_ylim()[0] > -30.0
+    assert draw(17).figure.axes[0].get_ylim()[1] < 1.0
+
+
+def test_the_conditions_of_case_1_are_those_flown():
+    scenario, bounds = load_scenario(case1.NOTCH[0]), load_vehicle().uncertainty
+    assert {name: abs(change) for name, change in scenario.vehicle.perturbation.items()} == pytest.approx(
+        {name: 0.5 * bound for name, bound in bounds.items()}
+    )
+    assert (scenario.vehicle.perturbation["mass"], scenario.vehicle.perturbation["moment_of_inertia"]) == (0.05, -0.05)
+
+
+def test_gain_switches_are_where_the_index_changes(flights):
+    flight = flights["case1"]
+    steps = gain_switches(flight)
+    assert list(flight.gain_index[steps] - flight.gain_index[steps - 1]) == [1.0] * len(steps)
+    assert flight.gain_index[-1] == flight.gain_index[0] + len(steps)
+    assert in_words([1.2, 2.0, 3.4]) == "1, 2 and 3"
+    assert in_words([1.2]) == "1"
+
+
+def test_the_notch_takes_out_its_centre_and_passes_the_rest(flights):
+    [section] = Material(flights).design("baseline").flown.notch
+    centre, low, high = np.abs(notch_response([section], np.array([section.zero_frequency, 1e-3, 1e4])))
+    assert centre == pytest.approx(section.zero_damping / section.pole_damping)
+    assert (low, high) == pytest.approx((1.0, 1.0), abs=1e-3)

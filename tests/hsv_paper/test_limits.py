@@ -1,0 +1,241 @@
+"""Fastest transfer and deepest fault by optimal control; the page has the numbers that the long tests recompute."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import DesignError
+from hsv.flight import comparison
+from hsv.flight.assembly import assemble_flight
+from hsv.flight.closed_loop import fly
+from hsv.flight.comparison import settling_times
+from hsv.flight.corners import corners
+from hsv.flight.governed import governed
+from hsv.flight.scenario import parse_scenario
+from hsv.model.dynamics import advance
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
+from hsv_paper.limits import optimum
+from hsv_paper.limits.optimum import (
+    INPUT_SCALE,
+    STATE_SCALE,
+    curvatures,
+    defects,
+    finer,
+    solve,
+    transitions,
+)
+from hsv_paper.limits.recovery import (
+    PERIOD,
+    at_trim,
+    envelope_points,
+    held_periods,
+    recovery,
+    static_limit,
+    turning_limit,
+)
+from hsv_paper.limits.replay import fly_optimum
+from hsv_paper.limits.study import (
+    BLEND,
+    PERIODS,
+    deepest_fault,
+    fastest_transfer,
+    least_survived,
+    needed_effectiveness,
+)
+from hsv_paper.limits.transfer import straight, time_bound, transfer
+from hsv_paper.linear_loop import START, TARGET
+from hsv_paper.sensitivity.catalogue import STUDIES, page
+
+ROOT = Path(__file__).parents[2]
+ENVELOPE = load_vehicle()
+VEHICLE = ENVELOPE.coupled("paper_like")
+HORIZON = 8.0
+
+
+def disturbed(count, seed=1):
+    """States (count, 9) and inputs (count, 2) about the trim, and periods (s) with their substeps."""
+    random = np.random.default_rng(seed)
+    point = trim(VEHICLE, *TARGET)
+    state = point.state + random.uniform(-1.0, 1.0, (count, 9)) * STATE_SCALE
+    inputs = point.input + random.uniform(-1.0, 1.0, (count, 2)) * INPUT_SCALE
+    return state, inputs, random.uniform(0.02, 0.1, count), random.integers(2, 10, count)
+
+
+def test_transitions_are_those_of_the_flights_integrator_with_its_derivatives():
+    state, inputs, period, substeps = disturbed(4)
+    end, slope = transitions(state, inputs, period, substeps, VEHICLE)
+    for k in range(4):
+        x = advance(state[k], inputs[k], VEHICLE, period[k], int(substeps[k]))
+        assert end[k] == pytest.approx(x, rel=1e-14, abs=1e-14)
+    for j, size in enumerate((*STATE_SCALE, *INPUT_SCALE, 0.02)):
+        reach = 1e-4 * size
+        change = np.zeros(12)
+        change[j] = reach
+        above, below = (
+            transitions(state + s * change[:9], inputs + s * change[9:11], period + s * change[11], substeps, VEHICLE)[
+                0
+            ]
+            for s in (1.0, -1.0)
+        )
+        difference = (above - below) / (2.0 * reach)
+        assert size * slope[:, :, j] / STATE_SCALE == pytest.approx(size * difference / STATE_SCALE, abs=1e-6)
+
+
+def test_curvature_is_the_change_of_the_derivatives():
+    state, inputs, period, substeps = disturbed(3)
+    weights = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 9)) / STATE_SCALE
+    found = curvatures(state, inputs, period, substeps, VEHICLE, weights)
+    assert found == pytest.approx(found.transpose(0, 2, 1))
+    scale = np.array([*STATE_SCALE, *INPUT_SCALE, 0.02])
+    for j in (2, 4, 9, 10, 11):
+        change = np.zeros(12)
+        change[j] = 1e-3 * scale[j]
+        above, below = (
+            transitions(state + s * change[:9], inputs + s * change[9:11], period + s * change[11], substeps, VEHICLE)[
+                1
+            ]
+            for s in (1.0, -1.0)
+        )
+        difference = np.einsum("ki,kij->kj", weights, above - below) / (2.0 * change[j])
+        curved = [0, 1, 2, 3, 4, 9, 10, 11]
+        assert (found[:, j] * scale * scale[j])[:, curved] == pytest.approx(
+            (difference * scale * scale[j])[:, curved], abs=1e-6
+        )
+
+
+def test_a_finer_mesh_keeps_states_and_inputs():
+    point = straight(transfer(VEHICLE, 10, settling=False), 12.0)
+    fine = finer(point, 3)
+    assert np.array_equal(fine.state[::3], point.state)
+    assert np.array_equal(fine.input[1::3], point.input)
+    assert fine.state[0, :2] == pytest.approx(START) and fine.state[-1, :2] == pytest.approx(TARGET)
+
+
+def test_the_deepest_fault_known_after_a_fifth_of_a_second():
+    """The optimum is where full elevator without fuel just turns the nose: to the resolution of the bisection."""
+    problem = recovery(VEHICLE, ENVELOPE, 0.2, HORIZON)
+    found = solve(problem, at_trim(problem), 1e-4)
+    assert found.scalar == pytest.approx(turning_limit(VEHICLE, 0.2), abs=2e-4)
+    assert np.abs(defects(problem, found)).max() < optimum.DEFECT
+    low, high = problem.inputs.at(found.scalar)
+    assert np.all(found.input >= low - 1e-8) and np.all(found.input <= high + 1e-8)
+
+    held, kept = np.array(held_periods(HORIZON)), round(0.2 / PERIOD)
+    flown = fly_optimum(problem, found, held, 5.0, found.scalar + 1e-3, kept)
+    assert flown.finished and flown.deviation(HORIZON) < 1e-3
+    assert np.all(flown.command >= VEHICLE.input_minimum) and np.all(flown.command <= VEHICLE.input_maximum)
+    assert np.all(flown.command[:kept] == trim(VEHICLE, *TARGET).input)
+    assert np.array_equal(flown.replayed(), flown.state)
+    # With 0.01 less the same inputs lose the vehicle.
+    lost = fly_optimum(problem, found, held, 5.0, found.scalar - 1e-2, kept)
+    assert not lost.finished and lost.deviation() == np.inf
+
+
+def test_an_iteration_that_ends_early_is_refused(monkeypatch):
+    monkeypatch.setattr(optimum, "_ITERATIONS", 2)
+    problem = recovery(VEHICLE, ENVELOPE, 0.2, 2.0)
+    with pytest.raises(DesignError, match="optimal control: after 2 iterations the largest defect"):
+        solve(problem, at_trim(problem))
+
+
+def test_static_limits_are_those_of_trims():
+    """At the target as printed in the issue, 0.41; the fastest and lowest point of the envelope needs least."""
+    at_target = static_limit(VEHICLE, np.array([TARGET]))
+    assert at_target == pytest.approx(0.4064, abs=1e-4)
+    points = envelope_points(ENVELOPE)
+    assert len(points) == 9
+    best = min(points, key=lambda point: static_limit(VEHICLE, point[None]))
+    assert best == pytest.approx([ENVELOPE.altitude_range[0], ENVELOPE.velocity_range[1]])
+    assert static_limit(VEHICLE, points) == static_limit(VEHICLE, best[None]) < at_target
+    # No trim at a velocity that no fuel gives.
+    assert static_limit(VEHICLE, np.array([[TARGET[0], 3.0 * TARGET[1]]])) == np.inf
+
+
+def test_each_delay_costs_effectiveness():
+    limits = [turning_limit(VEHICLE, delay) for delay in (0.0, 0.1, 0.2, 0.3)]
+    assert np.all(np.diff(limits) > 0.03)
+    assert limits[1:3] == pytest.approx([0.4114, 0.4576], abs=2e-4)
+
+
+@pytest.mark.long
+def test_the_fastest_transfers_of_the_page():
+    """Another first guess and mesh change the times by less than 0.1 %; flown, they are what was computed."""
+    rest = fastest_transfer(VEHICLE, PERIODS, settling=False)
+    assert rest.time == pytest.approx(10.626, abs=2e-3)
+    assert rest.coarser == pytest.approx(rest.time, rel=1e-3)
+    assert rest.flown.finished and rest.flown.deviation() < 1e-6
+    assert np.array_equal(rest.flown.replayed(), rest.flown.state)
+    assert rest.time * 0.9 < time_bound(VEHICLE) < rest.time
+    other = transfer(VEHICLE, 50, settling=False)
+    assert solve(other, straight(other, 30.0), 1e-4).scalar == pytest.approx(rest.time, rel=2e-3)
+
+    settled = fastest_transfer(VEHICLE, PERIODS, settling=True)
+    assert settled.time == pytest.approx(10.0125, abs=2e-3)
+    assert round(settled.time, 2) == comparison.LEAST_TIME
+    inside = settled.flown.state[settled.flown.time >= settled.time - 1e-9, :2]
+    step = np.subtract(TARGET, START)
+    assert np.all(np.abs(inside - TARGET) <= 0.02 * np.abs(step) * (1.0 + 1e-6))
+    longer = transfer(VEHICLE, 50, settling=True, rest=0.8)
+    assert solve(longer, straight(longer, 15.0), 1e-4).scalar == pytest.approx(settled.time, rel=2e-3)
+
+
+@pytest.mark.long
+def test_the_deepest_faults_of_the_page():
+    """A mesh twice as fine changes the limits by less than 0.1 %; what is flown recovers."""
+    for delay, expected in ((0.1, 0.4113), (0.2, 0.4576)):
+        found = deepest_fault(VEHICLE, ENVELOPE, delay, 10.0, refine=True)
+        assert found.effectiveness == pytest.approx(expected, abs=1e-4)
+        assert found.finer == pytest.approx(found.effectiveness, rel=1e-3)
+        assert found.turning == pytest.approx(found.effectiveness, abs=2e-4)
+        assert found.flown.finished
+    at_once = deepest_fault(VEHICLE, ENVELOPE, 0.0, 10.0, refine=False)
+    assert at_once.effectiveness == pytest.approx(0.4053, abs=1e-4)
+    assert at_once.static == pytest.approx(at_once.effectiveness, abs=1e-6)
+    assert at_once.flown.finished
+
+
+@pytest.mark.long
+def test_the_limits_of_all_corners():
+    """Over all corners the target's trim needs at most 0.4386, and turning after 0.2 s at most 0.491: below 0.5."""
+    others = [VEHICLE.perturbed(corner) for corner in corners(ENVELOPE.uncertainty)[1:]]
+    static = [static_limit(vehicle, np.array([TARGET])) for vehicle in others]
+    turning = [turning_limit(vehicle, 0.2) for vehicle in others]
+    assert (min(static), max(static)) == pytest.approx((0.3769, 0.4385), abs=1e-4)
+    assert (min(turning), max(turning)) == pytest.approx((0.4264, 0.4908), abs=2e-4)
+    worst = others[int(np.argmax(turning))]
+    found = deepest_fault(worst, ENVELOPE, 0.2, 10.0, refine=False)
+    assert found.effectiveness == pytest.approx(max(turning), abs=2e-4)
+
+
+def test_the_comparison_has_the_least_time_of_the_page():
+    page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
+    assert f"{comparison.LEAST_TIME} s" in page_of_limits
+    assert f"{comparison.LEAST_TIME} s" in (ROOT / "docs" / "comparison.md").read_text(encoding="utf-8")
+
+
+def test_the_page_has_what_the_controllers_reach():
+    page_of_limits = (ROOT / "docs" / "study" / "limits.md").read_text(encoding="utf-8")
+    flown = fly(assemble_flight(parse_scenario(governed("case1", BLEND).text, "case1")))
+    assert f"settles in {max(settling_times(flown.data())):.1f} s." in page_of_limits
+    assert f"loses the nominal vehicle below {least_survived('case1'):.3f}," in page_of_limits
+
+
+def test_elevator_is_needed_to_turn_and_to_hold():
+    limits = np.array([[0.6, 0.4, 0.3, 0.5], [0.6, 0.2, 0.3, 0.1]])
+    assert needed_effectiveness(limits).tolist() == [[0.4, 0.5], [0.3, 0.2]]
+
+
+@pytest.mark.long
+def test_a_coarse_study_has_its_page_and_numbers(tmp_path):
+    told = []
+    outcome = STUDIES["limits"].run(8.0, tmp_path, lambda *what: told.append(what))
+    text = page(STUDIES["limits"], outcome)
+    assert text.startswith("# Physical limits: Fastest transfer and deepest fault") and "{" not in text
+    assert [row["flown"] for row in outcome.numbers["faults"]] == [True] * 3
+    assert len(outcome.figure.axes) == 6
+    numbers = outcome.numbers["settling_s"]
+    assert f"| case1_governed | 29.0 | 28.8 | {numbers['case1_governed'] / numbers['least']:.1f} |" in text
+    assert numbers["least"] < min(numbers[name] for name in ("case1", "case1_qp", "case1_governed"))
+    assert told[-1] == ("done", 8, 8)

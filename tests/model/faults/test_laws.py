@@ -1,0 +1,283 @@
+"""Faults on the command and on the engine: each law against its formula, when they act, and how they are composed."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from core_calls import begin_faults, command_faults, engine_faults
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.base.errors import ParameterError
+from hsv.model.faults.laws import fault_memory, fault_rows
+from hsv.model.faults.table import (
+    CHANNELS,
+    COMMAND,
+    DYNAMICS,
+    EFFECTOR,
+    ENGINE_SIDE,
+    FAULT_KINDS,
+    OCCURRENCE_PARAMETERS,
+    SENSOR,
+    Fault,
+)
+
+T = 0.02
+FUEL, ELEVATOR = "fuel_equivalence_ratio", "elevator_deflection"
+NEVER = 2**62
+
+
+def elevator(kind, **parameters):
+    return Fault.of(ELEVATOR, kind, parameters)
+
+
+def flown(faults, commands, seed=0):
+    """Return what becomes of the elevator's commands, of faults with their first step and the one without."""
+    rows = fault_rows([COMMAND], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
+    actuator = np.array([command_faults(rows, k, seed, [0.4, command]) for k, command in enumerate(commands)])
+    assert (actuator[:, 0] == 0.4).all()
+    return actuator[:, 1]
+
+
+WAVE = 0.2 + 0.1 * np.sin(0.3 * np.arange(120))
+
+
+def test_without_faults_the_command_passes_to_the_bit():
+    assert_array_equal(flown([], WAVE), WAVE)
+
+
+def test_loss_of_effectiveness_is_a_product_from_its_start():
+    expected = WAVE.copy()
+    expected[50:] = 0.9 * WAVE[50:]
+    assert_array_equal(flown([(elevator("loss_of_effectiveness", effectiveness=0.9), 50)], WAVE), expected)
+
+
+def test_loss_over_a_ramp_begins_with_nothing_and_ends_as_an_abrupt_one():
+    result = flown([(elevator("loss_of_effectiveness", effectiveness=0.4, ramp_time=1.0), 10)], WAVE)
+    share = np.interp(np.arange(120) * T, [10 * T, 10 * T + 1.0], [1.0, 0.4])
+    assert_allclose(result, share * WAVE, rtol=1e-13)
+    assert_array_equal(result[60:], 0.4 * WAVE[60:])
+
+
+def test_reversal_is_of_the_total_or_about_the_trim():
+    assert_array_equal(flown([(elevator("reversal"), 0)], WAVE), -WAVE)
+    about = flown([(elevator("reversal", about_start=1.0), 0)], WAVE)
+    assert_allclose(about - WAVE[0], -(WAVE - WAVE[0]), rtol=1e-12, atol=1e-16)
+
+
+@pytest.mark.parametrize("steps", [1, 2, 5, 50])
+def test_delay_is_exact_and_begins_with_the_command_of_its_start(steps):
+    result = flown([(elevator("delay", steps=steps), 7)], WAVE)
+    expected = WAVE.copy()
+    expected[7:] = WAVE[np.maximum(np.arange(7, 120) - steps, 7)]
+    assert_array_equal(result, expected)
+
+
+def test_dead_zone_lies_about_the_command_at_its_start():
+    width = 0.06
+    off = WAVE - WAVE[0]
+    expected = WAVE[0] + np.sign(off) * np.maximum(np.abs(off) - 0.5 * width, 0.0)
+    assert_allclose(flown([(elevator("dead_zone", width=width), 0)], WAVE), expected, rtol=1e-14)
+
+
+def test_backlash_moves_at_its_edges_alone():
+    width = 0.06
+    result = flown([(elevator("backlash", width=width), 0)], WAVE)
+    assert result[0] == WAVE[0]
+    assert np.abs(result - WAVE).max() == pytest.approx(0.5 * width)
+    moving = np.diff(result) != 0.0
+    assert_allclose(np.abs(result - WAVE)[1:][moving], 0.5 * width, rtol=1e-12)
+    # Of an oscillation, amplitude less half the width remains.
+    assert result[30:].max() - result[30:].min() == pytest.approx(0.2 - width, abs=2e-3)
+
+
+def test_composition_does_not_depend_on_the_order_of_the_list():
+    faults = [
+        (elevator("backlash", width=0.02), 3),
+        (elevator("loss_of_effectiveness", effectiveness=0.8), 10),
+        (elevator("loss_of_effectiveness", effectiveness=0.7), 0),
+        (elevator("delay", steps=3), 5),
+        (elevator("dead_zone", width=0.03), 0),
+    ]
+    results = [flown(order, WAVE) for order in itertools.islice(itertools.permutations(faults), 0, 120, 17)]
+    for result in results[1:]:
+        assert_array_equal(result, results[0])
+    # One after the other, by hand.
+    lost = flown([(faults[2][0], 0), (faults[1][0], 10)], WAVE)
+    by_hand = flown([faults[0]], flown([faults[4]], flown([faults[3]], lost)))
+    assert_array_equal(results[0], by_hand)
+    assert_array_equal(lost[10:], 0.8 * (0.7 * WAVE[10:]))
+
+
+def test_periodic_fault_acts_for_its_share_of_each_period():
+    fault = elevator("loss_of_effectiveness", effectiveness=0.0, intermittent_period=0.2, intermittent_duty=0.3)
+    result = flown([(fault, 13)], np.ones(120))
+    expected = np.array([k < 13 or (k - 13) % 10 >= 3 for k in range(120)])
+    assert_array_equal(result, expected.astype(float))
+
+
+def test_random_fault_comes_and_goes_as_a_markov_chain():
+    fault = elevator("loss_of_effectiveness", effectiveness=0.0, random_on=0.4, random_off=1.2)
+    result = flown([(fault, 5)], np.ones(40000))
+    assert not result[5] and result[:5].all()
+    acts = result == 0.0
+    assert acts.mean() == pytest.approx(0.25, abs=0.03)
+    lengths = [len([*group]) for value, group in itertools.groupby(acts[5:]) if value]
+    assert np.mean(lengths) * T == pytest.approx(0.4, rel=0.1)
+    assert_array_equal(result, flown([(fault, 5)], np.ones(40000)))
+    assert (result != flown([(fault, 5)], np.ones(40000), seed=1)).any()
+
+
+def test_memory_begins_anew_whenever_an_intermittent_fault_does():
+    fault = elevator("delay", steps=5, intermittent_period=0.4, intermittent_duty=0.5)
+    result = flown([(fault, 0)], WAVE)
+    for onset in (0, 20, 40):
+        assert_array_equal(result[onset : onset + 6], WAVE[onset])
+
+
+def test_a_change_in_flight_leaves_the_memory_of_the_others():
+    slow, lost = elevator("delay", steps=4), elevator("loss_of_effectiveness", effectiveness=0.5)
+    rows = fault_rows([COMMAND], [(slow, 2, NEVER)], T)
+    result = []
+    for k, command in enumerate(WAVE):
+        if k == 30:
+            rows = fault_rows([COMMAND], [(slow, 2, 60), (lost, 30, NEVER)], T, rows)
+        result.append(command_faults(rows, k, 0, [0.4, command])[1])
+    assert_array_equal(result, flown([(lost, 30), (slow, 2, 60)], WAVE))
+
+
+def test_of_two_faults_alike_each_keeps_its_own_memory():
+    slow = elevator("delay", steps=4)
+    rows = fault_rows([COMMAND], [(slow, 2, NEVER), (slow, 10, NEVER)], T)
+    rows.memory["kept"] = 1.0, 2.0
+    later = fault_rows([COMMAND], [(slow, 10, 60)], T, rows)
+    assert later.memory.tobytes() == rows.memory[1:].tobytes()
+    other = fault_rows([COMMAND], [(elevator("delay", steps=5), 10, NEVER)], T, rows)
+    assert other.memory.tobytes() == fault_memory(len(other.rows)).tobytes()
+
+
+def engine(fault, points, start=0):
+    """Return the engine's factors along (angle of attack, Mach number, fuel)."""
+    rows = fault_rows([ENGINE_SIDE], [(fault, start, NEVER)], T)
+    return np.array([engine_faults(rows, k, 0, *point) for k, point in enumerate(points)])
+
+
+def test_thrust_is_lost_from_the_start_of_the_fault():
+    result = engine(Fault.of("engine", "thrust_loss", {"share": 0.25}), [(0.02, 8.0, 0.3)] * 4, start=2)
+    assert_array_equal(result, [[1.0, 1.0, 1.0, 0.0]] * 2 + [[0.25, 1.0, 1.0, 0.0]] * 2)
+
+
+def test_unstarted_inlet_changes_thrust_lift_drag_and_moment():
+    fault = Fault.of("engine", "inlet_unstart", {"moment_zero": 0.03, "moment_alpha": 0.5})
+    [row] = engine(fault, [(0.04, 8.0, 0.3)])
+    assert_allclose(row, [0.0, 0.8, 1.2, 0.03 + 0.5 * 0.04])
+
+
+def test_inlet_unstarts_outside_an_ellipse_and_restarts_well_inside_and_late_enough():
+    reach, wide = math.radians(4.0), {"mach": 8.0, "mach_reach": 0.5, "hysteresis": 0.2}
+    given = {"angle_of_attack_reach": reach, **wide}
+    fault = Fault.of("engine", "inlet_unstart_outside", given)
+    shares = [0.0, 0.9, 1.01, 0.9, 0.81, 0.79, 0.9, 0.99]
+    points = [(share * reach * 0.6, 8.0 + 0.8 * share * 0.5, 0.3) for share in shares]
+    assert_array_equal(engine(fault, points)[:, 0], [1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+    late = Fault.of("engine", "inlet_unstart_outside", {**given, "restart_time": 3 * T})
+    points = [(1.1 * reach, 8.0, 0.3)] + [(0.0, 8.0, 0.3)] * 4
+    assert_array_equal(engine(late, points)[:, 0], [0.0, 0.0, 0.0, 1.0, 1.0])
+    rich = Fault.of("engine", "inlet_unstart_outside", {"fuel_limit": 1.0, "hysteresis": 0.1})
+    points = [(0.0, 8.0, fuel) for fuel in (0.9, 1.0, 1.1, 0.95, 0.85)]
+    assert_array_equal(engine(rich, points)[:, 0], [1.0, 1.0, 0.0, 0.0, 1.0])
+
+
+def test_the_ellipse_of_an_inlet_has_its_centre_and_half_axes():
+    centre = {"angle_of_attack": 0.05, "angle_of_attack_reach": 0.02, "mach": 8.0, "mach_reach": 0.5}
+    fault = Fault.of("engine", "inlet_unstart_outside", centre)
+    for alpha, mach in ((0.02, 0.0), (-0.02, 0.0), (0.0, 0.5), (0.0, -0.5), (0.0141, 0.3536), (-0.0141, 0.3536)):
+        for share, thrust in ((0.99, 1.0), (1.01, 0.0)):
+            assert engine(fault, [(0.05 + share * alpha, 8.0 + share * mach, 0.3)])[0, 0] == thrust
+
+
+def valid(kind, channel):
+    """Return a fault of the kind, every parameter that must be given in the middle of its range."""
+    table = [p for p in kind_of(kind).parameters if p.default is None]
+    return Fault.of(channel, kind, {p.name: 2.0 if p.whole else p.of(channel).maximum / 2.0 for p in table})
+
+
+def kind_of(name):
+    return FAULT_KINDS[name]
+
+
+@pytest.mark.parametrize("name", FAULT_KINDS)
+def test_every_kind_is_described_and_may_be_scheduled_on_its_channels(name):
+    kind = kind_of(name)
+    assert kind.meaning and kind.channels and {*kind.channels} <= {*CHANNELS}
+    for channel in kind.channels:
+        fault = valid(name, channel)
+        assert f"{name} " in str(fault) and str(fault).endswith(f"of {channel}")
+        assert Fault.of(channel, name, fault.parameters) == fault
+        sides = (COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR)
+        assert sum(len(fault_rows([side], [(fault, 0, NEVER)], T).rows) for side in sides) == 1
+        for parameter in (*kind.parameters, *OCCURRENCE_PARAMETERS):
+            described = parameter.of(channel)
+            assert described.description and described.minimum <= described.default <= described.maximum
+
+
+def test_both_elastic_modes_have_the_same_travels():
+    for state in ("elastic_coordinate", "elastic_rate"):
+        assert CHANNELS[f"{state}_1"] == CHANNELS[f"{state}_2"]
+
+
+def test_codes_are_in_the_order_of_the_table():
+    assert [kind.code for kind in FAULT_KINDS.values()] == [*range(len(FAULT_KINDS))]
+
+
+@pytest.mark.parametrize(
+    ("channel", "kind", "parameters", "message"),
+    [
+        (ELEVATOR, "jam", {}, "fault.type = 'jam': expected one of loss_of_effectiveness"),
+        ("engine", "bias", {"offset": 0.1}, "fault.channel = 'engine': expected one of fuel_equivalence_ratio"),
+        (FUEL, "float", {}, "fault.channel = 'fuel_equivalence_ratio': expected one of elevator_deflection for float"),
+        (ELEVATOR, "bias", {}, "fault.offset: missing, expected offset for bias"),
+        (ELEVATOR, "bias", {"value": 0.1}, "fault.value: unknown parameter, expected one of offset, "),
+        (
+            ELEVATOR,
+            "lock_in_place",
+            {"offset": 1.0},
+            "fault.offset: unknown parameter, expected one of intermittent_period, ",
+        ),
+        (ELEVATOR, "bias", {"offset": 0.6}, "fault.offset = 0.6: expected double from -0.5235987756 to 0.523598"),
+        (ELEVATOR, "bias", {"offset": math.nan}, "fault.offset = nan: expected double from"),
+        (ELEVATOR, "bias", {"offset": True}, "fault.offset = True: expected double from"),
+        (
+            ELEVATOR,
+            "loss_of_effectiveness",
+            {"effectiveness": 1.1},
+            "fault.effectiveness = 1.1: expected double from 0",
+        ),
+        (ELEVATOR, "delay", {"steps": 2.5}, "fault.steps = 2.5: expected double from 1 to 50, whole"),
+        (ELEVATOR, "delay", {"steps": 51.0}, "fault.steps = 51.0: expected double from 1 to 50"),
+        (
+            ELEVATOR,
+            "stop_limit",
+            {"lower": math.radians(10.0), "upper": math.radians(5.0)},
+            "fault.lower = 10 deg: expected at most upper, 5 deg",
+        ),
+        (ELEVATOR, "lock_in_place", {"random_on": 1.0}, "fault.random_off = 0 s: expected above 0 s"),
+        (
+            ELEVATOR,
+            "lock_in_place",
+            {"random_on": 1.0, "random_off": 1.0, "intermittent_period": 2.0},
+            "fault.intermittent_period = 2 s: expected 0 s",
+        ),
+        (ELEVATOR, "reversal", {"about_start": -0.5}, "fault.about_start = -0.5: expected double from 0 to 1"),
+        ("pitch_rate", "sensor_bias", {"offset": 2.0}, "fault.offset = 2.0: expected double from -1 to 1 rad/s"),
+        ("pitch", "sensor_freeze", {}, "fault.channel = 'pitch': expected one of altitude, velocity"),
+    ],
+)
+def test_what_is_no_fault_is_refused(channel, kind, parameters, message):
+    with pytest.raises(ParameterError, match="^" + message.replace("(", r"\(")):
+        Fault.of(channel, kind, parameters)
+
+
+def test_faults_act_from_their_first_step_to_the_one_without():
+    rows = fault_rows([COMMAND], [(elevator("reversal"), 3, 6)], T)
+    assert [begin_faults(rows, k, 0) for k in range(8)] == [0, 0, 0, 1, 1, 1, 0, 0]

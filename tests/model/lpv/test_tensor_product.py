@@ -1,0 +1,85 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.base.errors import DesignError
+from hsv.model.lpv.tensor_product import tensor_product
+
+ALTITUDES = np.linspace(100.0, 300.0, 17)
+VELOCITIES = np.linspace(10.0, 20.0, 13)
+
+
+def model(h, v, n=3):
+    """Rank 3 in altitude (1, h, h^2), rank 2 in velocity (1, 1/v), any number of states."""
+    rng = np.random.default_rng(7)
+    c = rng.normal(size=(4, n, n + 2)) * 0.01
+    a, b = h / 200.0 - 1.0, 10.0 / v
+    S = c[0] + c[1] * a + c[2] * a * a * b + c[3] * b
+    return np.eye(n) + S[:, :n], S[:, n:]
+
+
+def samples(n=3):
+    pairs = [[model(h, v, n) for v in VELOCITIES] for h in ALTITUDES]
+    return np.array([[p[0] for p in row] for row in pairs]), np.array([[p[1] for p in row] for row in pairs])
+
+
+@pytest.mark.parametrize("n", [3, 11])
+def test_ranks_and_exactness(n):
+    product = tensor_product(*samples(n), ALTITUDES, VELOCITIES, np.ones(n), np.ones(2), 1e-10)
+    assert product.altitude_samples[1].shape[1] == 3
+    assert product.velocity_samples[1].shape[1] == 2
+    assert product.polytope.A.shape == (6, n, n)
+    for h, v in ((117.3, 10.4), (250.1, 19.7), (300.0, 10.0)):
+        A, B = product.polytope.at(h, v)
+        expected_A, expected_B = model(h, v, n)
+        assert_allclose(A, expected_A, atol=2e-6)  # 1 / v between 13 samples
+        assert_allclose(B, expected_B, atol=2e-6)
+
+
+def test_scales_decide_what_counts():
+    A, B = samples()
+    scale = np.array([1.0, 1e-9, 1.0])
+    coarse = tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 0.3)
+    scaled = tensor_product(A, B, ALTITUDES, VELOCITIES, scale, np.ones(2), 0.3)
+    assert not np.allclose(coarse.singular_values[0], scaled.singular_values[0])
+
+
+def test_structural_zeros_stay_zero():
+    A, B = samples()
+    A[:, :, 0, 2] = 0.0
+    B[:, :, 1, 0] = 0.0
+    polytope = tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10).polytope
+    assert np.all(polytope.A[:, 0, 2] == 0.0) and np.all(polytope.B[:, 1, 0] == 0.0)
+
+
+def test_the_same_input_gives_the_same_bits():
+    first, second = (tensor_product(*samples(), ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10) for _ in range(2))
+    assert np.array_equal(first.polytope.A, second.polytope.A)
+    assert np.array_equal(first.altitude_samples[1], second.altitude_samples[1])
+
+
+def test_too_few_samples_and_wrong_shapes_are_refused():
+    A, B = samples()
+    rng = np.random.default_rng(1)
+    with pytest.raises(DesignError, match="17 samples of rank 17"):
+        tensor_product(A + rng.normal(size=A.shape), B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10)
+    with pytest.raises(DesignError, match=r"expected \(17, 12\) matrices"):
+        tensor_product(A, B, ALTITUDES, VELOCITIES[:-1], np.ones(3), np.ones(2), 1e-10)
+    with pytest.raises(DesignError, match=r"expected \(3,\) and \(2,\)"):
+        tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(4), np.ones(2), 1e-10)
+
+
+def test_polynomial_functions_are_exact_where_the_model_is_a_polynomial():
+    def at(h, v):
+        return model(h, 1.0 / (v / 100.0))  # b = 10 / v, so linear in what is given
+
+    pairs = [[at(h, v) for v in VELOCITIES] for h in ALTITUDES]
+    A, B = np.array([[p[0] for p in row] for row in pairs]), np.array([[p[1] for p in row] for row in pairs])
+    product = tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10, "polynomial")
+    assert len(product.polytope.A) == 6
+    assert_allclose(product.polytope.at(131.7, 17.3)[0], at(131.7, 17.3)[0], atol=1e-12)
+    for _, weights in (product.altitude_samples, product.velocity_samples):
+        assert weights.min() >= 0.0
+        assert_allclose(weights.sum(axis=1), 1.0, rtol=1e-12)
+    with pytest.raises(DesignError, match=r"tensor_product\.functions = 'splines': expected one of"):
+        tensor_product(A, B, ALTITUDES, VELOCITIES, np.ones(3), np.ones(2), 1e-10, "splines")

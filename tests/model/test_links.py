@@ -1,0 +1,163 @@
+"""Links: exact delays, shares and runs of losses, one bit of a corrupted payload; draws by numpy's own Philox."""
+
+import math
+
+import numpy as np
+import pytest
+from core_calls import receive
+from numpy.testing import assert_array_equal
+
+from hsv.base.errors import ParameterError
+from hsv.core import lib
+from hsv.model.links import LARGEST, command_link, computation, link_state, measurement_link
+
+T = 0.02
+STEPS = 4000
+SENT = np.array([26000.0, 2400.0, 0.03, 0.04, 0.01, 1.0, 2.0, 0.3, 0.4]) * (
+    1.0 + 0.1 * np.sin(np.outer(np.arange(STEPS), np.linspace(0.11, 0.27, 9)))
+)
+MEASUREMENT, COMMAND = 0, 1
+
+
+def passed(link, sent=SENT, seed=0, before=None):
+    """Return what a receiver has in every step of what is sent."""
+    state = link_state(link, sent.shape[1], before)
+    return np.array([receive(link, state, k, seed, payload) for k, payload in enumerate(sent)])
+
+
+def measured(sent=SENT, seed=0, **fields):
+    return passed(measurement_link({f"link.measurement.{name}": value for name, value in fields.items()}), sent, seed)
+
+
+def drawn(stream, channel, seed=0, steps=STEPS):
+    """Return the two uniform numbers of every step; numpy has the words of a counter after those of the one before."""
+    rows = []
+    for step in range(steps):
+        counter = (stream + channel) * 2**64 + step - 1
+        words = np.random.Philox(counter=counter, key=seed).random_raw(2)
+        rows.append((words >> np.uint64(11)).astype(float) / 2.0**53)
+    return np.array(rows).T
+
+
+def held(taken):
+    return np.array([False, *(taken[1:] == taken[:-1]).all(axis=1)])
+
+
+def test_an_ideal_link_passes_every_bit():
+    link = measurement_link({})
+    assert link.ideal
+    assert_array_equal(passed(link), SENT)
+
+
+@pytest.mark.parametrize("delay", [1, 3, 50])
+def test_delay_is_exact(delay):
+    assert_array_equal(measured(delay=float(delay)), SENT[np.maximum(np.arange(STEPS) - delay, 0)])
+
+
+@pytest.mark.parametrize(("delay", "computed", "steps"), [(0.0, 0.02, 1), (2.0, 0.0, 2), (1.0, 0.065, 4)])
+def test_a_delayed_command_follows_that_of_the_trim(delay, computed, steps):
+    values = {"link.command.delay": delay, "link.computational_delay": computed}
+    trim = np.array([0.25, 0.21])
+    taken = passed(command_link(values, T), SENT[:, :2], before=trim)
+    assert_array_equal(taken[:steps], np.tile(trim, (steps, 1)))
+    assert_array_equal(taken[steps:], SENT[:-steps, :2])
+
+
+def test_time_of_computation_is_whole_periods_and_the_rest():
+    for time, whole, rest in [(0.0, 0, 0.0), (0.005, 0, 0.25), (0.06, 3, 0.0), (0.027, 1, 0.35), (0.14, 7, 0.0)]:
+        found = computation({"link.computational_delay": time}, T)
+        assert found == (whole, pytest.approx(rest, abs=1e-9))
+        assert (found[1] == 0.0) == (rest == 0.0)
+
+
+def test_of_payloads_that_are_late_at_random_the_newest_counts():
+    late = np.floor(3.0 * drawn(lib.LINK_DELAY, MEASUREMENT, seed=5)[0])
+    assert set(late) == {0.0, 1.0, 2.0}
+    newest = np.maximum.accumulate(np.arange(STEPS) - 1 - late)
+    assert_array_equal(measured(seed=5, delay=1.0, jitter=2.0), SENT[np.maximum(newest, 0).astype(int)])
+
+
+def test_lost_payloads_are_those_that_were_drawn_and_the_last_one_is_held():
+    lost = drawn(lib.LINK_LOSS, MEASUREMENT, seed=3)[0] < 0.2
+    assert abs(lost.sum() - 0.2 * STEPS) < 4.0 * math.sqrt(0.2 * 0.8 * STEPS)
+    last = np.maximum.accumulate(np.where(lost, 0, np.arange(STEPS)))
+    assert_array_equal(measured(seed=3, loss=0.2), SENT[last])
+    # Of a link that delays, the payload of the step is lost, not the one that is sent then.
+    assert_array_equal(measured(seed=3, loss=0.2, delay=2.0), SENT[np.maximum(last - 2, 0)])
+
+
+def test_losses_in_bursts_have_their_share_and_their_mean_length():
+    lost = held(np.vstack([measured(seed=seed, loss=0.1, burst=4.0) for seed in range(10)]))
+    edges = np.flatnonzero(np.diff(lost.astype(int)))
+    runs = np.count_nonzero(np.diff(lost.astype(int)) == 1)
+    # A chain with these two means; its losses are about seven times as scattered as single ones.
+    assert lost.mean() == pytest.approx(0.1, abs=4.0 * math.sqrt(7.0 * 0.1 * 0.9 / len(lost)))
+    assert lost.sum() / runs == pytest.approx(4.0, rel=0.15)
+    assert len(edges) > 1000
+    assert held(measured(loss=1.0)).sum() == STEPS - 1
+
+
+def test_a_corrupted_payload_differs_in_one_bit_of_one_number_or_is_held():
+    taken = measured(seed=2, corruption=0.3)
+    draw, place = drawn(lib.LINK_CORRUPTION, MEASUREMENT, seed=2)
+    corrupted = draw < 0.3
+    assert_array_equal(taken[~corrupted], SENT[~corrupted])
+    expected = SENT.copy()
+    words = expected.view(np.uint64).reshape(-1)
+    for k in np.flatnonzero(corrupted):
+        bit = int(place[k] * 64 * 9)
+        words[9 * k + bit // 64] ^= np.uint64(1) << np.uint64(bit % 64)
+        if not np.all(np.abs(expected[k]) <= LARGEST):
+            expected[k] = expected[k - 1] if k else SENT[0]
+    assert_array_equal(taken, expected)
+    refused = corrupted & held(taken)
+    # Of 64 bits the ones of the exponent's upper end alone make a number that large.
+    assert 0.02 < refused.sum() / corrupted.sum() < 0.1
+    assert np.isfinite(taken).all() and np.abs(taken).max() <= LARGEST
+
+
+def test_with_a_checksum_what_is_corrupted_is_lost():
+    corrupted = drawn(lib.LINK_CORRUPTION, MEASUREMENT)[0] < 0.1
+    last = np.maximum.accumulate(np.where(corrupted, 0, np.arange(STEPS)))
+    assert_array_equal(measured(corruption=0.1, checksum=True), SENT[last])
+
+
+def test_a_refused_payload_that_comes_once_more_is_whole():
+    numbers = np.full((STEPS, 1), 1.5)
+    numbers[:, 0] += np.arange(STEPS) * 2.0**-20
+    taken = passed(measurement_link({"link.measurement.jitter": 3.0, "link.measurement.corruption": 1.0}), numbers)
+    assert np.abs(taken).max() <= LARGEST
+    sent, words = numbers.view(np.uint64).ravel(), taken.view(np.uint64).ravel()
+    for k in range(10, STEPS):
+        window = sent[k - 10 : k + 1] ^ words[k]
+        assert any(int(word).bit_count() <= 1 for word in window), k
+
+
+def test_each_link_has_draws_of_its_own():
+    link = command_link({"link.command.loss": 0.2}, T)
+    lost = drawn(lib.LINK_LOSS, COMMAND)[0] < 0.2
+    last = np.maximum.accumulate(np.where(lost, -1, np.arange(STEPS)))
+    before = np.array([0.25, 0.21])
+    sent = np.vstack([SENT[:, :2], before])
+    assert_array_equal(passed(link, SENT[:, :2], before=before), sent[last])
+    assert np.any(lost != (drawn(lib.LINK_LOSS, MEASUREMENT)[0] < 0.2))
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "message"),
+    [
+        ("delay", 0.5, "link.command.delay = 0.5: expected double from 0 to 50, whole"),
+        ("jitter", 1.5, "link.command.jitter = 1.5: expected double from 0 to 50, whole"),
+        ("burst", 0.5, "link.command.burst = 0.5: expected 0, or at least 1"),
+        ("loss", 1.5, "link.command.loss = 1.5: expected double from 0 to 1"),
+        ("corruption", math.nan, "link.command.corruption = nan: expected double from 0 to 1"),
+    ],
+)
+def test_what_is_no_link_is_refused(field, value, message):
+    with pytest.raises(ParameterError, match=message):
+        command_link({f"link.command.{field}": value}, T)
+
+
+def test_bursts_that_would_have_to_overlap_are_refused():
+    with pytest.raises(ParameterError, match=r"burst = 2\.0: expected 0, or at least 9"):
+        measurement_link({"link.measurement.loss": 0.9, "link.measurement.burst": 2.0})

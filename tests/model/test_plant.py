@@ -1,0 +1,160 @@
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.base.errors import ParameterError, TrimError
+from hsv.core import lib
+from hsv.model.dynamics import advance
+from hsv.model.faults.schedule import ActiveFault
+from hsv.model.faults.table import Fault
+from hsv.model.plant import PLANT_PARAMETERS, FlightStatus, Plant, PlantFaults
+
+DEFAULTS = {p.name: p.default for p in PLANT_PARAMETERS}
+
+
+def plant(**changes):
+    return Plant.from_parameters({**DEFAULTS, **{name.replace("__", "."): value for name, value in changes.items()}})
+
+
+def test_starts_in_the_trim_of_the_nominal_vehicle_even_if_perturbed():
+    nominal, heavy = plant(), plant(vehicle__perturbation__mass=0.1)
+    assert heavy.vehicle.mass == 1.1 * nominal.vehicle.mass
+    assert_array_equal(heavy.reset().state, nominal.reset().state)
+    held = nominal.initial.input
+    assert abs(nominal.step(held).state[0] - nominal.initial.state[0]) < 1e-9
+    assert abs(heavy.step(held).state[1] - nominal.initial.state[1]) < 1.0
+    assert heavy.step(held).state[2] != nominal.initial.state[2]
+
+
+def test_reset_repeats_the_flight_bit_for_bit():
+    bench = plant()
+    held = bench.initial.input * 1.01
+    first = [bench.reset().state, *(bench.step(held).state for _ in range(50))]
+    second = [bench.reset().state, *(bench.step(held).state for _ in range(50))]
+    assert_array_equal(first, second)
+
+
+def test_finishes_after_its_duration():
+    bench = plant(duration=0.06)
+    assert bench.reset().status is FlightStatus.RUNNING
+    statuses = [bench.step(bench.initial.input).status for _ in range(3)]
+    assert statuses == [FlightStatus.RUNNING, FlightStatus.RUNNING, FlightStatus.FINISHED]
+
+
+def test_tells_when_the_model_means_nothing_any_more():
+    bench = plant()
+    result = bench.reset()
+    for _ in range(1000):
+        result = bench.step(np.array([0.0, -0.5]))
+        if result.status is not FlightStatus.RUNNING:
+            break
+    assert result.status is FlightStatus.DIVERGED
+    assert np.all(np.isfinite(result.state))
+
+
+def test_input_that_is_no_number_ends_the_flight():
+    assert plant().step(np.array([np.nan, 0.2])).status is FlightStatus.DIVERGED
+
+
+def test_a_change_of_faults_in_flight_leaves_the_memories_of_the_others():
+    stuck = Fault.of("elevator_deflection", "lock_in_place", {}), 0, 2**62
+    frozen = Fault.of("altitude", "sensor_freeze", {}), 0, 2**62
+    unstart = Fault.of("engine", "inlet_unstart_outside", {}), 0, 2**62
+    before = PlantFaults.of([stuck, frozen, unstart], 0.02)
+    for number, faults in enumerate(before, 1):
+        assert len(faults.memory) == 1
+        faults.memory["kept"] = number
+    added = [(Fault.of(channel, kind, given), 5, 2**62) for channel, kind, given in ADDED]
+    after = PlantFaults.of([*added, stuck, frozen, unstart], 0.02, before)
+    for number, faults in enumerate(after, 1):
+        assert sorted(faults.memory["kept"]) == [0.0, number]
+
+
+ADDED = [
+    ("elevator_deflection", "bias", {"offset": 0.1}),
+    ("engine", "thrust_loss", {"share": 0.5}),
+    ("velocity", "sensor_freeze", {}),
+]
+
+
+def test_statuses_are_those_of_the_message():
+    assert [FlightStatus.RUNNING, FlightStatus.FINISHED, FlightStatus.DIVERGED] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("equipment", [{}, {"sensors__set": "ghv"}])
+def test_sensors_do_not_move_the_vehicle(equipment):
+    bench = plant(**equipment)
+    x = bench.initial.state
+    for share in (1.0, 1.02, 0.97):
+        held = share * bench.initial.input
+        x = advance(x, held, bench.vehicle, 0.02, 2)
+        assert_array_equal(bench.step(held).state, x)
+
+
+def test_the_vehicle_flies_in_the_wind_and_density_of_its_atmosphere():
+    bench = plant(wind__forward=20.0, wind__up=-3.0, density__offset=0.05)
+    x, held = bench.initial.state.copy(), bench.initial.input
+    for _ in range(3):
+        x = advance(x, held, bench.vehicle, 0.02, 2, np.array([20.0, -3.0, 1.05, 1.0, 1.0, 1.0, 0.0]))
+        result = bench.step(held)
+        assert_allclose(result.state, x, rtol=1e-14)
+        assert_allclose(result.air, [20.0, -3.0, 1.05])
+
+
+@pytest.mark.parametrize(("wind", "speed"), [({}, 0.0), ({"wind__up": 40.0}, 0.0), ({"wind__forward": 100.0}, 100.0)])
+def test_an_inlet_feels_angle_of_attack_and_mach_number_of_the_air(wind, speed):
+    bench = plant(**wind)
+    state = bench.initial.state
+    velocity = state[1] - speed
+    alpha, mach = state[2] + wind.get("wind__up", 0.0) / velocity, velocity / lib.hsv_speed_of_sound(state[0])
+    for off_alpha, off_mach, started in ((0.0, 0.0, True), (2e-3, 0.0, False), (0.0, 0.02, False)):
+        region = {"angle_of_attack": alpha + off_alpha, "angle_of_attack_reach": 1e-3}
+        region |= {"mach": mach + off_mach, "mach_reach": 0.01}
+        fault = Fault.of("engine", "inlet_unstart_outside", region)
+        bench.reset()
+        result = bench.step(bench.initial.input, (ActiveFault(fault, 0),))
+        assert (result.forces[2] > 0.0) == started
+
+
+def test_with_actuators_too_a_flight_begins_at_rest():
+    bench = plant(actuator__elevator_deflection__set="elevator_50")
+    held = bench.initial.input
+    for _ in range(2):
+        assert_allclose(bench.step(held).state, bench.initial.state, rtol=1e-9, atol=1e-9)
+        assert_array_equal(bench.step(held).effector, held)
+        bench.step(0.9 * held)
+        bench.reset()
+
+
+def test_result_is_a_copy():
+    bench = plant()
+    first = bench.reset().state
+    bench.step(bench.initial.input * 1.1)
+    assert_array_equal(first, bench.initial.state)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("period", 0.0, "parameter period = 0.0: expected double from 0.0001 to 1 s"),
+        ("period", 1, "parameter period = 1: expected double"),
+        ("substeps", 2.0, "parameter substeps = 2.0: expected integer"),
+        ("substeps", True, "parameter substeps = True: expected integer"),
+        ("vehicle.model", "XM", "parameter vehicle.model = 'XM': expected one of CM, DM"),
+        ("vehicle.coupling", "none", "parameter vehicle.coupling = 'none': expected one of paper_like, derived"),
+        ("initial.altitude", 20000.0, "parameter initial.altitude = 20000.0: expected double from 25908 to 26365.2 m"),
+        ("initial.velocity", float("nan"), "parameter initial.velocity = nan: expected double"),
+        ("vehicle.perturbation.mass", -1.0, "parameter vehicle.perturbation.mass = -1.0: expected double"),
+    ],
+)
+def test_a_wrong_parameter_is_named(name, value, message):
+    with pytest.raises(ParameterError) as caught:
+        Plant.from_parameters({**DEFAULTS, name: value})
+    assert str(caught.value).startswith(message)
+
+
+def test_errors_share_one_base():
+    from hsv.base.errors import HsvError
+
+    assert issubclass(TrimError, HsvError)
+    assert issubclass(ParameterError, HsvError)

@@ -1,0 +1,207 @@
+"""Sensors: variances, correlation, exact delays, bounds of quantisation, faults; channels keep to themselves."""
+
+import math
+
+import numpy as np
+import pytest
+from core_calls import measure
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.base.errors import ParameterError
+from hsv.model.dynamics import STATE_NAMES
+from hsv.model.envelope import FOOT
+from hsv.model.faults.laws import fault_rows
+from hsv.model.faults.table import SENSOR, Fault
+from hsv.model.sensors import SENSOR_PARAMETERS, SENSOR_SETS, sensor_data, sensor_state
+
+T = 0.02
+NEVER = 2**62
+STEPS = 300
+STATES = np.array([26000.0, 2400.0, 0.03, 0.04, 0.01, 1.0, 2.0, 0.3, 0.4]) * (
+    1.0 + 0.1 * np.sin(np.outer(np.arange(STEPS), np.linspace(0.11, 0.27, 9)))
+)
+Q = STATE_NAMES.index("pitch_rate")
+ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")
+
+
+def measured(values, states=STATES, faults=(), seed=0):
+    data, state = sensor_data(values, T), sensor_state()
+    rows = fault_rows([SENSOR], [row if len(row) == 3 else (*row, NEVER) for row in faults], T)
+    return np.array([measure(data, state, rows, k, seed, x) for k, x in enumerate(states)])
+
+
+def of_pitch_rate(states=STATES, faults=(), seed=0, **fields):
+    """Return the measured pitch rate, of sensors that are ideal but for these fields; the other channels pass."""
+    values = {f"sensors.pitch_rate.{name}": [float(value)] for name, value in fields.items()}
+    result = measured(values, states, faults, seed)
+    others = [i for i in range(9) if i != Q]
+    assert_array_equal(result[:, others], states[:, others])
+    return result[:, Q]
+
+
+def test_ideal_sensors_say_the_truth_to_the_bit():
+    assert sensor_data({}, T).ideal
+    assert_array_equal(measured({}), STATES)
+
+
+def still(steps):
+    return np.tile(STATES[0], (steps, 1))
+
+
+def test_white_noise_has_its_variance_and_no_memory():
+    error = of_pitch_rate(still(40_000), noise=2e-3) - STATES[0, Q]
+    assert np.std(error) == pytest.approx(2e-3, rel=0.02)
+    assert abs(np.corrcoef(error[:-1], error[1:])[0, 1]) < 0.02
+    assert abs(np.mean(error)) < 4.0 * 2e-3 / 200.0
+
+
+def test_drift_is_a_gauss_markov_process():
+    error = of_pitch_rate(still(200_000), drift_sigma=1e-3, drift_time=0.5) - STATES[0, Q]
+    assert np.std(error) == pytest.approx(1e-3, rel=0.05)
+    lag = 20
+    assert np.mean(error[:-lag] * error[lag:]) / 1e-6 == pytest.approx(math.exp(-lag * T / 0.5), abs=0.05)
+    begun = [of_pitch_rate(still(1), seed=seed, drift_sigma=1.0)[0] for seed in range(400)]
+    assert np.std(begun) == pytest.approx(1.0, rel=0.15)
+
+
+def test_random_walk_grows_with_the_root_of_time():
+    ends = [of_pitch_rate(still(101), seed=seed, random_walk=1e-3)[-1] - STATES[0, Q] for seed in range(300)]
+    assert np.std(ends) == pytest.approx(1e-3 * math.sqrt(2.0), rel=0.15)
+
+
+def test_constants_are_drawn_once_a_flight():
+    assert_allclose(of_pitch_rate(bias=3e-3), STATES[:, Q] + 3e-3, rtol=1e-15)
+    assert_allclose(of_pitch_rate(scale=0.02), 1.02 * STATES[:, Q], rtol=1e-15)
+    biases = [of_pitch_rate(STATES[:3], seed=seed, bias_sigma=1.0) - STATES[:3, Q] for seed in range(300)]
+    assert_allclose(np.ptp(biases, axis=1), 0.0, atol=1e-14)
+    assert np.std(biases) == pytest.approx(1.0, rel=0.15)
+    scales = [of_pitch_rate(STATES[:1], seed=seed, scale_sigma=0.1)[0] / STATES[0, Q] for seed in range(300)]
+    assert np.std(scales) == pytest.approx(0.1, rel=0.15)
+
+
+def test_lag_is_of_first_order_and_begins_at_rest():
+    states = still(100)
+    states[1:, Q] += 0.05
+    expected = states[:, Q] - 0.05 * np.exp(-20.0 * T * np.arange(100)) * (np.arange(100) > 0)
+    # Sampled: the first new sample has had one period.
+    assert_allclose(of_pitch_rate(states, lag=20.0), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("latency", [1, 3, 50])
+def test_latency_is_exact(latency):
+    expected = STATES[np.maximum(np.arange(STEPS) - latency, 0), Q]
+    assert_array_equal(of_pitch_rate(latency=latency), expected)
+
+
+def test_lost_samples_are_held():
+    result = of_pitch_rate(drop_out=0.2)
+    fresh = result == STATES[:, Q]
+    assert 0.7 < fresh.mean() < 0.9 and fresh[0]
+    last = np.maximum.accumulate(np.where(fresh, np.arange(STEPS), 0))
+    assert_array_equal(result, STATES[last, Q])
+
+
+def test_a_sensor_that_loses_all_samples_holds_the_first():
+    assert_array_equal(of_pitch_rate(drop_out=1.0), STATES[0, Q])
+
+
+def test_quantisation_rounds_to_the_nearest_step():
+    quantum = 1e-4
+    result = of_pitch_rate(quantum=quantum)
+    assert np.abs(result - STATES[:, Q]).max() <= 0.5 * quantum * (1.0 + 1e-9)
+    assert_allclose(result / quantum, np.round(result / quantum), atol=1e-9)
+    assert abs(np.mean(result - STATES[:, Q])) < 0.1 * quantum
+
+
+def test_range_clips():
+    assert_array_equal(of_pitch_rate(minimum=0.0095, maximum=0.0104), np.clip(STATES[:, Q], 0.0095, 0.0104))
+
+
+def test_inertial_angle_of_attack_shares_the_error_of_the_pitch_angle():
+    values = {"sensors.pitch_angle.noise": [1e-3], "sensors.pitch_angle.bias": [2e-3]}
+    error = measured({**values, "sensors.inertial_angle_of_attack": [1.0]}) - STATES
+    assert_allclose(error[:, ALPHA], error[:, PITCH], atol=1e-15)
+    assert np.std(error[:, PITCH]) > 5e-4
+    assert_array_equal(measured(values)[:, ALPHA], STATES[:, ALPHA])
+
+
+def test_noise_is_a_function_of_seed_step_and_channel():
+    first = measured({"sensors.set": "ghv"})
+    assert_array_equal(first, measured({"sensors.set": "ghv"}))
+    assert (first[:, :5] != measured({"sensors.set": "ghv"}, seed=1)[:, :5]).all()
+    other = measured({"sensors.set": "ghv", "sensors.velocity.noise": [0.0]})
+    assert_array_equal(other[:, Q], first[:, Q])
+    assert abs(np.corrcoef((first - STATES)[:, [ALPHA, PITCH]].T)[0, 1]) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("fine", [FOOT, 0.1 * FOOT, math.radians(0.005), math.radians(0.005), math.radians(0.01)]),
+        ("ghv", [math.sqrt(10.0) * FOOT, FOOT, 1e-3, 1e-3, math.sqrt(1e-5)]),
+    ],
+)
+def test_named_sets_have_their_noise(name, expected):
+    # GHV: variances of 10 ft^2, 1 (ft/s)^2, 1e-6 rad^2 twice, 1e-5 (rad/s)^2 (Wiese 2013).
+    error = measured({"sensors.set": name}, still(20_000)) - STATES[0]
+    assert_allclose(error.std(axis=0)[:5], expected, rtol=0.03)
+    assert not error[:, 5:].any()
+    assert all(entry.source for entry in SENSOR_SETS.values())
+
+
+def fault(kind, **parameters):
+    return Fault.of("pitch_rate", kind, parameters)
+
+
+def test_faults_bias_scale_and_run_away():
+    expected = STATES[:, Q].copy()
+    expected[50:] += 0.02
+    assert_array_equal(of_pitch_rate(faults=[(fault("sensor_bias", offset=0.02), 50)]), expected)
+    assert_array_equal(of_pitch_rate(faults=[(fault("sensor_scale", factor=0.5), 0)]), 0.5 * STATES[:, Q])
+    away = of_pitch_rate(faults=[(fault("sensor_runaway", rate=-0.1, limit=0.3), 20)])
+    drift = -np.clip(0.1 * T * (np.arange(STEPS) - 20), 0.0, 0.3)
+    assert_allclose(away, STATES[:, Q] + drift, rtol=1e-13, atol=1e-15)
+
+
+def test_frozen_sensor_shows_what_it_showed():
+    result = of_pitch_rate(faults=[(fault("sensor_freeze"), 50, 90)], quantum=1e-5)
+    assert_array_equal(result[50:90], result[50])
+    assert (np.abs(result - STATES[:, Q]) <= 0.6e-5)[np.r_[0:51, 90:STEPS]].all()
+
+
+def test_fault_of_noise_and_drop_out():
+    noisy = of_pitch_rate(still(5000), [(fault("sensor_noise", standard_deviation=0.01), 1000)]) - STATES[0, Q]
+    assert not noisy[:1000].any() and np.std(noisy[1000:]) == pytest.approx(0.01, rel=0.05)
+    lost = of_pitch_rate(faults=[(fault("sensor_drop_out", probability=1.0), 50, 90)])
+    assert_array_equal(lost[50:90], STATES[49, Q])
+    some = of_pitch_rate(faults=[(fault("sensor_drop_out", probability=0.3), 0)])
+    assert 0.6 < (some == STATES[:, Q]).mean() < 0.8
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"sensors.set": "good"}, "sensors.set = 'good': expected one of ideal, fine, ghv"),
+        ({"sensors.pitch_rate.noise": [-1.0]}, r"sensors.pitch_rate.noise\[0\] = -1.0: expected"),
+        ({"sensors.pitch_rate.noise": [1.0, 2.0]}, "sensors.pitch_rate.noise: 2 values, expected one"),
+        (
+            {"sensors.altitude.latency": [1.5]},
+            r"altitude.latency\[0\] = 1.5: expected double array from 0 to 50, whole",
+        ),
+        (
+            {"sensors.pitch_angle.minimum": [np.radians(25.0)], "sensors.pitch_angle.maximum": [np.radians(20.0)]},
+            "minimum = 25 deg: expected less than maximum, 20 deg",
+        ),
+        (
+            {"sensors.altitude.minimum": [2.0], "sensors.altitude.maximum": [1.0]},
+            "minimum = 2 m: expected less than maximum, 1 m",
+        ),
+    ],
+)
+def test_what_is_no_sensor_is_refused(values, message):
+    with pytest.raises(ParameterError, match=message):
+        sensor_data(values, T)
+
+
+def test_parameters_are_described():
+    assert all(parameter.description for parameter in SENSOR_PARAMETERS)

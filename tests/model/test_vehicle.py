@@ -1,0 +1,240 @@
+"""Vehicle files: what they hold, what they extend, what is refused, and how they come to nodes and back."""
+
+import copy
+import sys
+
+import numpy as np
+import pytest
+import tomli_w
+
+from hsv.base.errors import ParameterError, VehicleError
+from hsv.base.units import parse_quantity
+from hsv.model.trim import trim
+from hsv.model.vehicle import (
+    VEHICLE_PARAMETERS,
+    Vehicle,
+    load_vehicle,
+    parse_vehicle,
+    vehicle_names,
+    vehicle_tables,
+    vehicle_text,
+)
+from hsv.model.vehicle_parameters import COEFFICIENT_UNITS, VehicleParameters
+
+
+@pytest.mark.parametrize("name", vehicle_names())
+def test_every_registered_vehicle_is_whole_and_trims_all_over_its_envelope(name):
+    vehicle = load_vehicle(name)
+    assert vehicle.title
+    for coupling in vehicle.couplings:
+        for altitude in np.linspace(*vehicle.altitude_range, 3):
+            for velocity in np.linspace(*vehicle.velocity_range, 3):
+                point = trim(vehicle.coupled(coupling), altitude, velocity)
+                assert point.residual < 1e-9
+                assert np.all(point.input > vehicle.decoupled.input_minimum)
+                assert np.all(point.input < vehicle.decoupled.input_maximum)
+
+
+def test_a_vehicle_that_extends_another_differs_in_what_it_lists():
+    parker, stiffened = load_vehicle("parker"), load_vehicle("stiffened")
+    differing = {n for n in COEFFICIENT_UNITS if getattr(parker.decoupled, n) != getattr(stiffened.decoupled, n)}
+    assert {"mass", "natural_frequency_1", "moment_elevator", "thrust_beta_1"} < differing
+    assert not {"gravity", "reference_area", "drag_alpha", "thrust_beta_2"} & differing
+    assert stiffened.decoupled.mass == parse_quantity("318 slug", "kg", "mass")
+    assert stiffened.uncertainty == parker.uncertainty
+    assert stiffened.altitude_range == (parker.altitude_range[0], parse_quantity("87000 ft", "m", "altitude"))
+    assert "extends" not in vehicle_text("stiffened") and vehicle_text("parker").startswith("# Flexible")
+
+
+def test_coefficients_are_named_in_the_order_of_the_equations():
+    assert list(COEFFICIENT_UNITS) == list(VehicleParameters._fields[: len(COEFFICIENT_UNITS)])
+    assert list(VehicleParameters._fields[len(COEFFICIENT_UNITS) :]) == [
+        "inertial_coupling_1",
+        "inertial_coupling_2",
+        "fuel_equivalence_ratio_minimum",
+        "fuel_equivalence_ratio_maximum",
+        "elevator_deflection_minimum",
+        "elevator_deflection_maximum",
+        "angle_limit",
+    ]
+
+
+def test_what_is_certain_is_not_varied():
+    tables = vehicle_tables("parker")
+    tables["rigid_body"]["mass"]["uncertainty"] = "0 %"
+    assert parse_vehicle(tables, "mine").uncertainty.keys() == load_vehicle().uncertainty.keys() - {"mass"}
+
+
+def test_units_are_those_of_ones_choice():
+    tables = vehicle_tables("parker")
+    tables["rigid_body"]["mass"]["value"] = "4378.1708811 kg"
+    tables["envelope"]["velocity"] = {"minimum": "2346.96 m/s", "maximum": "9107.424 km/h"}
+    metric, paper = parse_vehicle(tables, "metric"), load_vehicle()
+    assert metric.decoupled.mass == pytest.approx(paper.decoupled.mass, rel=1e-9)
+    assert metric.velocity_range == pytest.approx(paper.velocity_range, rel=1e-12)
+
+
+WRONG = [
+    ("rigid_body.mass", None, 'rigid_body.mass: missing, expected a table such as { value = "1.0 kg" }'),
+    ("rigid_body", None, "rigid_body: missing, expected a table"),
+    ("rigid_body.mass.value", None, "rigid_body.mass.value: missing, expected a quantity such as '1.0 kg'"),
+    ("rigid_body.mass", "300 slug", "rigid_body.mass = '300 slug': expected a table such as { value = \"1.0 kg\" }"),
+    ("rigid_body.mass.value", "300 ft", "rigid_body.mass.value = '300 ft': wrong unit, expected a finite quantity"),
+    ("rigid_body.mass.value", 300.0, "rigid_body.mass.value = 300.0: the unit is missing"),
+    ("rigid_body.mass.value", "-3 kg", "rigid_body.mass.value = '-3 kg': expected above zero"),
+    ("rigid_body.mass.valu", "3 kg", "rigid_body.mass.valu: unknown field, expected one of value, symbol, uncertainty"),
+    ("rigid_body.weight", {}, "rigid_body.weight: unknown field, expected one of mass, moment_of_inertia, gravity"),
+    ("wings", {}, "wings: unknown field, expected one of title, rigid_body, geometry, atmosphere"),
+    ("title", 3, "title = 3: expected text"),
+    ("lift.lift_alpha.value", "4.7 m", "lift.lift_alpha.value = '4.7 m': wrong unit"),
+    ("rigid_body.mass.uncertainty", "-1 %", "rigid_body.mass.uncertainty = '-1 %': expected 0 % to 90 %"),
+    ("rigid_body.mass.uncertainty", "95 %", "rigid_body.mass.uncertainty = '95 %': expected 0 % to 90 %"),
+    ("elastic_modes.natural_frequency_1.value", "16 Hz", "elastic_modes.natural_frequency_1.value = '16 Hz': wrong"),
+    (
+        "envelope.altitude.minimum",
+        "90000 ft",
+        "envelope.altitude.minimum = '90000 ft': expected below its maximum, '86500 ft'",
+    ),
+    ("envelope.altitude.maximum", None, "envelope.altitude.maximum: missing, expected a quantity such as '1.0 m'"),
+    ("envelope.velocity.minimum", "-1 m/s", "envelope.velocity.minimum = '-1 m/s': expected above zero"),
+    ("envelope.angle.maximum", "0 deg", "envelope.angle.maximum = '0 deg': expected above zero"),
+    ("envelope.mach", {}, "envelope.mach: unknown field, expected one of altitude, velocity, angle"),
+    (
+        "input_limits.elevator_deflection.maximum",
+        "-40 deg",
+        "input_limits.elevator_deflection.minimum = '-0.5235987755982988 rad': expected below its maximum, '-40 deg'",
+    ),
+    ("input_limits.rudder", {}, "input_limits.rudder: unknown field, expected one of fuel_equivalence_ratio"),
+    ("inertial_coupling.derived", None, "inertial_coupling.derived: missing, expected a set, of which numbers"),
+    ("inertial_coupling.0.5", {}, "inertial_coupling.0: expected a name of lower-case letters, digits and _"),
+    (
+        "inertial_coupling.derived.inertial_coupling_1.value",
+        "3 kg",
+        "inertial_coupling.derived.inertial_coupling_1.value = '3 kg': wrong unit",
+    ),
+]
+
+
+def changed(field, value):
+    tables = copy.deepcopy(vehicle_tables("parker"))
+    *path, key = field.split(".")
+    place = tables
+    for name in path:
+        place = place.setdefault(name, {})
+    if value is None:
+        del place[key]
+    else:
+        place[key] = value
+    return tables
+
+
+@pytest.mark.parametrize(("field", "value", "message"), WRONG, ids=[f"{f} = {v}" for f, v, _ in WRONG])
+def test_a_wrong_field_is_named_with_what_was_expected(field, value, message):
+    with pytest.raises(VehicleError) as caught:
+        parse_vehicle(changed(field, value), "mine")
+    assert str(caught.value).startswith(f"vehicle 'mine': {message}")
+    assert "\n" not in str(caught.value)
+
+
+def test_no_more_parameters_are_uncertain_than_a_design_can_fly_the_corners_of():
+    tables = vehicle_tables("parker")
+    for row in tables["drag"].values():
+        row["uncertainty"] = "1 %"
+    with pytest.raises(VehicleError, match="uncertainty: of 15 coefficients, expected at most 12"):
+        parse_vehicle(tables, "mine")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("title = ", r"mine.toml': .*, expected a TOML file"),
+        ('extends = "parkr"\n', r"vehicle 'parkr': expected one of parker, stiffened or the path of a TOML file \(did"),
+        ('extends = "mine.toml"\n', r"vehicle 'mine': extends: .* expected files that do not extend each other"),
+        ("extends = 3\n", r"vehicle 'mine': extends = 3: expected a name or the path of a file"),
+    ],
+)
+def test_a_file_that_is_no_vehicle_is_named(tmp_path, text, message):
+    (tmp_path / "mine.toml").write_text(text)
+    with pytest.raises(VehicleError, match=message):
+        load_vehicle(str(tmp_path / "mine.toml"))
+
+
+def test_a_file_is_read_as_it_is_now(tmp_path):
+    path = tmp_path / "mine.toml"
+    masses = []
+    for mass in ("4400 kg", "4500 kg"):
+        path.write_text(f'extends = "parker"\n[rigid_body]\nmass = {{ value = "{mass}" }}\n')
+        masses.append(load_vehicle(str(path)).decoupled.mass)
+    assert masses == [4400.0, 4500.0]
+
+
+def test_flat_parameters_are_the_whole_vehicle():
+    stiffened = load_vehicle("stiffened")
+    values = stiffened.to_parameters()
+    assert set(values) == {parameter.name for parameter in VEHICLE_PARAMETERS}
+    again = Vehicle.from_parameters(values)
+    assert again.to_parameters() == values
+    assert again.coupled("derived") == stiffened.coupled("derived")
+    assert again.digest == stiffened.digest != "" == load_vehicle().digest
+    # What is not given is that of the vehicle by name, and where none is named that of the default one.
+    assert Vehicle.from_parameters({}).to_parameters() == load_vehicle().to_parameters()
+    heavier = Vehicle.from_parameters({"vehicle.name": "stiffened", "vehicle.mass": 5000.0})
+    assert heavier.to_parameters() == values | {"vehicle.mass": 5000.0}
+    assert heavier.digest not in ("", stiffened.digest)
+
+
+def test_no_path_in_parameters_is_followed(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('extends = "parker"\n')
+    with pytest.raises(ParameterError, match=r"parameter vehicle.mass: missing, expected that of the vehicle '.*mine"):
+        Vehicle.from_parameters({"vehicle.name": str(path)})
+    values = load_vehicle("stiffened").to_parameters() | {"vehicle.name": str(path)}
+    assert Vehicle.from_parameters(values).digest == load_vehicle("stiffened").digest
+
+
+def test_a_copy_under_another_name_is_the_same_vehicle():
+    assert parse_vehicle(vehicle_tables("parker"), "copy").digest == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("vehicle.mass", 0.0, "parameter vehicle.mass = 0.0: expected above zero"),
+        ("vehicle.mass", 1, "parameter vehicle.mass = 1: expected double"),
+        ("vehicle.altitude_range", [2.0, 1.0], "parameter vehicle.altitude_range: 2.0 to 1.0, expected a range that"),
+        ("vehicle.input_maximum", [1.5, -1.0], "parameter vehicle.elevator_deflection: "),
+        ("vehicle.input_maximum", [1.5], "parameter vehicle.input_maximum = [1.5]: expected 2 numbers"),
+        ("vehicle.coupling_sets.names", ["a"], "parameter vehicle.coupling_sets.values = "),
+        ("vehicle.coupling_sets.names", ["a", "b"], "parameter vehicle.coupling_sets.names = ['a', 'b']: expected one"),
+        ("vehicle.uncertainty.bounds", [0.1], "parameter vehicle.uncertainty.bounds = [0.1]: expected 10 numbers"),
+    ],
+)
+def test_a_wrong_flat_parameter_is_named(name, value, message):
+    with pytest.raises(ParameterError) as caught:
+        Vehicle.from_parameters({name: value})
+    assert str(caught.value).startswith(message)
+
+
+def test_a_package_registers_its_files_and_is_not_imported(tmp_path, monkeypatch):
+    package, info = tmp_path / "my_vehicles", tmp_path / "my_vehicles-1.0.dist-info"
+    package.mkdir()
+    info.mkdir()
+    (package / "__init__.py").write_text("raise RuntimeError('imported')\n")
+    (package / "glider.toml").write_text('extends = "stiffened"\n[rigid_body]\nmass = { value = "4000 kg" }\n')
+    (info / "METADATA").write_text("Name: my_vehicles\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "[hsv.vehicles]\nzeppelin = nowhere_at_all:zeppelin.toml\n"
+        "glider = my_vehicles:glider.toml\ngone = nowhere_at_all:gone.toml\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert {"glider", "gone"} < set(vehicle_names())
+    assert load_vehicle("glider").decoupled.mass == 4000.0
+    assert "my_vehicles" not in sys.modules
+    with pytest.raises(VehicleError, match=r"vehicle 'gone': registered as 'nowhere_at_all:gone\.toml', expected"):
+        load_vehicle("gone")
+
+
+def test_a_vehicle_written_out_is_the_same(tmp_path):
+    path = tmp_path / "whole.toml"
+    path.write_text(tomli_w.dumps(vehicle_tables("stiffened")))
+    assert load_vehicle(str(path)).digest == load_vehicle("stiffened").digest

@@ -1,0 +1,54 @@
+"""A short flight's messages, as the live node gets them, and what decodes them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from recorded_flight import message_types, record_flight
+
+from hsv.bags.description import TOPICS
+from hsv.bags.reader import Bag
+from hsv.pages.live.hub import Hub
+from hsv.pages.live.server import PageServer
+
+Message = tuple[str, int, bytes]
+"""Topic, simulated time (ns) and bytes."""
+
+
+@pytest.fixture(scope="session")
+def bag(tmp_path_factory: pytest.TempPathFactory) -> Bag:
+    """Four seconds of Case 1 whose fault begins at two."""
+    return record_flight(tmp_path_factory.mktemp("bags") / "flown", duration=4.0, fault=2.0)
+
+
+@pytest.fixture(scope="session")
+def messages(bag: Bag) -> list[Message]:
+    """All step messages in the order in which a step is recorded."""
+    by_time: dict[int, list[Message]] = {}
+    for topic in TOPICS:
+        for time, data in bag.messages(topic):
+            by_time.setdefault(time, []).append((topic, time, data))
+    return [message for time in sorted(by_time) for message in by_time[time]]
+
+
+@pytest.fixture(scope="session")
+def decode() -> Callable[[str, bytes], Any]:
+    types = message_types()
+    return lambda topic, data: types.deserialize_cdr(data, TOPICS[topic])
+
+
+@pytest.fixture
+def hub(decode: Callable[[str, bytes], Any]) -> Hub:
+    hub = Hub(decode, {"title": "a flight", "bag": str(Path("bags", "flown"))})
+    hub.start_run("1f" * 16, 0.02, 200)
+    return hub
+
+
+@pytest.fixture
+def server(hub: Hub) -> Iterator[PageServer]:
+    server = PageServer(0, hub)
+    yield server
+    server.close()

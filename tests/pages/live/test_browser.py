@@ -1,0 +1,161 @@
+"""The live page as a browser shows it: a flight over DDS with a fault injected by its button, and its report."""
+
+import time
+
+import pytest
+from live_clients import FoxgloveClient, addresses, assert_without_gap
+from node_processes import Processes, recorded_steps, short_scenario
+from page_checks import PageChecks
+from ros_domain import own_environment
+from waiting import wait_until
+
+from hsv.bags.reader import Bag
+
+pytestmark = pytest.mark.viewer
+
+
+@pytest.fixture
+def processes(tmp_path):
+    with own_environment() as environment:
+        started = Processes(environment, tmp_path)
+        yield started
+        started.stop()
+
+
+def fly(processes, *words):
+    """Start a live flight; return its process, the address of its page and the port for Foxglove."""
+    log = processes.folder / "live.txt"
+    with log.open("w") as output:
+        flight = processes.start("hsv", "run", *words, "--live", "--live-port", "0", output=output)
+    wait_until(lambda: "live data" in log.read_text() or flight.poll() is not None, [flight.pid])
+    return flight, *addresses(log.read_text())
+
+
+def until(browser, flight, condition):
+    """Wait until a condition of the page, in JavaScript, is true."""
+    wait_until(lambda: browser.run(f"return Boolean({condition})"), [flight.pid])
+
+
+def test_a_fault_is_injected_by_its_button_and_the_report_has_it(browser, processes, screen, tmp_path, pictures):
+    bag = tmp_path / "bag"
+    flight, page, _ = fly(processes, short_scenario(tmp_path, 120, fault=115), "--bag", bag)
+    driver = browser.driver
+    screen(1280)
+    browser.console()
+    browser.requests()
+    driver.get(page)
+    until(browser, flight, "window.live && live.charts.now > 4")
+    # Space pauses, and the flight goes on where it was.
+    browser.press(" ")
+    until(browser, flight, "live.status.settings.paused")
+    until(browser, flight, "live.form.pause.textContent === 'Resume'")
+    stood = browser.run("return live.charts.now")
+    steps = recorded_steps(bag)
+    time.sleep(0.5)
+    assert browser.run("return live.charts.now") - stood < 0.1 and recorded_steps(bag) - steps <= 50
+    browser.press(" ")
+    until(browser, flight, "!live.status.settings.paused")
+    driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
+    driver.find_element("css selector", "[name=inject]").click()
+    # The fault may be seen to act before the answer has come.
+    until(browser, flight, "live.status.faults.length === 1 && document.getElementById('answer').className")
+    answer = browser.run("return document.getElementById('answer').textContent")
+    assert answer.startswith("loss of effectiveness 0.8 of elevator deflection from step ")
+    step = int(answer.partition("from step ")[2].split()[0])
+    until(browser, flight, f"live.charts.now > {step * 0.02 + 6.0}")
+    browser.picture(pictures / "live.png")
+    shade = browser.run("return document.getElementById('plot-altitude').layout.shapes[0]")
+    assert shade["x0"] == pytest.approx(step * 0.02) and shade["x1"] > shade["x0"]
+    limits = "document.getElementById('plot-elevator_deflection')"
+    browser.run(f"{limits}.scrollIntoView()")
+    until(browser, flight, f"{limits}.layout && {limits}.layout.shapes.filter((s) => s.type === 'line').length === 2")
+    pace = driver.find_element("css selector", "[name=pace]")
+    # In the middle of the window: at its edge something else may lie above it.
+    browser.run("document.querySelector('[name=pace]').scrollIntoView({ block: 'center', behavior: 'instant' })")
+    wait_until(pace.is_displayed, [flight.pid])
+    pace.clear()
+    pace.send_keys("0\n")
+    until(browser, flight, "live.status.ending")
+    state = browser.run("return document.getElementById('state').textContent")
+    assert state == f"Flight finished at t = 120.00 s · verdict, metrics and report: {bag}/report.html"
+    wait_until(lambda: flight.poll() is not None, [flight.pid])
+    # The server has left; the curves stay.
+    until(browser, flight, "live.over")
+    assert browser.run("return live.charts.now") == pytest.approx(120.0)
+    assert browser.run("return document.querySelector('fieldset.flight').disabled")
+    assert browser.console() == []
+    assert {address.split("/")[2] for address in browser.requests() if ":" in address} <= {page.split("/")[2]}
+    active = [message.step for _, message in Bag(bag).decode("/hsv/actuator") if message.active]
+    assert active[0] == step
+    report = bag / "report.html"
+    browser.open(report)
+    driver.get(f"{report.as_uri()}#events")
+    events = browser.run("return document.getElementById('events').textContent")
+    assert "effectiveness 0.8" in events
+    browser.picture(pictures / "live_report.png")
+
+
+@pytest.fixture(scope="module")
+def endless(tmp_path_factory):
+    """Start a flight that lasts longer than the tests that look at it; return its process and the page's address."""
+    folder = tmp_path_factory.mktemp("endless")
+    with own_environment() as environment:
+        started = Processes(environment, folder)
+        flight, page, _ = fly(started, short_scenario(folder, 3600, fault=2), "--bag", folder / "bag", "--no-report")
+        yield flight, page
+        started.stop()
+
+
+def look(browser, flight, page):
+    """Open the live page at an address, and wait until a fault acts and everything is drawn."""
+    # The same page with another token is no other page to a browser.
+    browser.driver.get("about:blank")
+    browser.driver.get(page)
+    until(browser, flight, "window.live && live.charts.now > 3 && live.status && live.status.faults.length")
+
+
+@pytest.fixture
+def show(browser, endless):
+    return lambda: look(browser, *endless)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
+def test_without_the_token_it_shows_and_asks_nothing(browser, endless):
+    flight, page = endless
+    look(browser, flight, page.partition("#")[0])
+    assert browser.run("return document.querySelector('fieldset.flight').disabled")
+    assert "token" in browser.run("return document.getElementById('answer').textContent")
+    browser.run("live.ask('pause', { paused: 'true' })")
+    assert_refused(browser, flight)
+
+
+@pytest.mark.parametrize("button", ["pause", "set_pace", "set_tau", "inject", "clear"])
+def test_with_another_token_every_button_is_answered_with_a_reason(browser, endless, button):
+    flight, page = endless
+    look(browser, flight, f"{page}x")
+    browser.driver.find_element("css selector", "[name=parameters]").send_keys("80 %")
+    browser.driver.find_element("css selector", f"[name={button}]").click()
+    assert_refused(browser, flight)
+
+
+def assert_refused(browser, flight):
+    """The page says why nothing was done, and nothing was: the flight goes on as it was."""
+    until(browser, flight, "document.getElementById('answer').className === 'bad'")
+    assert browser.run("return document.getElementById('answer').textContent").startswith("token: wrong or missing")
+    before = browser.run("return live.charts.now")
+    until(browser, flight, f"live.charts.now > {before + 0.5}")
+    status = browser.run("return live.status")
+    assert not status["settings"]["paused"] and status["settings"]["real_time_factor"] == 1
+    assert [fault["channel"] for fault in status["faults"]] == ["elevator_deflection"]
+
+
+@pytest.mark.long
+def test_two_hundred_seconds_at_real_time_pace_lack_nothing(processes, tmp_path):
+    flight, _, port = fly(processes, "case1", "--bag", tmp_path / "bag", "--no-report")
+    client = FoxgloveClient(port)
+    wait_until(lambda: flight.poll() is not None, [flight.pid])
+    client.wait()
+    assert_without_gap(client, Bag(tmp_path / "bag"))

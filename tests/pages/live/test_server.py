@@ -1,0 +1,129 @@
+"""The server of the page: who is let in, what he gets, and that nobody is kept waiting."""
+
+import json
+import urllib.error
+import urllib.request
+
+import pytest
+from live_clients import PageClient
+from waiting import wait_until
+from websocket import WebSocketBadStatusException
+
+from hsv.pages.live.commands import Clear
+
+A_STEP = 9
+
+
+def get(server, path="/", **headers):
+    request = urllib.request.Request(f"http://127.0.0.1:{server.port}{path}", headers=headers)
+    try:
+        with urllib.request.urlopen(request) as response:
+            return response.status, response.read().decode()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read().decode()
+
+
+def fly(hub, server, messages):
+    for number, message in enumerate(messages, 1):
+        hub.offer(*message)
+        if number % A_STEP == 0:
+            hub.sample()
+            hub.decode()
+            server.publish()
+
+
+def rows(client, hub, count):
+    """Read until so many rows have come; return them."""
+    width = 4 * (1 + len(hub.columns))
+    while len(client.data) < count * width:
+        assert client.read()
+    assert len(client.data) == count * width
+    return client.times(len(hub.columns))
+
+
+def test_the_page_is_whole_and_may_ask_its_own_server_only(server):
+    status, page = get(server)
+    assert status == 200 and "a flight" in page
+    policy = page.partition('Content-Security-Policy" content="')[2].partition('"')[0]
+    assert f"connect-src ws://127.0.0.1:{server.port} ws://localhost:{server.port}" in policy
+    assert policy.startswith("default-src 'none'")
+    assert server.url.rpartition("#token=")[2] not in page
+    assert get(server, "/etc/passwd") == (404, "path = '/etc/passwd': expected / or /flight\n")
+
+
+def test_pages_of_other_places_are_refused(server):
+    with pytest.raises(WebSocketBadStatusException) as refused:
+        PageClient(server.url, origin="http://elsewhere.example")
+    assert refused.value.status_code == 403
+    expected = f"http://127.0.0.1:{server.port} or http://localhost:{server.port}"
+    assert refused.value.resp_body.decode() == f"Origin: 'http://elsewhere.example', expected {expected}\n"
+    assert get(server, "/", Origin="http://elsewhere.example")[0] == 403
+    with pytest.raises(WebSocketBadStatusException) as refused:
+        PageClient(server.url, origin=None)
+    assert refused.value.resp_body.decode() == f"Origin: missing, expected {expected}\n"
+
+
+def test_commands_need_the_token(hub, server):
+    client = PageClient(server.url, token="guessed")
+    answer = client.ask("clear")
+    assert answer["accepted"] is False
+    assert answer["message"].startswith("token: wrong or missing, expected that of the address")
+    assert server.commands.empty()
+    client = PageClient(server.url)
+    client._socket.send(json.dumps({"token": client.token, "command": "clear", "id": 7}))
+    wait_until(lambda: not server.commands.empty(), pause=lambda _: None)
+    command, answered = server.commands.get()
+    assert command == Clear("", "")
+    answered({"accepted": True, "message": "done", "step": 3})
+    while not client.answers:
+        client.read()
+    assert client.answers == [{"id": 7, "accepted": True, "message": "done", "step": 3}]
+
+
+@pytest.mark.parametrize(
+    ("request_text", "words"),
+    [("no json", "request: no JSON"), ("[1, 2]", "request = '[1, 2]': expected a JSON object")],
+)
+def test_nonsense_is_answered(server, request_text, words):
+    answer = PageClient(server.url).send(request_text)
+    assert answer["accepted"] is False and words in answer["message"]
+
+
+def test_whoever_comes_late_gets_all_and_then_what_is_new(hub, server, messages):
+    early = PageClient(server.url)
+    fly(hub, server, messages[: 100 * A_STEP])
+    late = PageClient(server.url)
+    first = rows(late, hub, 100)
+    fly(hub, server, messages[100 * A_STEP :])
+    assert rows(late, hub, 201)[:100].tolist() == first.tolist()
+    assert rows(early, hub, 201).tolist() == late.times(len(hub.columns)).tolist()
+    assert late.status["title"] == "a flight" and late.status["run"]["last_step"] == 200
+
+
+def test_a_new_run_is_shown_alone(hub, server, messages):
+    client = PageClient(server.url)
+    fly(hub, server, messages)
+    rows(client, hub, 201)
+    hub.start_run("2e" * 16, 0.02, 200)
+    fly(hub, server, messages[: 10 * A_STEP])
+    while client.status["run"]["id"] != "2e" * 16 or len(client.data) > 10 * 4 * (1 + len(hub.columns)):
+        assert client.read()
+    rows(client, hub, 10)
+
+
+def test_who_never_reads_holds_nobody_up(hub, server, messages):
+    idle = [PageClient(server.url) for _ in range(2)]
+    client = PageClient(server.url)
+    for _ in range(20):
+        # Far more than the system keeps for them.
+        hub.start_run("2e" * 16, 0.02, 200)
+        hub.say(limits={"padding": ["x" * 100_000]})
+        fly(hub, server, messages)
+    while client.status.get("limits") != {"padding": ["x" * 100_000]} or len(client.data) < 201 * 4:
+        assert client.read()
+    for left in idle:
+        left.leave()
+    hub.end(1, 200)
+    server.publish()
+    while client.status["ending"] is None:
+        assert client.read()

@@ -1,0 +1,268 @@
+"""The page as a browser shows it."""
+
+import numpy as np
+import pytest
+from page_checks import PageChecks
+from recorded_flight import record_flight
+
+from hsv.base.units import UnitSystem, in_system
+from hsv.pages.report.page import write_report
+from hsv.pages.report.panels import PANELS, error_panel
+
+pytestmark = pytest.mark.viewer
+
+MEGABYTE = 1e6
+SAMPLES = np.linspace(0, 1000, 41).astype(int)
+
+
+@pytest.fixture(scope="module")
+def flights(quiet, loud):
+    return [quiet, loud]
+
+
+@pytest.fixture(scope="module")
+def page(flights, tmp_path_factory):
+    page = tmp_path_factory.mktemp("page") / "report.html"
+    write_report(flights, page)
+    return page
+
+
+@pytest.fixture
+def opened(browser, page):
+    browser.open(page)
+    return browser
+
+
+@pytest.fixture
+def show(browser, page):
+    return lambda: browser.open(page)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
+def recorded(bag, curve):
+    columns = bag.columns(curve.topic)
+    parts = [columns[name] if curve.column is None else columns[name][:, curve.column] for name in curve.fields]
+    return np.sum(parts, axis=0)
+
+
+def drawn(browser, panel):
+    """Return the curves of a panel as the plotting library holds them: name, x and y at the samples."""
+    script = """
+        const [name, samples] = arguments;
+        const pick = (values) => samples.map((i) => values[Math.min(i, values.length - 1)]);
+        return document.getElementById(`plot-${name}`).data.map((d) => ({name: d.name, x: pick(d.x), y: pick(d.y)}));
+    """
+    return {curve["name"]: curve for curve in browser.run(script, panel.name, SAMPLES.tolist())}
+
+
+def x_ranges(browser):
+    ranges = browser.run("return report.panels.map((p) => p.element._fullLayout.xaxis.range)")
+    return {tuple(round(end, 6) for end in each) for each in ranges}
+
+
+def test_the_page_asks_nothing_of_any_network(browser, page):
+    browser.requests()
+    browser.open(page)
+    assert {address.split(":")[0] for address in browser.requests()} <= {"file", "data", "blob"}
+
+
+@pytest.mark.parametrize("units", list(UnitSystem))
+def test_plots_hold_what_the_bags_hold(opened, flights, units):
+    opened.click(f"[name=units][value={units}]")
+    for panel in (*PANELS, *map(error_panel, range(7))):
+        factor = in_system(1.0, panel.unit, units)[0]
+        curves = drawn(opened, panel)
+        for bag, label in zip(flights, ("case1 (quiet)", "case1 (loud)"), strict=True):
+            for curve in panel.curves:
+                seen = curves.get(f"{label}, {curve.label}") or curves[curve.label]
+                expected = recorded(bag, curve)[SAMPLES] * factor
+                np.testing.assert_allclose(seen["y"], expected, rtol=2e-7, atol=1e-12 * factor)
+                np.testing.assert_allclose(seen["x"], SAMPLES * 0.02, rtol=1e-6)
+
+
+def test_the_tube_is_drawn_around_the_error(opened, flights):
+    opened.click("[name=units][value=si]")
+    status = flights[1].columns("/hsv/tube_status")
+    curves = drawn(opened, error_panel(2))
+    for sign, label in ((1.0, "c + z"), (-1.0, "c − z")):
+        edge = status["tube_centre"][0, 2] + sign * status["tube_half_width"][0, 2]
+        np.testing.assert_allclose(curves[f"case1 (loud), {label}"]["y"], edge, rtol=1e-6)
+
+
+def test_units_change_titles_and_tables_too(opened):
+    def visible(css_class):
+        return opened.run(
+            "return [...document.querySelectorAll(arguments[0])].filter((e) => e.getClientRects().length).length",
+            f"figcaption .{css_class}, #metrics .{css_class}",
+        )
+
+    assert visible("metric") and not visible("si:not(.metric)")
+    for units in ("paper", "si"):
+        opened.click(f"[name=units][value={units}]")
+        assert visible(units) and not visible(f"metric:not(.{units})")
+
+
+def test_runs_and_kinds_of_curves_are_switched(opened):
+    altitude = PANELS[0]
+    every = set(drawn(opened, altitude))
+    opened.click("[name=run][value='1']")
+    one = set(drawn(opened, altitude))
+    assert one == {name for name in every if "loud" not in name} and one < every
+    opened.click("[name=kind][value=nominal]")
+    assert set(drawn(opened, altitude)) == {name for name in one if "nominal" not in name}
+
+
+def test_zooming_one_plot_zooms_all(opened):
+    assert x_ranges(opened) == {(0.0, 20.0)}
+    opened.run("Plotly.relayout('plot-altitude', {'xaxis.range[0]': 7.5, 'xaxis.range[1]': 9})")
+    opened.settle()
+    assert x_ranges(opened) == {(7.5, 9.0)}
+    assert opened.run(
+        "return [document.querySelector('[name=from]').value, document.querySelector('[name=to]').value]"
+    ) == [
+        "7.5",
+        "9",
+    ]
+    opened.click("[name=all]")
+    assert x_ranges(opened) == {(0.0, 20.0)}
+
+
+def test_the_time_window_can_be_typed(opened):
+    opened.driver.find_element("css selector", "[name=from]").send_keys("8\t")
+    opened.settle()
+    assert x_ranges(opened) == {(8.0, 20.0)}
+
+
+def state(browser):
+    """Return what the page shows: units, time window, vertical ranges, curves of the altitude, runs of the picture."""
+    return browser.run(
+        """
+        const axis = (name) => document.getElementById(`plot-${name}`)._fullLayout.yaxis.range;
+        const inSight = (path) => getComputedStyle(path).display !== "none";
+        return {
+          units: document.documentElement.dataset.units,
+          time: report.state.time,
+          ranges: report.zooms,
+          drawn: report.zooms.velocity && axis("velocity"),
+          curves: document.getElementById("plot-altitude").data.map((curve) => curve.name).sort(),
+          picture: [...document.querySelectorAll(".picture [data-run]")].filter(inSight).length,
+          place: scrollY,
+        };
+        """
+    )
+
+
+def test_the_address_says_what_is_shown_and_shows_it(opened, page):
+    plain = state(opened)
+    assert "#" not in opened.driver.current_url
+    opened.click("[name=units][value=paper]")
+    opened.click("[name=run][value='1']")
+    opened.click("[name=kind][value=nominal]")
+    opened.click("[name=limits]")
+    opened.run("Plotly.relayout('plot-altitude', {'xaxis.range[0]': 7.5, 'xaxis.range[1]': 9})")
+    opened.settle()
+    opened.run("Plotly.relayout('plot-velocity', {'yaxis.range[0]': 7901, 'yaxis.range[1]': 7910})")
+    opened.settle()
+    opened.driver.find_element("css selector", "nav a[href='#inputs']").click()
+    opened.settle()
+    address, shown = opened.driver.current_url, state(opened)
+    assert shown["time"] == [7.5, 9] and shown["ranges"] == {"velocity": [7901, 7910]} and shown["units"] == "paper"
+    assert 0 < shown["picture"] < plain["picture"] and len(shown["curves"]) < len(plain["curves"])
+    assert address.partition("#")[2].startswith("inputs&")
+    opened.driver.get("about:blank")
+    opened.driver.get(address)
+    opened.settle()
+    found = state(opened)
+    assert found.pop("place") > 500
+    assert found == {key: value for key, value in shown.items() if key != "place"}
+    assert opened.console() == []
+    opened.click("[name=all]")
+    assert "from=" not in opened.driver.current_url and "y-velocity" not in opened.driver.current_url
+
+
+def test_an_address_that_says_nonsense_shows_the_page(browser, page):
+    browser.driver.get("about:blank")
+    browser.driver.get(f"{page.as_uri()}#nowhere&units=cubits&from=x&no-run=7&y-altitude=a..b&other=1")
+    browser.settle()
+    assert browser.run("return document.documentElement.dataset.units") == "metric"
+    assert x_ranges(browser) == {(0.0, 20.0)} and browser.console() == []
+
+
+def test_differences_are_those_of_the_bags_and_follow_the_units(opened, flights):
+    opened.click("[name=units][value=paper]")
+    first, second = (bag.columns("/hsv/state")["altitude"][SAMPLES] for bag in flights)
+    (curve,) = opened.run(
+        "return document.getElementById('plot-difference_altitude').data.map((d) => arguments[0].map((i) => d.y[i]))",
+        SAMPLES.tolist(),
+    )
+    np.testing.assert_allclose(curve, (second - first) / 0.3048, rtol=2e-7, atol=1e-12)
+
+
+def test_the_keyboard_reaches_everything(opened):
+    reached = """
+        const all = "a[href], button, input, select, summary, [tabindex]";
+        const shown = [...document.querySelectorAll(all)].filter((each) => each.getClientRects().length);
+        return shown.filter((each) => each.tabIndex < 0 || each.matches("a:not([href])")).map((each) => each.outerHTML);
+    """
+    assert opened.run(reached) == []
+    scrolling = "return [...document.querySelectorAll('.scroll, pre')].every((each) => each.tabIndex === 0)"
+    assert opened.run(scrolling)
+    button = opened.driver.find_element("css selector", "[name=units]:checked")
+    button.send_keys("\ue014")  # arrow to the right
+    opened.settle()
+    assert opened.run("return document.documentElement.dataset.units") == "si"
+
+
+def test_the_first_picture_needs_no_script(browser, page):
+    browser.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
+    try:
+        browser.driver.get("about:blank")
+        browser.driver.get(page.as_uri())
+        document = browser.driver.execute_cdp_cmd("DOM.getDocument", {"depth": 0})["root"]["nodeId"]
+        path = {"nodeId": document, "selector": ".picture .run0"}
+        node = browser.driver.execute_cdp_cmd("DOM.querySelector", path)["nodeId"]
+        assert browser.driver.execute_cdp_cmd("DOM.getBoxModel", {"nodeId": node})["model"]["width"] > 500
+    finally:
+        browser.driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
+
+
+def test_faults_limits_and_excursions_are_shaded(opened):
+    def shades(name):
+        shapes = opened.run("return document.getElementById(`plot-${arguments[0]}`).layout.shapes", name)
+        return {(shape["fillcolor"], shape["x0"]) for shape in shapes if shape["type"] == "rect"}
+
+    fault = next(iter(shades("altitude")))
+    assert fault[1] == 8.0
+    assert fault in shades("fuel_equivalence_ratio") and len(shades("fuel_equivalence_ratio")) > 1
+    assert shades("elevator_deflection") == {fault}
+    assert len(shades("level")) > 1 and len(shades("error_1")) > 1
+
+
+@pytest.mark.parametrize("scenarios", [["case1"], ["case1", "case1_no_notch", "case1_derived"]], ids=len)
+def test_whole_flights_make_a_small_page_and_its_time_is_told(
+    browser, bags, screen, tmp_path, pictures, record_property, capsys, scenarios
+):
+    flown = [record_flight(bags / f"{len(scenarios)}_{name}", name, 200.0, 100.0) for name in scenarios]
+    page = tmp_path / "whole.html"
+    screen(1280)
+    write_report(flown, page)
+    size = page.stat().st_size / MEGABYTE
+    # The best of three: what else the machine does is not the page's doing.
+    first = "return performance.getEntriesByName('first-contentful-paint')[0].startTime / 1000"
+    times = [(browser.open(page), browser.run(first)) for _ in range(3)]
+    seconds, painted = map(min, zip(*times, strict=True))
+    record_property("page_megabytes", size)
+    record_property("page_first_picture_seconds", painted)
+    record_property("page_open_seconds", seconds)
+    with capsys.disabled():
+        print(
+            f"\nreport of {len(flown)} flights: {size:.2f} MB, first picture after {painted:.2f} s, "
+            f"all plots drawn after {seconds:.2f} s"
+        )
+    assert browser.console() == []
+    assert size < 5.0
+    if len(flown) == 3:
+        browser.picture(pictures / "report.png")

@@ -1,0 +1,214 @@
+import base64
+import gzip
+import html
+import re
+
+import numpy as np
+import pytest
+from full_disk import files_no_larger_than
+from recorded_flight import message_types
+
+from hsv.bags.reader import Bag
+from hsv.bags.topic import Qos, Topic
+from hsv.bags.writer import BagWriter
+from hsv.base.errors import RecordingError
+from hsv.flight.metrics import METRICS
+from hsv.pages.report.differences import differences
+from hsv.pages.report.opening import happened, sentence
+from hsv.pages.report.page import render, write_report
+from hsv.pages.report.payload import Numbers, all_panels, payload
+from hsv.pages.report.run import reported_runs
+
+EMBEDDED = re.compile(r'<script type="application/[^>]*>.*?</script>', re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def page(quiet, loud):
+    return render(reported_runs([quiet, loud]))
+
+
+def words(page):
+    """What a reader sees: without scripts, style and tags."""
+    page = re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL)
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", page)))
+
+
+def test_the_page_refers_to_nothing_outside_itself(page):
+    shell = EMBEDDED.sub("", page)
+    addresses = re.findall(r'(?:src|href|action|poster)="([^"]*)"', shell)
+    assert addresses and all(address.startswith("#") for address in addresses)
+    assert "@import" not in shell and not re.search(r"url\((?!#)", shell)
+    assert "default-src 'none'" in shell
+
+
+def test_every_link_has_its_section(page):
+    for name in re.findall(r'href="#([^"]*)"', page):
+        assert f'id="{name}"' in page
+
+
+def test_equal_bags_give_equal_pages(quiet, page, loud):
+    assert render(reported_runs([quiet, loud])) == page
+
+
+def test_runs_of_one_scenario_are_told_apart(quiet, loud):
+    assert [run.label for run in reported_runs([quiet, loud])] == ["case1 (quiet)", "case1 (loud)"]
+
+
+def test_verdict_limits_and_metrics_are_those_of_the_run(quiet):
+    (run,) = reported_runs([quiet])
+    seen = words(render([run]))
+    over = sum(not verdict.within for verdict in run.verdicts.values())
+    assert over, "20 s are too short to reach the end error that is asked for"
+    assert f"✗ {over} of {len(run.scenario.limits)} limits not kept" in seen
+    for name in run.metrics:
+        assert METRICS[name].words in seen and METRICS[name].meaning in seen
+    assert seen.count("✓ within ") + seen.count("✗ over ") == len(run.scenario.limits)
+    names = {name.replace("_", " ") for name in METRICS} - {metric.words for metric in METRICS.values()}
+    assert names and not [name for name in names if name in seen]
+
+
+def test_metrics_are_grouped_as_people_read_them(page):
+    table = page.partition('<section id="metrics">')[2].partition("</table>")[0]
+    groups = re.findall(r'<th scope="rowgroup"[^>]*>([^<]+)<', table)
+    assert groups == ["Tracking", "After the fault", "Modes", "Inputs"]
+
+
+def test_the_verdict_has_its_numbers_in_the_units_shown(quiet):
+    (run,) = reported_runs([quiet])
+    metric, paper = (
+        re.search(rf'<span class="{units}">([^<]+)</span>', sentence([run]))[1] for units in ("metric", "paper")
+    )
+    value = re.compile(r"altitude error at the end (\S+) (m|ft) \(limit")
+    (metres, m), (feet, ft) = (value.search(said).groups() for said in (metric, paper))
+    assert (m, ft) == ("m", "ft") and float(metres) == pytest.approx(0.3048 * float(feet), rel=0.01)
+    assert float(metres) == pytest.approx(run.metrics["altitude_end_error"], rel=0.01)
+
+
+def test_all_systems_of_units_are_there(page):
+    (run, *_) = re.findall(r"<tr[^>]*>\s*<th scope=\"row\">altitude error at the end.*?</tr>", page, re.DOTALL)
+    cells = re.findall(r'<span class="metric si">([^&]*)&nbsp;m</span><span class="paper">([^&]*)&nbsp;ft</span>', run)
+    assert len(cells) >= 2
+    for si, paper in cells:
+        assert float(paper.replace("−", "-")) == pytest.approx(float(si.replace("−", "-")) / 0.3048, rel=5e-3)
+
+
+def test_what_happened_is_told_and_escaped(page):
+    seen = words(page)
+    assert "tube_mpc: <b>unusual</b>" in seen and "<b>unusual" not in page
+    assert "command of fuel equivalence ratio limited" in seen
+    assert "outside in" in seen and "inside throughout" in seen
+
+
+def test_parameters_certificate_and_repetition_are_told(page, loud):
+    seen = words(page)
+    assert "20 matrices 9 × 9" in seen and "vehicle.coupling" in seen
+    assert "invariant set" in seen and "parameters sha256" in seen
+    assert loud.custom_data["run_id"] in seen
+    assert f"git checkout {loud.custom_data['commit']}" in seen and "hsv run case1 " in seen
+
+
+def test_parameters_that_differ_are_marked_and_others_said_once(page):
+    rows = re.findall(r"<tr( class=differs)?>\s*<th scope=\"row\"><code>([^<]+)</code>", page)
+    marked = {name for mark, name in rows if mark}
+    assert marked == {"input.maximum", "tube.shape", "tube.half_width"}
+    assert len(rows) == len({name for _, name in rows})
+
+
+def test_all_recorded_steps_are_drawn(loud, quiet):
+    runs = reported_runs([quiet, loud])
+    found = differences(runs)
+    described, _ = payload(runs, found)
+    names = [panel.name for panel in all_panels(runs)]
+    assert [panel["name"] for panel in described["panels"]] == names + [each.name for each in found]
+    assert len(names) == 12 + 7 and len(found) == 12
+    assert set(described["lengths"]) == {1001, 2}
+
+
+def test_numbers_come_back_bit_for_bit():
+    rng = np.random.default_rng(1)
+    arrays = [rng.normal(size=1000), np.array([0.0, -0.0, np.nan, np.inf, -1e-40]), np.linspace(0.0, 200.0, 10_001)]
+    numbers = Numbers()
+    for array in arrays:
+        numbers.add(array)
+    packed, offset = np.frombuffer(gzip.decompress(base64.b64decode(numbers.packed())), "u1"), 0
+    for array in arrays:
+        planes = packed[offset : offset + 4 * len(array)].reshape(4, -1)
+        bits = np.cumsum(np.ascontiguousarray(planes.T).view("<u4").ravel(), dtype=np.uint32)
+        np.testing.assert_array_equal(bits, array.astype("<f4").view("<u4"))
+        offset += 4 * len(array)
+
+
+def test_it_opens_with_the_verdict_and_a_picture_before_any_table(page, quiet):
+    assert page.index('class="lead') < page.index('class="picture"') < page.index("<table")
+    (run,) = reported_runs([quiet])
+    said = happened([run], [])
+    assert said.startswith("Loss of effectiveness of the elevator deflection from 8 s; ")
+    level = quiet.columns("/hsv/tube_status")["level"].max()
+    assert f"the error stayed in the invariant set, largest level {level:.3g}." in said
+
+
+def test_sections_are_in_the_order_of_the_links_to_them(page):
+    links = re.findall(r'<a href="#([^"]*)"', page.partition("<nav")[2].partition("</nav>")[0])
+    assert links == re.findall(r'<section id="([^"]*)"', page)
+    assert links[:2] == ["summary", "metrics"] and links.index("differences") < links.index("trajectory")
+
+
+def test_metrics_that_differ_are_marked_with_their_difference(page, quiet, loud):
+    first, second = (run.metrics for run in reported_runs([quiet, loud]))
+    rows = re.findall(r'<tr( class=differs)?>\s*<th scope="row">([^<]+)<small>(.*?)</tr>', page, re.DOTALL)
+    marked = {html.unescape(name) for mark, name, _ in rows if mark}
+    assert marked == {METRICS[name].words for name in first if first[name] != second.get(name)}
+    (cells,) = [cells for _, name, cells in rows if name == "altitude error, integral"]
+    shown = float(re.search(r'difference <span class="metric si">([^&]*)', cells)[1].replace("−", "-"))
+    name = "altitude_integral_absolute_error"
+    assert shown == pytest.approx(second[name] - first[name], rel=5e-3)
+
+
+def test_a_design_without_a_set_is_said_to_have_none(bags):
+    from recorded_flight import record_flight
+
+    bag = record_flight(bags / "no_set", tube__shape=[], tube__half_width=[], tube__centre=[], duration=2.0, fault=1.0)
+    page = render(reported_runs([bag]))
+    assert "carries an invariant set" in words(page) and 'id="plot-level"' not in page
+
+
+def test_without_attachments_there_is_a_page_but_no_verdict(quiet, tmp_path):
+    types = message_types()
+    topics = [
+        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
+        for t in quiet.topics.values()
+    ]
+    writer = BagWriter(tmp_path / "bare", topics)
+    for topic in quiet.topics:
+        for time, data in quiet.messages(topic):
+            writer.write(topic, time, data)
+    writer.close()
+    seen = words(render(reported_runs([Bag(tmp_path / "bare")])))
+    assert "no limits to judge by" in seen and "no scenario is attached" in seen
+    assert "None are attached to the bag" in seen
+
+
+def test_a_bag_without_a_flight_is_refused(quiet, tmp_path):
+    types = message_types()
+    topics = [
+        Topic(t.name, t.type, types.generate_msgdef(t.type, ros_version=2)[0], t.type_hash, Qos())
+        for t in quiet.topics.values()
+    ]
+    BagWriter(tmp_path / "empty", topics).close()
+    with pytest.raises(RecordingError, match="no complete step"):
+        reported_runs([Bag(tmp_path / "empty")])
+    BagWriter(tmp_path / "partial", [t for t in topics if t.name != "/hsv/nominal"]).close()
+    with pytest.raises(RecordingError, match="no topic /hsv/nominal"):
+        reported_runs([Bag(tmp_path / "partial")])
+
+
+def test_a_file_that_cannot_be_written_is_named(quiet, tmp_path):
+    with pytest.raises(RecordingError, match=r"nowhere/page\.html: cannot be written"):
+        write_report([quiet], tmp_path / "nowhere" / "page.html")
+
+
+def test_a_full_disk_leaves_no_half_page(quiet, tmp_path):
+    problem = r"page\.html: cannot be written \(File too large\)"
+    with pytest.raises(RecordingError, match=problem), files_no_larger_than(100_000):
+        write_report([quiet], tmp_path / "page.html")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,187 @@
+"""The side view of the report as a browser shows it: the recorded state, with the shape and signs of the vehicle."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hsv.model.airframe.geometry import airframe
+from hsv.model.airframe.side_view import geometry
+from hsv.pages.report.page import write_report
+
+pytestmark = pytest.mark.viewer
+
+FAULT = 8.0
+
+
+@pytest.fixture(scope="module")
+def page(quiet, tmp_path_factory):
+    page = tmp_path_factory.mktemp("page") / "report.html"
+    write_report([quiet], page)
+    return page
+
+
+@pytest.fixture
+def opened(browser, page):
+    browser.open(page)
+    browser.run("document.getElementById('vehicle').scrollIntoView()")
+    browser.wait("return Boolean(report.player.views)")
+    return browser
+
+
+def shown(browser, at, exaggeration=40):
+    """Show a time; return the figures as drawn, paths as numbers in pixels."""
+    script = """
+        const [time, exaggeration] = arguments, slider = document.querySelector("[name=exaggeration]");
+        slider.value = exaggeration;
+        slider.dispatchEvent(new Event("input"));
+        report.player.show(time);
+        const numbers = (path) => ((path.getAttribute("d") || "").match(/-?[\\d.]+/g) || []).map(Number);
+        return [...document.querySelectorAll("#vehicle figure")].map((figure) => ({
+          paths: [...figure.querySelectorAll("svg > path")].map(numbers),
+          ghost: [...figure.querySelectorAll("svg > g > path")].map(numbers),
+          readout: [...figure.querySelectorAll(".readout dd")].map((entry) => entry.textContent),
+          text: figure.querySelector("svg").textContent,
+        }));
+    """
+    return browser.run(script, at, exaggeration)
+
+
+def body_of(figure):
+    """Return the outline of the body, the longest path, in metres: x forward, z up, from the centre of gravity."""
+    points = np.array(max(figure["paths"], key=len)).reshape(-1, 2)
+    scale = 0.72 * 640 / airframe().length
+    return (points - [0.47 * 640, 0.55 * 300]) * [1.0, -1.0] / scale
+
+
+def expected_body(eta, pitch, exaggeration):
+    x, z, mode, shape, slope = np.array(geometry()["body"]).T
+    bend = exaggeration * np.where(mode == 0, eta[0], eta[1])
+    bent = np.stack([x - z * slope * bend, z + shape * bend], axis=1)
+    cos, sin = math.cos(pitch), math.sin(pitch)
+    return bent @ np.array([[cos, sin], [-sin, cos]])
+
+
+@pytest.mark.parametrize("at", [0.0, 8.44, 20.0])
+@pytest.mark.parametrize("exaggeration", [1, 40, 150])
+def test_the_outline_is_the_bent_body_of_the_recorded_state(opened, quiet, at, exaggeration):
+    vehicle, nominal = shown(opened, at, exaggeration)
+    row = round(at / 0.02)
+    state, plan = quiet.columns("hsv/state"), quiet.columns("hsv/nominal")
+    expected = expected_body(state["elastic_coordinate"][row], state["pitch_angle"][row], exaggeration)
+    np.testing.assert_allclose(body_of(vehicle), expected, atol=2e-3)
+    eta = plan["reference.elastic_coordinate"][row] + plan["deviation.elastic_coordinate"][row]
+    pitch = plan["reference.pitch_angle"][row] + plan["deviation.pitch_angle"][row]
+    np.testing.assert_allclose(body_of(nominal), expected_body(eta, pitch, exaggeration), atol=2e-3)
+    # The nominal one is also the dashed outline about the vehicle.
+    np.testing.assert_allclose(max(vehicle["ghost"], key=len), max(nominal["paths"], key=len), atol=0.02)
+    assert f"bending drawn × {exaggeration}" in vehicle["text"]
+
+
+def test_numbers_are_those_of_the_bag_and_true_to_scale(opened, quiet):
+    vehicle, _ = shown(opened, 10.0)
+    state = quiet.columns("hsv/state")
+    altitude, velocity, alpha, pitch, path, *_, nose, tail = vehicle["readout"]
+    assert altitude == f"{state['altitude'][500]:.1f} m" and velocity == f"{state['velocity'][500]:.1f} m/s"
+    angles = np.degrees([state["angle_of_attack"][500], state["pitch_angle"][500]])
+    assert (alpha, pitch) == tuple(f"{angle:.2f}°" for angle in angles)
+    assert path.replace("−", "-") == f"{angles[1] - angles[0]:.2f}°"
+    frame = airframe()
+    for text, x, eta in zip(
+        (nose, tail), (frame.fore_body, -frame.aft_body), state["elastic_coordinate"][500], strict=True
+    ):
+        assert text == f"{1000.0 * frame.shape(x) * eta:.1f} mm"
+
+
+def test_positive_elevator_is_drawn_trailing_edge_down(opened):
+    script = """
+        const place = document.createElement("div");
+        document.body.append(place);
+        const view = createSideView(place, report.player.plots.airframe);
+        const sample = {time: 0, altitude: 26000, velocity: 2400, angle_of_attack: 0, pitch_angle: 0, elastic: [0, 0],
+          fuel_equivalence_ratio: arguments[1], elevator_deflection: arguments[0], faults: []};
+        view.draw(sample);
+        const paths = [...place.querySelectorAll("svg > path")].map((path) => path.getAttribute("d") || "");
+        place.remove();
+        return paths.map((d) => (d.match(/-?[\\d.]+/g) || []).map(Number));
+    """
+
+    def elevator(deflection, fuel=0.5):
+        # A leading edge, a top, a trailing edge and a bottom.
+        [points] = [
+            np.array(path).reshape(-1, 2)
+            for path in opened.run(script, deflection, fuel)
+            if len(path) == 8 and path[0] < 300
+        ]
+        return points
+
+    level, down = elevator(0.0), elevator(0.3)
+    assert level[0, 0] > level[2, 0], "it flies to the right"
+    assert down[2, 1] > level[2, 1] and down[0, 1] < level[0, 1], "on a screen y points down"
+    flames = [
+        max((max(p[0::2]) - min(p[0::2]) for p in opened.run(script, 0.0, fuel) if len(p) == 10), default=0)
+        for fuel in (0.0, 0.5, 1.0)
+    ]
+    assert flames[0] == pytest.approx(0.0, abs=0.1) and flames[2] == pytest.approx(2.0 * flames[1], rel=1e-3)
+
+
+def test_faults_are_marked_on_the_time_line_and_told_while_they_act(opened):
+    assert opened.run("return document.querySelector('.marks > span').style.left") == "40%"
+    assert "loss of effectiveness" not in shown(opened, FAULT - 0.02)[0]["text"]
+    assert "elevator deflection: loss of effectiveness" in shown(opened, FAULT)[0]["text"]
+    shown(opened, 0.0)
+    opened.run("document.querySelector('.jumps button').click()")
+    assert opened.run("return report.player.time") == FAULT
+
+
+def test_it_plays_at_the_speed_chosen_and_stops_at_the_end(opened):
+    shown(opened, 0.0)
+    opened.run("document.querySelector('[name=speed]').value = '20'; document.querySelector('[name=play]').click()")
+    opened.wait("return report.player.time > 5")
+    opened.run("document.querySelector('[name=play]').click()")
+    paused = opened.run("return report.player.time")
+    assert opened.run("return [report.player.playing, report.player.time]") == [False, paused]
+    opened.run("document.querySelector('[name=play]').click()")
+    opened.wait("return !report.player.playing")
+    assert opened.run("return report.player.time") == 20.0
+    assert opened.console() == []
+
+
+def test_keys_move_the_time_and_play(opened):
+    shown(opened, 4.0)
+    slider = opened.driver.find_element("css selector", "#player [name=time]")
+    slider.send_keys("\ue014")  # arrow to the right
+    assert opened.run("return report.player.time") == pytest.approx(4.02)
+    slider.send_keys(" ")
+    opened.wait("return report.player.playing && report.player.time > 4.1")
+    slider.send_keys(" ")
+    assert not opened.run("return report.player.playing")
+
+
+def test_who_wants_little_motion_gets_two_pictures_a_second(opened):
+    opened.media(features=[{"name": "prefers-reduced-motion", "value": "reduce"}])
+    count = """
+        window.drawn = 0;
+        const draw = report.player.draw;
+        report.player.draw = function () { window.drawn++; draw.call(this); };
+    """
+    opened.run(f"{count} report.player.show(0); document.querySelector('[name=play]').click()")
+    opened.wait("return report.player.time > 2")
+    drawn, at = opened.run("return [window.drawn, report.player.time]")
+    opened.media(features=[])
+    assert drawn <= 2 * at + 3
+
+
+def test_on_paper_the_picture_stays_and_the_controls_go(opened):
+    shown(opened, 9.0)
+    opened.media(media="print")
+    assert opened.run("return getComputedStyle(document.getElementById('player')).display") == "none"
+    assert opened.run("return document.querySelector('#vehicle svg').getBoundingClientRect().width") > 100
+    assert opened.run("return document.querySelector('#vehicle .at').textContent") == "9.00 s"
+    opened.media(media="")
+
+
+def test_the_units_of_the_page_are_its_units(opened, quiet):
+    opened.click("[name=units][value=paper]")
+    altitude = shown(opened, 10.0)[0]["readout"][0]
+    assert altitude == f"{quiet.columns('hsv/state')['altitude'][500] / 0.3048:.0f} ft"

@@ -1,0 +1,61 @@
+"""The page as a browser shows it."""
+
+import pytest
+from node_processes import short_scenario
+from page_checks import PageChecks
+
+from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.resilience.campaign import plan
+from hsv.flight.resilience.run import CaseStore, run_resilience
+from hsv.flight.resilience.summary import ResilienceResults
+from hsv.pages.resilience.page import write_results
+
+pytestmark = pytest.mark.viewer
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("resilience")
+    campaign = plan((str(short_scenario(folder, duration=6, fault=2)),), ("elevator_loss", "fuel_loss"))
+    store = CaseStore(folder / "out")
+    run_resilience(campaign, store, SerialExecutor())
+    return write_results(ResilienceResults.read(campaign, store), folder / "out", "hsv resilience")[0]
+
+
+@pytest.fixture
+def show(browser, page):
+    return lambda: browser.open(page)
+
+
+class TestPage(PageChecks):
+    """As all pages."""
+
+
+@pytest.mark.usefixtures("screen")
+def test_it_prints_its_numbers(browser, page):
+    browser.open(page)
+    height = "return document.querySelector('details').getBoundingClientRect().height"
+    closed = browser.run(height)
+    browser.media(media="print")
+    assert browser.run(height) > 1.5 * closed
+    links = browser.run("return [...document.querySelectorAll('a')].map((a) => a.getAttribute('href'))")
+    assert all((page.parent / link).is_file() for link in links if not link.startswith("#"))
+
+
+def test_units_are_switched_and_kept_in_the_address(browser, page):
+    head = """
+        document.querySelector("details").open = true;
+        const heads = [...document.querySelectorAll("thead th")].map((head) => head.innerText);
+        return heads.find((text) => text.startsWith("altitude"));
+    """
+    browser.driver.get("about:blank")
+    browser.open(page)
+    assert browser.run(head) == "altitude (m)"
+    browser.click("[name=units][value=paper]")
+    assert browser.run(head) == "altitude (ft)"
+    browser.driver.find_element("css selector", "nav a[href='#cells']").click()
+    address = browser.driver.current_url
+    assert address.endswith("#cells&units=paper")
+    browser.driver.get("about:blank")
+    browser.driver.get(address)
+    assert browser.run(head) == "altitude (ft)" and browser.console() == []
