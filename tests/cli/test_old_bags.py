@@ -11,7 +11,7 @@ from hsv_msgs.msg import Run
 
 from hsv.bags.former import INTERFACE_VERSION
 
-OLD = Path(__file__).parents[1] / "recording" / "old_bags" / "case1_4e00631"
+OLD = Path(__file__).parents[1] / "bags" / "old_bags" / "case1_4e00631"
 
 Hsv = Callable[..., Any]
 

@@ -19,7 +19,7 @@ def test_a_figure_that_is_none_of_the_paper_s_is_named(hsv):
 
 
 def test_a_study_is_plotted_and_printed_as_json(hsv, tmp_path):
-    ran = hsv("study", "notch", "--coarseness", "20", "--out", "plots", "--json")
+    ran = hsv("sensitivity", "notch", "--coarseness", "20", "--out", "plots", "--json")
     assert ran.code == 0
     assert ran.json["study"] == "notch"
     assert len(ran.json["numbers"]["centre_rad_per_s"]) == 3
@@ -28,7 +28,7 @@ def test_a_study_is_plotted_and_printed_as_json(hsv, tmp_path):
 
 def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv, tmp_path):
     (tmp_path / "mine.toml").write_text('extends = "case1_integral_heavy"\ntitle = "with integral action"\n')
-    ran = hsv("study", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")
+    ran = hsv("sensitivity", "fault", "--with", "mine.toml", "--coarseness", "33", "--out", "plots", "--json")
     assert ran.code == 0
     assert "with integral action" in ran.json["numbers"]["flights"]
     assert ran.json["findings"][-1].startswith("with integral action: ")
@@ -52,7 +52,7 @@ def test_the_fault_study_flies_the_controllers_of_other_scenarios_beside(hsv, tm
 )
 def test_what_a_study_cannot_fly_is_named(hsv, tmp_path, words, message):
     (tmp_path / "none.toml").write_text('extends = "case1"\nfault = []\n')
-    ran = hsv("study", *words)
+    ran = hsv("sensitivity", *words)
     assert ran.code == 2
     assert ran.error.startswith(message)
 

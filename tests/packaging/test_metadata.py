@@ -18,6 +18,8 @@ from hsv.flight.scenario import scenario_names
 
 ROOT = Path(__file__).parents[2]
 SOURCES = ROOT / "src" / "hsv" / "hsv"
+BY_NAME = {"clarabel"}
+"""Given to cvxpy by its name only, as the solver."""
 DECLARED = [Requirement(line) for line in requires("hsv") or []]
 
 OF_ROS = {"ament_index_python"}
@@ -32,7 +34,7 @@ def extra_of(requirement: Requirement) -> str:
 
 def imported() -> set[str]:
     """Return the modules outside the standard library that the package imports, wherever and whenever it does."""
-    found = set()
+    found = set(BY_NAME)
     for path in SOURCES.rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):

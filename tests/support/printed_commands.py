@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PROGRAMS = ("cd", "fastdds", "hsv", "make", "mkdir", "plotjuggler", "python3", "ros2", "source", "sudo")
+PROGRAMS = ("cd", "fastdds", "hsv", "hsv-paper", "make", "mkdir", "plotjuggler", "python3", "ros2", "source", "sudo")
 _BLOCK = re.compile(r"^    (\S.*)$", re.MULTILINE)
 _SPAN = re.compile(r"`([^`\n]+)`")
 _PLACEHOLDER = re.compile(r"\b(?!UTC)[A-Z]{3,}\b|\.\.\.$")

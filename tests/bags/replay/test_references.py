@@ -12,7 +12,7 @@ from hsv.bags.replay.engine import replay, rerun
 from hsv.bags.replay.processes import processes_of
 from hsv.flight.scenario import load_scenario
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 REFERENCES = ROOT / "bags" / "reference"
 SCENARIOS = sorted(REFERENCES.glob("*.toml"))
 

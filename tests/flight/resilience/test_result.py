@@ -9,7 +9,7 @@ from hsv.flight.resilience.campaign import plan
 from hsv.flight.resilience.faults import TRIED, Moment
 from hsv.flight.resilience.flights import SubjectRunner
 
-PAGE = Path(__file__).parents[2] / "docs/resilience_result.md"
+PAGE = Path(__file__).parents[3] / "docs/resilience_result.md"
 
 
 def rows(heading):

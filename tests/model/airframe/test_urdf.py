@@ -8,7 +8,7 @@ import pytest
 
 from hsv.model.airframe.pose import FLAMES, LEVEL, Sample, transforms
 
-ROBOT = ElementTree.parse(Path(__file__).parents[2] / "ros_ws/src/hsv_bringup/urdf/airframe.urdf").getroot()
+ROBOT = ElementTree.parse(Path(__file__).parents[3] / "ros_ws/src/hsv_bringup/urdf/airframe.urdf").getroot()
 JOINTS = {joint.find("child").attrib["link"]: joint for joint in ROBOT.iter("joint")}
 
 

@@ -22,7 +22,7 @@ from hsv.flight.campaign.sample_runner import Outcome, SampleRunner, sample_runn
 from hsv.flight.closed_loop import watched
 from hsv.flight.metrics import METRICS
 
-CAMPAIGN, ENVELOPE, DIGEST = b"hsv.flight.campaign", b"hsv.envelope", b"hsv.digest"
+CAMPAIGN, ENVELOPE, DIGEST = b"hsv.campaign", b"hsv.envelope", b"hsv.digest"
 """Keys of the file's metadata."""
 
 _SECONDS = b"hsv.seconds"

@@ -76,7 +76,7 @@ def write_page(results: Results, out: Path, units: UnitSystem = UnitSystem.metri
 
 def render(results: Results, units: UnitSystem = UnitSystem.metric) -> str:
     """Return the page."""
-    environment = environment_of("hsv.flight.campaign")
+    environment = environment_of("hsv.pages.campaign")
     worst = worst_flights(results)
     shown = distributions(results)
     flights = _flown(results, worst[0].flight)

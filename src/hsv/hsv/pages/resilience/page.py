@@ -88,7 +88,7 @@ def sentence(results: ResilienceResults) -> str:
 def render(results: ResilienceResults, name: str, command: str) -> str:
     """Return the page (``index.html``) or the Markdown (``result.md``), which name the ``command`` that makes them."""
     html = name.endswith(".html")
-    environment = environment_of("hsv.flight.resilience", escaped=html)
+    environment = environment_of("hsv.pages.resilience", escaped=html)
     return environment.get_template(f"{name}.j2").render(
         command=command,
         campaign=results.campaign,
