@@ -20,7 +20,7 @@ def commands() -> str:
     Raises:
         subprocess.CalledProcessError: If the command line cannot be imported.
     """
-    words = ["-m", "typer", "hsv.cli.all_commands", "utils", "docs", "--name", "hsv"]
+    words = ["-m", "typer", "hsv.cli.entry", "utils", "docs", "--name", "hsv"]
     text = subprocess.run([sys.executable, *words], check=True, capture_output=True, text=True).stdout
     # Lists of commands have the beginnings of sentences alone, which stand whole under each command.
     text = re.sub(r"^\*\*Commands\*\*:\n\n(\* .*\n)+\n?", "", text, flags=re.MULTILINE)

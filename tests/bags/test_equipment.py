@@ -8,7 +8,7 @@ from recorded_flight import record_flight
 
 from hsv.bags.info import describe, parameters_in_words
 from hsv.base.units import UnitSystem
-from hsv.cli.info import info
+from hsv.cli.look import info
 from hsv.core import lib
 from hsv.core.noise import uniforms
 from hsv.pages.report.events import flight_events

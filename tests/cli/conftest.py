@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 
-from hsv.cli.main import main
+from hsv.cli.entry import COMMANDS, DESCRIPTION, MOVED
+from hsv.cli.main import run as run_command_line
 
 
 @dataclass
@@ -41,7 +42,7 @@ def hsv(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
     def run(*words: str) -> Ran:
         monkeypatch.setattr("sys.argv", ["hsv", *words])
         with pytest.raises(SystemExit) as caught:
-            main()
+            run_command_line("hsv", COMMANDS, DESCRIPTION, MOVED)
         captured = capsys.readouterr()
         code = caught.value.code
         return Ran(captured.out, captured.err, 0 if code is None else int(code))

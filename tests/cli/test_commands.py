@@ -1,6 +1,7 @@
 import json
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,19 +10,20 @@ import numpy as np
 import pytest
 
 import hsv as library
-from hsv.cli.all_commands import app
+from hsv.base.units import PAPER_UNITS
+from hsv.cli.entry import COMMANDS, MOVED, TREE
 from hsv.cli.main import EXIT_CODES
-from hsv.cli.output import UNIT_KEYS
+from hsv.cli.output import unit_key
 from hsv.control.design_file import find_design
 from hsv.flight.metrics import METRICS
 from hsv.flight.scenario import scenario_names, scenario_text
 
-COMMANDS = sorted(command.callback.__name__.replace("_", "-") for command in app.registered_commands)
-PRINT_NO_NUMBERS = {"cluster", "include", "play"}
+PRINT_NO_NUMBERS = {"include", "play", "fault", "montecarlo"}
+VISIBLE = [name for name, command in COMMANDS.items() if command.panel]
 PUBLISHED_POINT = ("--altitude", "85000 ft", "--velocity", "7702.0808 ft/s")
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", sorted(COMMANDS))
 def test_help_of_every_command_has_an_example(hsv, command):
     ran = hsv(command, "--help")
     assert ran.code == 0
@@ -37,7 +39,7 @@ def test_help_of_every_command_has_an_example(hsv, command):
 )
 def test_the_prose_of_a_help_text_is_folded_by_the_terminal_alone(words, prose):
     ran = subprocess.run(
-        [sys.executable, "-m", "hsv.cli.main", *words, "-h"],
+        [sys.executable, "-m", "hsv.cli.entry", *words, "-h"],
         capture_output=True,
         text=True,
         env=os.environ | {"COLUMNS": "300"},
@@ -74,14 +76,26 @@ def test_help_and_documentation_have_the_same_exit_codes(hsv):
 def test_a_shell_is_told_the_words_that_may_come(tmp_path, typed, due):
     asked = {"_HSV_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" "))}
     ran = subprocess.run(
-        [sys.executable, "-m", "hsv.cli.main"], capture_output=True, text=True, cwd=tmp_path, env=os.environ | asked
+        [sys.executable, "-m", "hsv.cli.entry"], capture_output=True, text=True, cwd=tmp_path, env=os.environ | asked
     )
     assert ran.returncode == 0 and set(ran.stdout.split()) == due
 
 
 def test_the_list_of_commands_is_the_answer_to_no_command(hsv):
     ran = hsv()
-    assert all(command in ran.out + ran.err for command in COMMANDS)
+    assert ran.out == hsv("--help").out
+    assert len(VISIBLE) <= 29
+    listed = re.findall(r"^│ ([a-z]\S+) {2,}", ran.out, re.MULTILINE)
+    assert sorted(listed) == sorted(VISIBLE)
+    assert all(f"─ {panel} ─" in ran.out for panel, _, _ in TREE if panel)
+
+
+@pytest.mark.parametrize("old", MOVED)
+def test_an_old_name_is_answered_in_one_line_with_the_new_one(hsv, old):
+    ran = hsv(old, "case1", "--json")
+    assert ran.code == 2 and ran.out == ""
+    assert ran.error == f"hsv {old} {MOVED[old]}"
+    assert {*re.findall(r"hsv (\S+)", MOVED[old])} <= {*COMMANDS}
 
 
 def test_trim_of_the_literature_to_all_digits(hsv):
@@ -99,14 +113,15 @@ def test_trim_of_a_climb(hsv):
     level = hsv("trim", "--json").json
     climbing = hsv("trim", "--climb-rate", "10 ft/s", "--acceleration", "4 ft/s^2", "--json").json
     sinking = hsv("trim", "--climb-rate", "-10 ft/s", "--json").json
-    for values, sine in ((level, 0.0), (climbing, 10.0 / 7900.0), (sinking, -10.0 / 7900.0)):
+    for values, sine in ((level, 0.0), (climbing, 10.0 / 7702.0808), (sinking, -10.0 / 7702.0808)):
         assert math.sin(values["pitch_angle_rad"] - values["angle_of_attack_rad"]) == pytest.approx(sine, abs=1e-12)
         assert values["largest_residual_si"] < 1e-12
     assert sinking["thrust_N"] < level["thrust_N"] < climbing["thrust_N"]
 
 
-def test_trim_in_si(hsv):
-    values = hsv("trim", *PUBLISHED_POINT, "--json").json
+def test_trim_in_si_at_the_default_point(hsv):
+    values = hsv("trim", "--json").json
+    assert values == hsv("trim", *PUBLISHED_POINT, "--json").json
     assert values["altitude_m"] == 25908.0
     assert values["angle_of_attack_rad"] == pytest.approx(math.radians(1.644566), rel=1e-6)
     assert values["thrust_N"] > 0
@@ -125,13 +140,16 @@ def test_trim_table_for_people(hsv):
 )
 def test_linearise_prints_the_coupled_poles(hsv, coupling, expected):
     values = hsv("linearise", "--coupling", coupling, "--json").json
-    poles = {(round(p["natural_frequency_rad_per_s"], 2), round(p["damping_ratio"], 4)) for p in values["poles"]}
+    poles = {(round(p["natural_frequency_rad_per_s"], 2), round(p["damping_ratio"] or 0.0, 4)) for p in values["poles"]}
     assert expected <= poles
     assert np.array(values["A_si"]).shape == (9, 9)
     assert np.array(values["B_si"]).shape == (9, 2)
     table = hsv("linearise", "--coupling", coupling).out
     assert all(f"{frequency:.3g}" in table for frequency, _ in expected)
     assert "…" not in table
+    origin = values["poles"][-1]
+    assert abs(origin["natural_frequency_rad_per_s"]) < 1e-9 and origin["damping_ratio"] is None
+    assert table.rstrip().splitlines()[-1].split() == ["0", "0", "0", "-"]
 
 
 def test_linearise_in_paper_units_has_the_same_poles(hsv):
@@ -152,16 +170,16 @@ def test_linearise_decoupled_has_the_structural_modes(hsv):
 
 
 def test_scenarios_lists_them_all(hsv):
-    assert set(hsv("scenarios", "--json").json) == set(scenario_names())
-    out = hsv("scenarios").out
+    assert set(hsv("list", "scenarios", "--json").json) == set(scenario_names())
+    out = hsv("list", "scenarios").out
     assert all(name in out for name in scenario_names())
 
 
 def test_vehicles_lists_them_all_and_shows_one_that_can_be_flown(hsv, tmp_path):
-    assert set(hsv("vehicles", "--json").json) == {"parker", "stiffened"}
-    assert all(name in hsv("vehicles").out for name in ("parker", "stiffened"))
-    (tmp_path / "mine.toml").write_text(hsv("vehicles", "--show", "stiffened").out)
-    table = hsv("vehicles", "--show", "mine.toml", "--json").json
+    assert set(hsv("list", "vehicles", "--json").json) == {"parker", "stiffened"}
+    assert all(name in hsv("list", "vehicles").out for name in ("parker", "stiffened"))
+    (tmp_path / "mine.toml").write_text(hsv("list", "vehicles", "stiffened").out)
+    table = hsv("list", "vehicles", "mine.toml", "--json").json
     assert table["rigid_body"]["mass"] == {"value": "318 slug", "symbol": "m", "uncertainty": "10 %"}
     mine, shipped = (hsv("trim", "--vehicle", name, "--json").json for name in ("mine.toml", "stiffened"))
     assert mine == shipped != hsv("trim", "--json").json
@@ -184,11 +202,11 @@ def test_simulate_case1(hsv, units):
     assert ran.json["within_limits"] is True
     assert ran.json["diverged_at_s"] is None
     assert ran.json["real_time_factor"] > 0
-    suffixes = [key for key in UNIT_KEYS.values() if key]
     for key in ran.json["metrics"]:
         name = next(name for name in sorted(METRICS, key=len, reverse=True) if key.startswith(name))
-        unit = key.removeprefix(name).removeprefix("_")
-        assert unit in suffixes if METRICS[name].unit != "1" else unit == ""
+        si = METRICS[name].unit
+        unit = unit_key(PAPER_UNITS.get(si, si) if units == "paper" else si)
+        assert key == "_".join(filter(None, (name, unit)))
     assert ("altitude_end_error_ft" in ran.json["metrics"]) is (units == "paper")
 
 
@@ -248,17 +266,17 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
         (("trim", "--velocity", "nan ft/s"), "velocity = 'nan ft/s': "),
         (
             ("trim", "--altitude", "200000 ft"),
-            "altitude = '200000 ft', velocity = '7900 ft/s': trim needs fuel_equivalence_ratio = -0.114628, expected",
+            "altitude = '200000 ft', velocity = '7702.0808 ft/s': trim needs fuel_equivalence_ratio = -",
         ),
         (("trim", "--climb-rate", "10"), "climb_rate = '10': the unit is missing"),
         (("trim", "--acceleration", "4 ft/s"), "acceleration = '4 ft/s': wrong unit"),
         (
             ("trim", "--climb-rate", "10 km/s"),
-            "altitude = '85500 ft', velocity = '7900 ft/s', climb_rate = '10 km/s': expected a climb rate below",
+            "altitude = '85000 ft', velocity = '7702.0808 ft/s', climb_rate = '10 km/s': expected a climb rate below",
         ),
         (
             ("trim", "--acceleration", "100 ft/s^2"),
-            "altitude = '85500 ft', velocity = '7900 ft/s', acceleration = '100 ft/s^2': trim needs fuel_equivalence",
+            "altitude = '85000 ft', velocity = '7702.0808 ft/s', acceleration = '100 ft/s^2': trim needs fuel",
         ),
         (("trim", "--coupling", "strong"), "coupling = 'strong': expected one of paper_like, derived"),
         (
@@ -269,7 +287,7 @@ def test_json_has_no_numbers_that_json_lacks(hsv, tmp_path, capsys):
             ("linearise", "--vehicle", "absent.toml"),
             "vehicle 'absent.toml': cannot be read (No such file or directory)",
         ),
-        (("vehicles", "--show", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
+        (("list", "vehicles", "absent"), "vehicle 'absent': expected one of parker, stiffened or the path of a TOML"),
         (("linearise", "--model", "XM"), "model = 'XM': expected one of CM, DM"),
         (("simulate", "case9"), "scenario 'case9': expected a path or one of case1, case1_active"),
         (("simulate", "case1", "--units", "feet"), "Invalid value for '--units': 'feet' is not one of 'metric', 'si'"),
@@ -340,17 +358,45 @@ def design_with(gain, words):
 
 
 @pytest.mark.parametrize(
-    "words", [("trim", "--units", "imperial"), ("trim", "--wings"), ("fly",), ("simulate", "a", "b")]
+    ("words", "message"),
+    [
+        ("trim --units imperial", "Invalid value for '--units': 'imperial' is not one of"),
+        ("trim --wings", "No such option: --wings"),
+        ("simulat case1", "command 'simulat': unknown (did you mean 'simulate'?)"),
+        ("simulate a b", "Got unexpected extra argument"),
+        ("simulate case1 --json --json", "--json: given twice, expected once"),
+        ("trim --altitude 1 --units si --altitude 2", "--altitude: given twice, expected once"),
+        ("montecarlo case1 --samples 3 --samples 4", "--samples: given twice, expected once"),
+        ("list faults oscilation", "fault = 'oscilation': expected one of loss_of_effectiveness, "),
+        ("simulate case1 --out x.csv", "out = 'x.csv': expected a file that ends in .npz"),
+    ],
 )
-def test_usage_errors_have_code_2(hsv, words):
-    ran = hsv(*words)
+def test_usage_errors_are_one_line_with_code_2(hsv, words, message):
+    ran = hsv(*words.split())
+    assert ran.code == 2 and ran.out == ""
+    assert ran.error.startswith(message)
+
+
+@pytest.mark.parametrize("words", ["--traceback simulate absent.toml", "simulate absent.toml --traceback"])
+def test_a_traceback_is_printed_if_asked_for(hsv, monkeypatch, words):
+    monkeypatch.setenv("HSV_TRACEBACK", "0")
+    assert hsv("simulate", "absent.toml").err.count("\n") == 1
+    ran = hsv(*words.split())
     assert ran.code == 2
-    assert ran.err.startswith("hsv: error: ") and ran.err.count("\n") == 1
-    assert ran.out == ""
+    assert ran.err.startswith("Traceback") and ran.err.splitlines()[-1].startswith("hsv: error: scenario 'absent.toml'")
+
+
+def test_with_strict_a_limit_that_is_not_kept_is_no_success(hsv):
+    assert hsv("simulate", "case1", "--strict").code == 0
+    assert hsv("simulate", "case1_single_k").code == 0
+    ran = hsv("simulate", "case1_single_k", "--strict", "--all")
+    assert ran.code == 1
+    assert "limits not kept" in ran.error
+    assert "not judged" in ran.out and "not judged" not in hsv("simulate", "case1").out
 
 
 def command(*words, cwd):
-    return subprocess.run([sys.executable, "-m", "hsv.cli.main", *words], capture_output=True, text=True, cwd=cwd)
+    return subprocess.run([sys.executable, "-m", "hsv.cli.entry", *words], capture_output=True, text=True, cwd=cwd)
 
 
 def test_as_a_process_it_prints_json_on_standard_output_alone(tmp_path):

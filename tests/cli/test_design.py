@@ -46,7 +46,7 @@ def test_a_design_is_written_here_and_comes_out_alike_on_another_processor(hsv, 
     text = (here / "small.yaml").read_text()
     assert text.count(entry) == 1
     small.with_suffix(".yaml").write_text(text.replace(entry, repr(1.01 * float(entry))))
-    words = [sys.executable, "-m", "hsv.cli.main", "design", str(small), "--check", "--json"]
+    words = [sys.executable, "-m", "hsv.cli.entry", "design", str(small), "--check", "--json"]
     processor = {"OPENBLAS_CORETYPE": "Nehalem", "OPENBLAS_NUM_THREADS": "1"}
     checked = subprocess.run(words, env=os.environ | processor, capture_output=True, text=True)
     assert checked.returncode == 1

@@ -7,23 +7,23 @@ SETS += ["ideal", "fine", "ghv", "inertial"]
 
 
 def test_every_set_is_listed_with_its_source(hsv):
-    listed = hsv("equipment", "--json").json
+    listed = hsv("list", "equipment", "--json").json
     assert list(listed) == SETS
     assert all(entry["source"] for entry in listed.values())
-    out = hsv("equipment").out
+    out = hsv("list", "equipment").out
     assert all(name in out for name in SETS)
 
 
 @pytest.mark.parametrize("name", SETS)
 def test_a_scenario_may_name_the_set_in_the_table_that_is_printed(hsv, name):
-    described = hsv("equipment", name, "--json").json
+    described = hsv("list", "equipment", name, "--json").json
     text = f'{scenario_text("case1")}\n[{described["table"]}]\nset = "{name}"\n'
     assert parse_scenario(text, "flight").equipment == {f"{described['table']}.set": name}
-    assert f'[{described["table"]}] set = "{name}"' in hsv("equipment", name).out
+    assert f'[{described["table"]}] set = "{name}"' in hsv("list", "equipment", name).out
 
 
 def test_published_numbers_of_the_elevator_and_of_the_research_sensors(hsv):
-    elevator = hsv("equipment", "elevator_50", "--units", "paper", "--json").json["numbers"]
+    elevator = hsv("list", "equipment", "elevator_50", "--units", "paper", "--json").json["numbers"]
     numbers = {row["quantity"]: (pytest.approx(row["value"]), row["unit"]) for row in elevator}
     assert numbers == {
         "order": (2, ""),
@@ -32,14 +32,14 @@ def test_published_numbers_of_the_elevator_and_of_the_research_sensors(hsv):
         "stop": (20.0, "deg"),
         "rate_limit": (400.0, "deg/s"),
     }
-    sensors = hsv("equipment", "ghv", "--units", "paper", "--json").json["numbers"]
+    sensors = hsv("list", "equipment", "ghv", "--units", "paper", "--json").json["numbers"]
     noise = {row["channel"]: row["value"] for row in sensors}
     assert noise["altitude"] ** 2 == pytest.approx(10.0)
     assert noise["pitch_rate"] == pytest.approx(0.1812, rel=1e-3)
 
 
 def test_an_unknown_set_is_refused_with_the_nearest(hsv):
-    ran = hsv("equipment", "elevator_51")
+    ran = hsv("list", "equipment", "elevator_51")
     assert ran.code == 2
-    assert ran.error.startswith("name = 'elevator_51': expected one of elevator_50, ")
+    assert ran.error.startswith("equipment = 'elevator_51': expected one of elevator_50, ")
     assert ran.error.endswith("(did you mean 'elevator_50'?)")

@@ -11,7 +11,7 @@ from node_processes import short_scenario
 from recorded_flight import record_flight
 
 from hsv.base.errors import ParameterError
-from hsv.cli.targets import writing
+from hsv.cli.output import writing
 from hsv.control.certificate import write_certificate
 
 FULL = Path("/dev/full")
@@ -21,7 +21,7 @@ def command(*words, out, buffered=True):
     """Run the command as a process of its own: what matters is also what Python does at its end."""
     environment = os.environ | {"PYTHONUNBUFFERED": "" if buffered else "1"}
     ran = subprocess.run(
-        [sys.executable, "-m", "hsv.cli.main", *words], stdout=out, stderr=subprocess.PIPE, text=True, env=environment
+        [sys.executable, "-m", "hsv.cli.entry", *words], stdout=out, stderr=subprocess.PIPE, text=True, env=environment
     )
     return ran.returncode, ran.stderr
 

@@ -23,8 +23,6 @@ COMMANDS = [
     "check tube_mpc",
     "montecarlo case1 --samples 2000",
     "resilience --controllers case1 --faults elevator_loss",
-    "claims",
-    "study coupling",
     "bench --only in_process",
     "certify baseline.yaml",
     "run case1 --live --live-port 0",

@@ -15,7 +15,6 @@ from rich.console import Console
 from hsv.bags.metadata import FILE_NAME
 from hsv.base.units import UnitSystem
 from hsv.cli import output
-from hsv.cli.progress import flight, stages
 from hsv.cli.summary import print_section
 
 NAME = "run[old] [/x] :bug:"
@@ -55,19 +54,19 @@ def test_lines_of_nodes_and_titles_are_printed_as_they_are(capsys: pytest.Captur
 
 def test_a_bar_shows_the_name_of_a_scenario_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     written = io.StringIO()
-    monkeypatch.setattr("hsv.cli.progress.errors", Console(file=written, force_terminal=True, width=200))
-    with flight(NAME, 100) as line:
-        line.step(50)
-    with stages() as progress:
+    monkeypatch.setattr(output, "errors", Console(file=written, force_terminal=True, width=200))
+    with output.flight_line(NAME, 100, UnitSystem.si) as (show_step, _):
+        show_step(50)
+    with output.stages() as progress:
         progress(NAME, 1, 2)
     assert written.getvalue().count("run[old] [/x]") >= 2
 
 
 def test_control_characters_are_shown_and_not_sent_to_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    title = "\x1b[31mred\x1b]0;title\x07 \x9b2J \x08\r\x7f\tend"
+    title = "\x1b[31mred\x1b]0;title\x07 \x9b2J \x08\r\x7f\u202e\u200b\u2028\u2066\tend"
     terminal = type(output.console)(file=io.StringIO(), force_terminal=True, highlight=False, width=200)
     terminal.print(title, soft_wrap=True)
     output.report_error(title)
     for shown in (terminal.file.getvalue(), capsys.readouterr().err):  # type: ignore[attr-defined]
-        assert not {"\x1b", "\x07", "\x08", "\x9b", "\x7f", "\r"} & set(shown)
+        assert not set("\x1b\x07\x08\x9b\x7f\r\u202e\u200b\u2028\u2066") & set(shown)
         assert r"\x1b[31mred\x1b]0;title" in shown and r"\x9b2J" in shown

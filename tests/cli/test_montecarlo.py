@@ -100,7 +100,7 @@ def test_a_flight_keeps_the_design_that_was_flown(drawn, hsv, tmp_path, monkeypa
 
 
 def test_a_distribution_is_shown_but_not_flown_alone(drawn, hsv):
-    assert "7910 ft/s" in hsv("scenarios", "--show", "drawn.toml").out
+    assert "7910 ft/s" in hsv("list", "scenarios", "drawn.toml").out
     for command in ("simulate", "run"):
         refused = hsv(command, "drawn.toml")
         assert refused.code == 2

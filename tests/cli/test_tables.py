@@ -5,30 +5,40 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from hsv.cli.claims import _print_ranking
 from node_processes import short_scenario
 
 from hsv.base.units import UnitSystem
 from hsv.bench.figure import Figure
-from hsv.cli.bench import _print as print_figures
-from hsv.cli.certify import HALF_WIDTHS
-from hsv.cli.design import _steps
+from hsv.cli.design import HALF_WIDTHS, _steps
+from hsv.cli.know import _print_figures
 from hsv.cli.output import console, quantity_table
 from hsv.design.verification.verifier import load_subject
-from hsv_paper.claims.ranking import CONTROLLERS, METRICS, Rank
 
 DESIGNS = Path(__file__).parents[2] / "offline_design"
 
 COMMANDS = [
-    ("scenarios",),
-    ("vehicles",),
-    ("equipment",),
-    ("equipment", "elevator_50"),
-    ("equipment", "fine", "--units", "paper"),
-    ("faults",),
-    ("faults", "loss_of_effectiveness"),
-    ("faults", "oscillation", "--units", "si"),
-    ("faults", "sensor_runaway", "--units", "paper"),
+    (
+        "list",
+        "scenarios",
+    ),
+    (
+        "list",
+        "vehicles",
+    ),
+    (
+        "list",
+        "equipment",
+    ),
+    ("list", "equipment", "elevator_50"),
+    ("list", "equipment", "fine", "--units", "paper"),
+    (
+        "list",
+        "faults",
+    ),
+    ("list", "faults", "loss_of_effectiveness"),
+    ("list", "faults", "oscillation", "--units", "si"),
+    ("list", "faults", "sensor_runaway", "--units", "paper"),
+    ("list", "controllers"),
     ("trim",),
     ("linearise", "--model", "ECM", "--coupling", "derived"),
     ("simulate", "case1"),
@@ -110,7 +120,7 @@ def test_the_steps_of_a_design_and_the_figures_of_a_machine_do_so_too(pair) -> N
     report = load_subject(DESIGNS / "adjustable.yaml").certificate
     check(*pair(lambda: console.print(_steps(report, UnitSystem.paper))))
     figure = Figure("name", "what is measured, in a sentence " * 3, "another", "s", (1.0, 1.1), (2.0, 2.1), 3.0)
-    check(*pair(lambda: print_figures([figure])))
+    check(*pair(lambda: _print_figures([figure])))
 
 
 @pytest.mark.parametrize(
@@ -125,11 +135,3 @@ def test_half_widths_of_a_set_are_in_the_units_asked_for(capsys, units, expected
     console.print(_steps(load_subject(DESIGNS / "adjustable.yaml").certificate, system))
     [line] = [line for line in capsys.readouterr().out.splitlines() if "gains, |u_n|" in line]
     assert line.rstrip().endswith("rad" if units == "si" else "deg")
-
-
-def test_the_ranking_is_in_the_units_asked_for(capsys) -> None:
-    ranks = {metric: {name: Rank(0.3048, 0.3048, 1, 1) for name in CONTROLLERS} for metric in METRICS}
-    for units, number in (("metric", "0.305"), ("paper", "1")):
-        _print_ranking(ranks, UnitSystem(units))
-        [line] = [line for line in capsys.readouterr().out.splitlines() if line.startswith("altitude error at the")]
-        assert line.split()[-4:] == [number] * 4

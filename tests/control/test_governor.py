@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import GovernorError
-from hsv.cli.command import command
-from hsv.cli.govern import govern as govern_command
+from hsv.cli.design import govern as govern_command
+from hsv.cli.in_flight import command
 from hsv.control import governor
 from hsv.control.design_file import find_design, read_design
 from hsv.control.governor import (

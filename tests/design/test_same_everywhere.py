@@ -28,7 +28,7 @@ PROCESSORS = {
 @pytest.mark.parametrize("processor", PROCESSORS)
 @pytest.mark.parametrize("name", DESIGNS)
 def test_a_shipped_design_comes_out_as_shipped(name, processor):
-    words = [sys.executable, "-m", "hsv.cli.main", "design", name, "--check", "--json"]
+    words = [sys.executable, "-m", "hsv.cli.entry", "design", name, "--check", "--json"]
     ran = subprocess.run(words, env=os.environ | PROCESSORS[processor], capture_output=True, text=True)
     assert ran.returncode == 0, ran.stderr
     found = {d["parameter"]: d["scaled"] for d in json.loads(ran.stdout)["deviations"]}

@@ -73,9 +73,10 @@ def designed(hsv, monkeypatch, source, target):
 
 @pytest.fixture
 def hsv():
-    from hsv.cli.main import main
+    from hsv.cli.entry import COMMANDS
+    from hsv.cli.main import run
 
-    return main
+    return lambda: run("hsv", COMMANDS, "")
 
 
 def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):

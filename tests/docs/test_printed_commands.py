@@ -18,8 +18,8 @@ PAGES = ("README.md", "docs/installation.md")
 HERE = {
     "hsv run case1 --bag bags/case1_readme",
     "hsv plot bags/case1_readme --units paper --out docs/images/case1.png",
-    "hsv scenarios",
-    "hsv vehicles",
+    "hsv list scenarios",
+    "hsv list vehicles",
     "hsv run case1 --bag bags/first",
     "hsv run case1_derived --bag bags/second",
     "hsv simulate case1",

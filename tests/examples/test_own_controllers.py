@@ -51,7 +51,7 @@ class Installed:
         )
 
     def hsv(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return self.python("-m", "hsv.cli.main", *words)
+        return self.python("-m", "hsv.cli.entry", *words)
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +194,7 @@ def test_what_the_example_in_c_refuses_is_said_in_a_line(checkout, tmp_path):
     }.items():
         path = tmp_path / "mine.toml"
         path.write_text(f'extends = "{checkout}/examples/c_gain_scheduled/c_gain_scheduled.toml"\n{text}\n')
-        command = [sys.executable, "-m", "hsv.cli.main", "simulate", str(path)]
+        command = [sys.executable, "-m", "hsv.cli.entry", "simulate", str(path)]
         ran = subprocess.run(command, capture_output=True, text=True)
         assert ran.returncode == 2
         [line] = ran.stderr.splitlines()

@@ -7,8 +7,7 @@ import inspect
 import sys
 from pathlib import Path
 
-from hsv.cli.prepare import prepare
-from hsv.cli.run import run
+from hsv.cli.fly import prepare, run
 
 FILE = Path(__file__).parents[2] / "ros_ws" / "src" / "hsv_bringup" / "launch" / "sil.launch.py"
 TREE = ast.parse(FILE.read_text(encoding="utf-8"))

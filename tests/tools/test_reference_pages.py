@@ -12,7 +12,8 @@ from typer.main import get_command
 import hsv
 import reference_pages
 import repository_pages
-from hsv.cli.all_commands import app
+from hsv.cli.entry import COMMANDS
+from hsv.cli.main import application
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,7 +30,7 @@ def test_every_command_has_a_section_with_all_its_options():
         for child, below in getattr(command, "commands", {}).items():
             check(f"{name} {child}", below)
 
-    check("hsv", get_command(app))
+    check("hsv", get_command(application(COMMANDS)))
     assert found == {}
     assert "...\n" not in re.sub(r"^\$ .*", "", page, flags=re.MULTILINE)
 

@@ -29,7 +29,7 @@ from launch_ros.actions import Node
 from launch import Action, LaunchContext, LaunchDescription
 
 ARGUMENTS = {
-    "scenario": ("case1", "name of a shipped scenario (hsv scenarios lists them), or path of a TOML file"),
+    "scenario": ("case1", "name of a shipped scenario (hsv list scenarios lists them), or path of a TOML file"),
     "bag": ("", "bag to write, a new folder; empty: bags/<scenario>_<UTC>"),
     "real_time_factor": ("", "pace: 1 is real time, 0 as fast as possible; empty: 0, with a live view 1"),
     "step_timeout": (

@@ -30,7 +30,7 @@ def design_and_verify() -> list[Figure]:
 
 def _timed(*words: str) -> float:
     started = time.perf_counter()
-    ran = subprocess.run([sys.executable, "-m", "hsv.cli.main", *words], capture_output=True, text=True)
+    ran = subprocess.run([sys.executable, "-m", "hsv.cli.entry", *words], capture_output=True, text=True)
     if ran.returncode:
         raise RunError(f"hsv {' '.join(words)}: exit code {ran.returncode}: {ran.stderr.strip()}")
     return time.perf_counter() - started

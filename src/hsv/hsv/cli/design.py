@@ -1,4 +1,4 @@
-"""The command ``hsv design``."""
+"""Commands on models and designs: trim, linear models, design, verification, certification, governor and export."""
 
 from __future__ import annotations
 
@@ -7,19 +7,229 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
-from hsv.base.units import UnitSystem, in_words, significant
-from hsv.cli.options import JsonOption, UnitsOption
-from hsv.cli.output import console, folded, new_table, print_json, quantity_table, report_error
-from hsv.cli.targets import check_target, writing
+from hsv.base.errors import DesignError, ParameterError, QuantityError
+from hsv.base.units import UnitSystem, in_system, in_words, significant
+from hsv.cli.options import DesignArgument, ForceOption, JsonOption, ScenarioArgument, UnitsOption
+from hsv.cli.output import (
+    check_folder,
+    check_new,
+    console,
+    folded,
+    json_system,
+    new_table,
+    print_json,
+    print_matrix,
+    print_table,
+    print_written,
+    quantity_table,
+    report_error,
+    say,
+    stages,
+    to_json,
+    writing,
+)
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    import numpy as np
     from rich.table import Table
 
     from hsv.control.design import ControlDesign
-    from hsv.design.baseline import DesignResult
     from hsv.design.inputs import DesignInputs
     from hsv.design.sets.compare import Row
+    from hsv.design.verification.checks import Check
+    from hsv.model.modes import Mode
+    from hsv.model.trim import Trim
+    from hsv.model.vehicle_parameters import VehicleParameters
+
+ALTITUDE, VELOCITY = "85000 ft", "7702.0808 ft/s"
+"""Flight condition at which the literature publishes a trim: the default of trim and linearise."""
+
+AT_REST = ("0 m/s", "0 m/s^2")
+"""Climb rate and acceleration of level, steady flight."""
+
+AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '85500 ft'.")]
+VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
+CouplingOption = Annotated[
+    str,
+    typer.Option(
+        help="Inertial coupling: a set of the vehicle, by default its first, or a multiple of derived, as 0.65."
+    ),
+]
+VehicleOption = Annotated[
+    str, typer.Option(help="Name of a vehicle (hsv list vehicles), or path of a TOML file; default: the paper's.")
+]
+
+READINGS = ("physical", "printed")
+FILTER_UNITS = ("rad", "rad s")
+UNIT_SYSTEMS = {
+    UnitSystem.metric: "SI with degrees",
+    UnitSystem.si: "SI",
+    UnitSystem.paper: "ft, ft/s, deg, slug^0.5 ft",
+}
+HALF_WIDTHS = {
+    "h": "m",
+    "V": "m/s",
+    "alpha": "rad",
+    "theta": "rad",
+    "q": "rad/s",
+    "FZ fuel": "1",
+    "FZ elevator": "rad",
+}
+"""Columns of a table of invariant sets, with SI units: half-widths of the rigid states, and of the feedback on them."""
+
+
+def _trim_at(
+    vehicle: VehicleParameters,
+    altitude: str,
+    velocity: str,
+    climb_rate: str = AT_REST[0],
+    acceleration: str = AT_REST[1],
+) -> Trim:
+    """Return the equilibrium at a condition with units; an error repeats the condition as it was written."""
+    from hsv.base.units import parse_quantity
+    from hsv.model.trim import trim
+
+    units = {"altitude": "m", "velocity": "m/s", "climb_rate": "m/s", "acceleration": "m/s^2"}
+    written = dict(zip(units, (altitude, velocity, climb_rate, acceleration), strict=True))
+    condition = {name: parse_quantity(text, units[name], name) for name, text in written.items()}
+    shown = [name for name in units if condition[name] or name in ("altitude", "velocity")]
+    return trim(vehicle, **condition, where=", ".join(f"{name} = {written[name]!r}" for name in shown))
+
+
+def trim(
+    altitude: AltitudeOption = ALTITUDE,
+    velocity: VelocityOption = VELOCITY,
+    climb_rate: Annotated[str, typer.Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
+    acceleration: Annotated[str, typer.Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
+    vehicle: VehicleOption = "",
+    coupling: CouplingOption = "",
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Compute the equilibrium at an altitude and a velocity (paper eq. 5): level, or climbing and accelerating.
+
+    Example: hsv trim --altitude "85500 ft" --velocity "7900 ft/s" --units paper
+    """
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
+    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
+
+    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
+    result = _trim_at(parameters, altitude, velocity, climb_rate, acceleration)
+    names = (*STATE_NAMES, *INPUT_NAMES, "lift", "drag", "thrust", "pitching_moment", "dynamic_pressure")
+    values = (*result.state.tolist(), *result.input.tolist(), *forces(result.state, result.input, parameters))
+    si = (*STATE_UNITS, *INPUT_UNITS, "N", "N", "N", "N m", "Pa")
+    quantities = dict(zip(names, zip(values, si, strict=True), strict=True))
+    if json:
+        print_json(to_json(quantities, units) | {"largest_residual_si": result.residual})
+    else:
+        print_table("Trim", quantities, units, digits=5)
+
+
+def linearise(
+    altitude: AltitudeOption = ALTITUDE,
+    velocity: VelocityOption = VELOCITY,
+    vehicle: VehicleOption = "",
+    coupling: CouplingOption = "",
+    model: Annotated[
+        str, typer.Option(help="Coupled (CM) or decoupled (DM) model, or CM with the notch filter in it (ECM).")
+    ] = "CM",
+    reading: Annotated[
+        str,
+        typer.Option(
+            help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q'); default: physical."
+        ),
+    ] = "",
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Compute the Jacobians A, B and the poles at a trim point (paper eq. 6 to eq. 9; for the ECM eq. 40 to eq. 43).
+
+    Example: hsv linearise --coupling derived --model ECM
+    """
+    import numpy as np
+
+    from hsv.control.notch_filter import continuous, default_sections, series
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
+    from hsv.model.extended import Filter, extended_jacobian, extended_state
+    from hsv.model.modes import modes
+    from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
+    from hsv.model.vehicle_parameters import MODELS
+
+    if model not in (*MODELS, "ECM"):
+        raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
+    if reading and model != "ECM":
+        raise QuantityError(f"reading = {reading!r}: expected with model ECM only")
+    reading = reading or READINGS[0]
+    if reading not in READINGS:
+        raise QuantityError(f"reading = {reading!r}: expected one of {', '.join(READINGS)}")
+    parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
+    if model == "DM":
+        parameters = parameters.decoupled()
+    point = _trim_at(parameters, altitude, velocity)
+    names: tuple[str, ...] = STATE_NAMES
+    state_units: tuple[str, ...] = STATE_UNITS
+    other_poles: list[Mode] = []
+    if model == "ECM":
+        notch = Filter(*series(continuous(default_sections())))
+        state = extended_state(point.state, notch)
+        made = {name: extended_jacobian(state, point.input, parameters, notch, name == "printed") for name in READINGS}
+        A, B = made[reading]
+        other_poles = modes(next(made[name][0] for name in READINGS if name != reading))
+        names = tuple("filtered_pitch_rate" if name == "pitch_rate" else name for name in STATE_NAMES)
+        names += tuple(f"filter_{i + 1}" for i in range(len(notch.B)))
+        state_units += FILTER_UNITS * (len(notch.B) // 2)
+    else:
+        A, B = jacobian(point.state, point.input, parameters)
+    poles = modes(A)
+    if json:
+        units = json_system(units)
+    state, inputs = (np.array([in_system(1.0, unit, units)[0] for unit in row]) for row in (state_units, INPUT_UNITS))
+    A = A * state[:, None] / state
+    B = B * state[:, None] / inputs
+    if json:
+        found = {"states": names, "inputs": INPUT_NAMES, f"A_{units}": A.tolist(), f"B_{units}": B.tolist()}
+        others = {"poles_of_the_other_reading": list(map(_pole, other_poles))} if other_poles else {}
+        print_json({**found, "poles": list(map(_pole, poles)), **others})
+        return
+    for name, matrix, columns in (("A", A, names), ("B", B, INPUT_NAMES)):
+        cells = [[significant(entry) for entry in row] for row in matrix.tolist()]
+        print_matrix(f"{name} ({UNIT_SYSTEMS[units]})", names, columns, cells)
+    console.print(_pole_table("Poles", poles))
+    if other_poles:
+        console.print(_pole_table("Poles for the other reading of eq. 40", other_poles))
+
+
+def _damping(mode: Mode) -> float | None:
+    """Return the damping ratio; ``None`` for a pole at the origin, whose sign is a matter of rounding."""
+    return mode.damping_ratio if round(mode.natural_frequency, 9) else None
+
+
+def _pole(mode: Mode) -> dict[str, float | None]:
+    return {
+        "real_rad_per_s": mode.pole.real,
+        "imag_rad_per_s": mode.pole.imag,
+        "natural_frequency_rad_per_s": mode.natural_frequency,
+        "damping_ratio": _damping(mode),
+    }
+
+
+def _pole_table(title: str, poles: list[Mode]) -> Table:
+    headings = ("real rad/s", "imaginary rad/s", "frequency rad/s", "damping ratio")
+    table = new_table(*headings, title=title, right=headings)
+    for mode in poles:
+        damping = _damping(mode)
+        table.add_row(
+            # A pole at the origin is zero but for rounding.
+            significant(round(mode.pole.real, 9) + 0.0),
+            f"±{significant(mode.pole.imag)}" if mode.pole.imag else "0",
+            significant(round(mode.natural_frequency, 9)),
+            "-" if damping is None else significant(damping),
+        )
+    return table
 
 
 def design(
@@ -27,7 +237,7 @@ def design(
     out: Annotated[
         Path | None, typer.Option(help="Parameter file to write; default: NAME.yaml in this folder.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite existing files.")] = False,
+    force: ForceOption = False,
     compare_sets: Annotated[
         bool, typer.Option("--compare-sets", help="Also compute the set by the other methods, and print a table.")
     ] = False,
@@ -48,26 +258,32 @@ def design(
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
-    from hsv.base.errors import ParameterError
     from hsv.control.certificate import certificate_path, write_certificate
     from hsv.control.design_file import write_design
+    from hsv.design.adjustable import design_adjustable
+    from hsv.design.baseline import design_baseline
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
 
     source = find_inputs(name)
     inputs = read_inputs(source)
     if tau:
-        inputs = with_tau(inputs, _factors(tau))
-    if check:
-        if out or force or tau or compare_sets:
-            raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
-        _check(source, inputs, json)
-        return
+        try:
+            inputs = with_tau(inputs, [float(part) for part in tau.split(",")])
+        except ValueError as error:
+            if isinstance(error, DesignError):
+                raise
+            raise DesignError(f"tau = {tau!r}: expected one number, or five separated by commas") from error
+    if check and (out or force or tau or compare_sets):
+        raise ParameterError("check: --out, --force, --tau or --compare-sets given, expected --check alone")
     target = out or Path(f"{source.stem}.yaml")
-    for path in (target, certificate_path(target)):
-        check_target(path, "out")
-        if path.exists() and not force:
-            raise ParameterError(f"out = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
-    result = _computed(inputs)
+    if not check:
+        for path in (target, certificate_path(target)):
+            check_new(path, "out", force)
+    with stages() as progress:
+        result = (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
+    if check:
+        _check(source, result.design, json)
+        return
     command = f"hsv design {name}" + (f" --tau {tau}" if tau else "")
     with writing(target, "out"):
         write_design(target, result.design, f"Written by: {command}. SI units; see offline_design/README.md.")
@@ -75,42 +291,50 @@ def design(
         write_certificate(certificate_path(target), result.report)
     rows = _compared(result.design, result.report, inputs) if compare_sets else []
     if json:
-        compared = {"compared_sets": [row.as_dict() for row in rows]} if compare_sets else {}
+        compared = {"compared_sets": [row.as_dict() for row in rows]} if rows else {}
         print_json(result.report | compared | {"file": str(target)})
         return
     if inputs.adjustable:
         console.print(_steps(result.report, units))
     else:
         _summary(result.report)
-    console.print(f"written              {target}, {certificate_path(target).name}", soft_wrap=True)
+    say(f"written              {target}, {certificate_path(target).name}")
     if rows:
-        console.print(_table(rows, units))
-        for row in rows:
-            if row.note:
-                console.print(folded(f"{row.name}: {row.note}"), soft_wrap=True)
+        title = "Invariant sets: half-widths about the centre"
+        sets = [(row.name, _half_widths(row.half_width, row.feedback, row.size)) for row in rows]
+        console.print(quantity_table(title, {**HALF_WIDTHS, "size": "1"}, sets, units))
+        say(*(folded(f"{row.name}: {row.note}") for row in rows if row.note))
 
 
-def _computed(inputs: DesignInputs) -> DesignResult:
-    from hsv.cli.progress import stages
-    from hsv.design.adjustable import design_adjustable
-    from hsv.design.baseline import design_baseline
-
-    with stages() as progress:
-        return (design_adjustable if inputs.adjustable else design_baseline)(inputs, progress)
+def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *size: float | None) -> list[float] | None:
+    """Return half-widths of the rigid states and of the feedback, and a size; ``None`` without a set."""
+    if half_width is None or feedback is None or None in size:
+        return None
+    return [*half_width[:5], *feedback, *(value for value in size if value is not None)]
 
 
-def _check(source: Path, inputs: DesignInputs, json: bool) -> None:
+def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
+    from hsv.design.disturbance import DisturbanceSet
+    from hsv.design.sets.compare import compare_sets
+    from hsv.design.tube_problem import tube_problem
+
+    disturbance = report["tube"]["disturbance"]
+    problem = tube_problem(design, inputs.flown_vehicle, DisturbanceSet.from_report(disturbance["channels"]))
+    delta = disturbance["boxes"]["delta"]
+    return compare_sets(design, problem, delta, inputs.disturbance.inflation, inputs.invariant_set)
+
+
+def _check(source: Path, found: ControlDesign, json: bool) -> None:
     from hsv.design.verification.agreement import deviations
     from hsv.design.verification.verifier import load_subject
 
-    shipped = load_subject(source.with_suffix(".yaml"))
-    found = deviations(_computed(inputs).design, shipped)
-    worst = max(found, key=lambda deviation: deviation.scaled)
+    deviating = deviations(found, load_subject(source.with_suffix(".yaml")))
+    worst = max(deviating, key=lambda deviation: deviation.scaled)
     if json:
-        print_json({"deviations": [vars(deviation) for deviation in found], "ok": worst.ok})
+        print_json({"deviations": [vars(deviation) for deviation in deviating], "ok": worst.ok})
     else:
         table = new_table("parameter", "largest deviation, scaled", "entry")
-        for d in found:
+        for d in deviating:
             table.add_row(d.parameter, significant(d.scaled), ", ".join(map(str, d.index)) if d.scaled else "")
         console.print(table)
     if not worst.ok:
@@ -118,29 +342,22 @@ def _check(source: Path, inputs: DesignInputs, json: bool) -> None:
         raise typer.Exit(1)
 
 
-def _factors(text: str) -> list[float]:
-    from hsv.base.errors import DesignError
-
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError as error:
-        raise DesignError(f"tau = {text!r}: expected one number, or five separated by commas") from error
-
-
 def _summary(report: dict[str, Any]) -> None:
     feedback, tube = report["feedback"], report["tube"]
-    console.print(f"vertices             {report['vertices']}")
-    console.print(f"spectral radius A+BF {max(feedback['spectral_radii']):.6f} (rigid states, worst vertex)")
-    console.print(f"(24) eigenvalue      {min(feedback['lmi_smallest_eigenvalues']):.3g} (least over the vertices)")
-    console.print(f"nominal gains        {len(report['nominal'])}")
-    console.print(f"invariant set        {tube['invariant_set']['kind']}, certified at every vertex")
+    say(
+        f"vertices             {report['vertices']}",
+        f"spectral radius A+BF {max(feedback['spectral_radii']):.6f} (rigid states, worst vertex)",
+        f"(24) eigenvalue      {min(feedback['lmi_smallest_eigenvalues']):.3g} (least over the vertices)",
+        f"nominal gains        {len(report['nominal'])}",
+        f"invariant set        {tube['invariant_set']['kind']}, certified at every vertex",
+    )
     level = tube["flights"]["worst_level"]
     if level is not None:
-        console.print(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
+        say(f"worst level          {level:.3f} (of 1, over {tube['flights']['flights']} flights)")
 
 
 def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
-    """Return the seven steps of Algorithm 1 with what came of each."""
+    """Return the seven steps of Algorithm 1 with their results."""
     import numpy as np
 
     from hsv.control.tube_factor import compact
@@ -184,25 +401,241 @@ def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
     return table
 
 
-def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
-    from hsv.design.disturbance import DisturbanceSet
-    from hsv.design.sets.compare import compare_sets
-    from hsv.design.tube_problem import tube_problem
+def verify(
+    file: DesignArgument,
+    quick: Annotated[bool, typer.Option("--quick", help="Omit flights and random sequences.")] = False,
+    scenario: Annotated[
+        str, typer.Option(help="Fly this scenario instead, and check level, disturbances and nominal inputs.")
+    ] = "",
+    corners: Annotated[
+        bool, typer.Option("--corners", help="With --scenario: also at the corners that determine a bound.")
+    ] = False,
+    json: JsonOption = False,
+) -> None:
+    """Recompute everything that a design and its certificate state, and name the first item that fails.
 
-    disturbance = report["tube"]["disturbance"]
-    problem = tube_problem(design, inputs.flown_vehicle, DisturbanceSet.from_report(disturbance["channels"]))
-    delta = disturbance["boxes"]["delta"]
-    return compare_sets(design, problem, delta, inputs.disturbance.inflation, inputs.invariant_set)
+    No hash is relied on.
+
+    Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
+    """
+    from hsv.control.design_file import find_design
+    from hsv.design.verification.scenario import bounding_corners, scenario_checks
+    from hsv.design.verification.verifier import load_subject
+    from hsv.design.verification.verifier import verify as recompute
+    from hsv.flight.scenario import load_scenario
+
+    if corners and not scenario:
+        raise QuantityError("corners: expected with --scenario only")
+    subject = load_subject(find_design(file))
+    with stages() as progress:
+        checks = recompute(subject, quick or bool(scenario), progress)
+        if scenario:
+            loaded = load_scenario(scenario)
+            over = bounding_corners(subject) if corners else [{}]
+            flights = scenario_checks(subject, loaded, over, lambda done: progress("flights", done, len(over)))
+            checks["scenario"] = list(flights)
+    rows = [(part, check) for part, made in checks.items() for check in made]
+    failing = [(part, check) for part, check in rows if not check.ok]
+    if json:
+        print_json({"claims": [{"part": part, **vars(check)} for part, check in rows], "ok": not failing})
+    else:
+        table = new_table("", "check", "found", "expected")
+        for part, made in checks.items():
+            if made:
+                table.add_row("", Text(part, "bold"), "", "")
+            for check in made:
+                cells = ("ok" if check.ok else "FAIL", f"  {check.name}", _found(check), check.expected)
+                table.add_row(*cells, style=None if check.ok else "bold red")
+        table.add_row("", Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"), "", "")
+        console.print(table)
+    if failing:
+        part, check = failing[0]
+        report_error(f"{part}: check fails: {check}")
+        raise typer.Exit(1)
 
 
-def _table(rows: list[Row], units: UnitSystem) -> Table:
-    from hsv.cli.certify import HALF_WIDTHS
+def _found(check: Check) -> str:
+    """Return the value found to three digits, or in full if they hide on which side of a bound it is."""
+    if isinstance(check.value, str) or not check.ok or significant(check.value) in ("1", "-1"):
+        return check.shown
+    return significant(check.value)
 
-    found: list[tuple[str, list[float] | None]] = []
-    for row in rows:
-        values = None
-        if row.half_width is not None and row.feedback is not None and row.size is not None:
-            values = [*row.half_width[:5], *row.feedback, row.size]
-        found.append((row.name, values))
-    title = "Invariant sets: half-widths about the centre"
-    return quantity_table(title, {**HALF_WIDTHS, "size": "1"}, found, units)
+
+def certify(
+    file: DesignArgument,
+    sensors: Annotated[str, typer.Option(help="Published sensors by name, with their noise and bias.")] = "ideal",
+    bias: Annotated[
+        list[str],
+        typer.Option(help="Constant bias of a rigid state, e.g. 'angle_of_attack=0.05 deg'; can be repeated."),
+    ] = [],  # noqa: B006
+    actuators: Annotated[
+        str,
+        typer.Option(
+            help="Published actuators by name, with commas between, or ideal; "
+            "default: the scenario's, without a scenario those the design knows."
+        ),
+    ] = "",
+    gust: Annotated[str, typer.Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
+    turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
+    density: Annotated[str, typer.Option(help="Largest difference of the density from the model's.")] = "0 %",
+    scenario: Annotated[
+        str,
+        typer.Option(
+            help="Also the actuators, sensors and air of this scenario, by name or path, beside what else is given."
+        ),
+    ] = "",
+    reach: Annotated[
+        float, typer.Option(help="Standard deviations that bound noise and turbulence; 8.572 is beyond all of ours.")
+    ] = 3.0,
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Check whether a design remains certified with given hardware and air, and with which margin.
+
+    Each model is added to the disturbances of the certificate separately, and then all together. A new invariant set is
+    computed, and the nominal trajectory must fit into the input bounds that remain. For actuators, the last line tells
+    whether their limits are reached in that set. For a scenario, everything that the certificate does not cover is
+    listed. The exit code is 1 if the design is not certified.
+
+    Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
+    """
+    from hsv.control.design_file import find_design
+    from hsv.design.verification.declared import declared, declared_actuators, described
+    from hsv.design.verification.verdict import certified_with
+    from hsv.design.verification.verifier import load_subject
+    from hsv.flight.coverage import uncovered_of
+    from hsv.flight.scenario import load_scenario
+
+    subject = load_subject(find_design(file))
+    models, unbounded = described(
+        subject, sensor_set=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density, reach=reach
+    )
+    uncovered: Sequence[str] = ()
+    if scenario:
+        loaded = load_scenario(scenario)
+        uncovered = uncovered_of(loaded, subject.design, subject.certificate)
+        own, further = declared(subject, loaded, reach)
+        models, unbounded = models | own, unbounded + further
+        actuators = actuators or declared_actuators(loaded)
+    with stages() as progress:
+        verdicts = certified_with(subject, models, actuators, progress, unbounded)
+    if json:
+        found = {"verdicts": [verdict.as_dict() for verdict in verdicts], "not_covered": list(uncovered)}
+        print_json({"design": subject.design.name, **found})
+    else:
+        say(*(folded(f"not covered by the certificate: {item}") for item in uncovered))
+        rows = [(verdict.name, _half_widths(verdict.half_width, verdict.feedback)) for verdict in verdicts]
+        console.print(quantity_table("Half-widths of the invariant set", HALF_WIDTHS, rows, units))
+        for verdict in verdicts:
+            state = "certified" if verdict.certified else "not certified"
+            say(folded(f"{verdict.name}: {state}, {verdict.said(units)}"))
+    last = next((verdict for verdict in reversed(verdicts) if not verdict.certified), None)
+    if last:
+        report_error(f"{subject.design.name}: not certified with {last.name}: {last.said(units)}")
+        raise typer.Exit(1)
+
+
+def govern(
+    scenario: ScenarioArgument = "case1",
+    blend: Annotated[
+        str, typer.Option(help="Half the time in which climb rate and acceleration change at a corner.")
+    ] = "2 s",
+    out: Annotated[Path | None, typer.Option(help="Scenario file to write, with the reference.")] = None,
+    force: ForceOption = False,
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Turn the commands of a scenario into the fastest jerk-limited reference that its design permits.
+
+    Steps, ramps and lists of points become ramps along climbing, accelerating trims with blended corners. They are as
+    short as possible while the nominal trajectory stays inside U minus F Z and within the rate limits of the actuators.
+
+    Example: hsv govern case1 --blend "2 s" --out governed.toml
+    """
+    from hsv.base.units import parse_quantity
+    from hsv.flight.governed import governed
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+
+    if out:
+        check_new(out, "out", force)
+    found = governed(scenario, parse_quantity(blend, "s", "blend"))
+    if out:
+        with writing(out, "out"):
+            out.write_text(found.text, encoding="utf-8")
+    reference, plan = found.reference, found.reference.plan
+    rates = abs(plan[1:] - plan[:-1]).max(axis=0)
+    inputs = [
+        (name, unit, (plan[:, i].min(), plan[:, i].max(), found.bounds.minimum[i], found.bounds.maximum[i], rates[i]))
+        for i, (name, unit) in enumerate(zip(INPUT_NAMES, INPUT_UNITS, strict=True))
+    ]
+    if json:
+        keys = ("least", "largest", "lower_bound", "upper_bound", "largest_step")
+        print_json(
+            {
+                "corners": [{"time_s": t, "altitude_m": h, "velocity_m_s": v} for t, h, v, _ in reference.corners],
+                "blend_s": reference.blend,
+                "end_s": reference.end,
+                "plan": {
+                    f"{name}{'_rad' if unit == 'rad' else ''}": dict(zip(keys, values, strict=True))
+                    for name, unit, values in inputs
+                },
+            }
+        )
+        return
+    corners = new_table("corner", "altitude", "velocity", right=("altitude", "velocity"))
+    for t, h, v, _ in reference.corners:
+        corners.add_row(f"{t:g} s", in_words(h, "m", units), in_words(v, "m/s", units))
+    console.print(corners)
+    console.print(f"corners blended over {reference.blend:g} s on either side; at rest from {reference.end:g} s on")
+    heads = ("least", "largest", "lower bound", "upper bound", "largest step in a period")
+    table = new_table("nominal input", *heads, right=heads)
+    for name, unit, values in inputs:
+        table.add_row(name.replace("_", " "), *(in_words(float(value), unit, units) for value in values))
+    console.print(table)
+    if out:
+        say(f"written {out}")
+
+
+def export_controller(
+    design: Annotated[str, typer.Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
+    out: Annotated[Path, typer.Option(help="Folder for the C files; new, or with such files only.")],
+    json: JsonOption = False,
+) -> None:
+    """Write the notch filter, nominal trajectory and tube law of a design as C99; print the cost of a step.
+
+    Example: hsv export-controller baseline --out controller
+    """
+    from hsv.control.design_file import find_design, read_design
+    from hsv.control.export import controller_files, step_bounds
+
+    loaded = read_design(find_design(design))
+    texts = controller_files(loaded)
+    check_folder(out, "out")
+    others = sorted({path.name for path in out.iterdir()} - texts.keys()) if out.exists() else []
+    if others:
+        raise ParameterError(
+            f"out = {str(out)!r}: holds {others[0]}, expected a new folder, or {', '.join(texts)} only"
+        )
+    out.mkdir(parents=True, exist_ok=True)
+    for name, text in texts.items():
+        with writing(out / name, "out"):
+            (out / name).write_text(text, encoding="utf-8")
+    bounds = step_bounds(loaded)
+    if not json:
+        counts = ("multiplications", "additions", "comparisons", "numbers of state")
+        table = new_table("most in a step", *counts, right=counts)
+        for name, bound in bounds.items():
+            table.add_row(name, *map(str, vars(bound).values()))
+        console.print(table)
+    costs = {name: vars(bound) for name, bound in bounds.items()}
+    print_written([out / name for name in texts], json, most_in_a_step=costs)
+
+
+def include() -> None:
+    """Print the folder of hsv_block.h, the header of controllers and other blocks in C, for a compiler's option -I.
+
+    Example: hsv include
+    """
+    from hsv.control.c_block import include_folder
+
+    print(include_folder())

@@ -1,21 +1,71 @@
-"""The ``hsv`` script: the command line, whose imports take a moment in which Ctrl-C may come as well."""
+"""The ``hsv`` script: the table of its commands, and the entry point, which holds back Ctrl-C while modules load."""
 
 from __future__ import annotations
 
 import os
 import sys
+from typing import Any, NamedTuple
 
 from hsv.base.interruption import take_interrupts
 
+DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."
+
+TREE = (
+    ("Fly", "hsv.cli.fly", "run simulate montecarlo resilience"),
+    ("Look at flights", "hsv.cli.look", "report plot info view"),
+    ("In flight", "hsv.cli.in_flight", "fault set command watch topic"),
+    ("Bags", "hsv.cli.bags", "replay diff export recover play"),
+    ("Design", "hsv.cli.design", "trim linearise design verify certify govern export-controller"),
+    ("Know", "hsv.cli.know", "list check bench"),
+    ("", "hsv.cli.fly", "prepare conclude"),
+    ("", "hsv.cli.design", "include"),
+)
+"""The commands by subject: heading in the help, module, names. Commands without a heading are hidden."""
+
+
+class Command(NamedTuple):
+    """Place of a command: the module that defines it, and its heading in the help; without one it is hidden."""
+
+    module: str
+    panel: str = "Commands"
+
+
+COMMANDS = {name: Command(module, panel) for panel, module, names in TREE for name in names.split()}
+
+MOVED = {
+    "scenarios": "is called hsv list scenarios now, and --show NAME hsv list scenarios NAME",
+    "vehicles": "is called hsv list vehicles now, and --show NAME hsv list vehicles NAME",
+    "faults": "is called hsv list faults now",
+    "equipment": "is called hsv list equipment now",
+    "figures": "is called hsv-paper figures now",
+    "claims": "is called hsv-paper claims now",
+    "study": "is called hsv-paper sensitivity now",
+    "cluster": "is gone: start Dask workers on other hosts and use --scheduler, see docs/montecarlo.md",
+}
+"""New names of commands that were renamed."""
+
 
 def main() -> None:
-    """Run the command line; interrupted before it begins it ends with one line, as later on."""
+    """Run the command line; an interruption while modules load ends in one line, as later on."""
     try:
-        # The whole command: asked to end, it ends its processes and removes its temporary files as after Ctrl-C.
+        # SIGTERM, too, ends child processes and removes temporary files, as Ctrl-C does.
         take_interrupts()
-        from hsv.cli.main import main as command_line
+        from hsv.cli.main import run
 
-        command_line()
+        run("hsv", COMMANDS, DESCRIPTION, MOVED)
     except KeyboardInterrupt:
         print("hsv: error: interrupted", file=sys.stderr, flush=True)
         os._exit(130)
+
+
+def __getattr__(name: str) -> Any:
+    """Return the whole command line as ``app`` to tools that document it; building it takes a moment."""
+    if name != "app":
+        raise AttributeError(name)
+    from hsv.cli.main import application
+
+    return application(COMMANDS)
+
+
+if __name__ == "__main__":
+    main()

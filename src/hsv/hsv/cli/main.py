@@ -1,22 +1,27 @@
-"""The hsv command: one file a command, errors on one line, exit code 0 only on success."""
+"""Build and run a command line: errors on one line, exit code 0 only on success."""
 
 from __future__ import annotations
 
+import builtins
 import inspect
 import os
 import sys
-from collections.abc import Callable, Sequence
+import traceback
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib import import_module
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.completion import completion_init
+from typer.core import TyperCommand
 
 import hsv
-from hsv.base.errors import HsvError, QuantityError, RunError, reason
-from hsv.cli.extras import missing_extra
+from hsv.base.errors import HsvError, QuantityError, RunError, did_you_mean, reason
 from hsv.cli.output import Interrupted, console, report_error
+
+if TYPE_CHECKING:
+    from hsv.cli.entry import Command
 
 _HELP = ("-h", "--help")
 
@@ -30,64 +35,42 @@ EXIT_CODES = {
 }
 """Meaning of each exit code of the command."""
 
+EXTRAS = {
+    "clarabel": "design",
+    "cvxpy": "design",
+    "distributed": "campaign",
+    "foxglove": "live",
+    "jinja2": "report",
+    "markupsafe": "report",
+    "matplotlib": "report",
+    "pyarrow": "campaign",
+    "websockets": "live",
+}
+"""Extra of the package that installs an imported module; the base installation lacks these modules."""
+
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 """Error for an unknown option, a missing argument and the like; typer exports only this subclass of it."""
 
-COMMANDS = (
-    "trim",
-    "linearise",
-    "design",
-    "verify",
-    "certify",
-    "check",
-    "scenarios",
-    "govern",
-    "vehicles",
-    "equipment",
-    "faults",
-    "simulate",
-    "run",
-    "prepare",
-    "conclude",
-    "include",
-    "info",
-    "plot",
-    "report",
-    "view",
-    "replay",
-    "play",
-    "diff",
-    "recover",
-    "export",
-    "export-controller",
-    "bench",
-    "resilience",
-    "cluster",
-    "set",
-    "command",
-    "topic",
-    "watch",
-    "montecarlo",
-    "fault",
-)
-"""Names of the commands; each is in a module of this name, with underscores, a function or a group of commands."""
 
-DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."
+class _OptionsOnce(TyperCommand):
+    """A command that refuses an option given twice, of which click silently takes the last."""
 
-MOVED = {"figures": "hsv-paper figures", "claims": "hsv-paper claims", "study": "hsv-paper sensitivity"}
-"""New names of commands that were renamed."""
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        _, _, given = self.make_parser(ctx).parse_args(args=[*args])
+        for parameter in given:
+            if given.count(parameter) > 1 and not getattr(parameter, "multiple", True):
+                raise QuantityError(f"{parameter.opts[0]}: given twice, expected once")
+        return super().parse_args(ctx, args)
 
 
-def application(
-    names: Sequence[str] = COMMANDS, *, prog: str = "hsv", package: str = "hsv.cli", listed: bool = False
-) -> typer.Typer:
-    """Return a command line with commands of these names, whose modules are imported.
+def application(commands: Mapping[str, Command], *, prog: str = "hsv", listed: bool = False) -> typer.Typer:
+    """Return a command line, and import the modules of its commands.
 
     Args:
-        names: Names of the commands.
+        commands: Places of the commands by name. A command ``a-b`` is the function, or group of commands, ``a_b`` of
+            its module, with an underscore at the end where Python itself has the name.
         prog: Name of the command line.
-        package: Package of the commands' modules.
-        listed: Whether only names and descriptions are needed, as for ``hsv --help``: options take most of the time.
+        listed: Whether only names and descriptions are needed, as for ``hsv --help``. Options take most of the time.
     """
     app = typer.Typer(
         name=prog,
@@ -99,17 +82,19 @@ def application(
     )
     app.callback()(options)
     groups = [app]
-    for name in names:
+    for name, (module, panel) in commands.items():
         attribute = name.replace("-", "_")
-        command = getattr(import_module(f"{package}.{attribute}"), attribute)
+        command = getattr(import_module(module), attribute + "_" * hasattr(builtins, attribute))
         if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
+            app.add_typer(command, name=name, rich_help_panel=panel)
             groups.append(command)
         else:
-            app.command(name)(_without_options(command) if listed else command)
+            shown = _without_options(command) if listed else command
+            app.command(name, rich_help_panel=panel, hidden=not panel)(shown)
     for group in groups:
         for registered in group.registered_commands:
-            # Folded to the terminal only: typer keeps the line breaks of the source in all paragraphs but the first.
+            registered.cls = _OptionsOnce
+            # The terminal folds the text: typer keeps the line breaks of all paragraphs but the first.
             paragraphs = (inspect.getdoc(registered.callback) or "").split("\n\n")
             registered.help = "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
     return app
@@ -132,37 +117,43 @@ def options(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
+    traceback: Annotated[
+        bool,
+        typer.Option("--traceback", envvar="HSV_TRACEBACK", help="Of any command: print the Python traceback, too."),
+    ] = False,
 ) -> None:
-    """Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."""
+    """Declare the options of the command line itself; its description is given to :func:`run`."""
 
 
-def main() -> None:
-    """Run the command ``hsv``."""
-    run("hsv", "hsv.cli", COMMANDS, DESCRIPTION)
-
-
-def run(prog: str, package: str, commands: Sequence[str], description: str) -> None:
+def run(prog: str, commands: Mapping[str, Command], description: str, moved: Mapping[str, str] | None = None) -> None:
     """Run a command line; bad input ends with one line and exit code 2, a failed run with exit code 1.
 
     Args:
-        prog: Its name.
-        package: Package of the modules of its commands.
-        commands: Names of its commands.
-        description: One sentence, the first of its help.
+        prog: Name of the command line.
+        commands: Places of its commands by name.
+        description: First sentence of its help.
+        moved: What to say of commands that were renamed, by their old names.
     """
     completing = f"_{prog.upper()}_COMPLETE" in os.environ
     if completing:
-        completion_init()  # a shell asks for the words that may come next
+        completion_init()  # a shell requests the words that may come next
+    words = sys.argv[1:] or ["--help"]
+    if "--traceback" in words[1:]:
+        words = ["--traceback", *(word for word in words if word != "--traceback")]
+    if words[0] == "--traceback":
+        os.environ["HSV_TRACEBACK"] = "1"
+    first = next((word for word in words if word != "--traceback"), "")
     try:
-        # Out of typer's standalone mode, so that a usage error is one line as well.
-        words = sys.argv[1:] or ["--help"]
-        if prog == "hsv" and (moved := MOVED.get(words[0])):
-            raise QuantityError(f"hsv {words[0]} is called {moved} now")
-        # One command is wanted: the modules of all, and what typer makes of them, take as long as numpy.
-        listed = words[0] in _HELP and not completing
-        names = words[:1] if words[0] in commands else commands
-        app = application(names, prog=prog, package=package, listed=listed)
+        if first in (moved or {}):
+            raise QuantityError(f"{prog} {first} {(moved or {})[first]}")
+        if first not in commands and not first.startswith("-"):
+            hint = did_you_mean(first, [name for name, command in commands.items() if command.panel])
+            raise QuantityError(f"command {first!r}: unknown{hint} (see {prog} --help)")
+        # Only the given command is built: all of them take as long as numpy.
+        listed = first in _HELP and not completing
+        app = application({first: commands[first]} if first in commands else commands, prog=prog, listed=listed)
         app.info.help = description
+        # Outside typer's standalone mode, a usage error is one line as well.
         code = app(words, prog_name=prog, standalone_mode=False)
         if code == _INTERRUPTED:
             raise KeyboardInterrupt  # typer swallows it
@@ -170,7 +161,7 @@ def run(prog: str, package: str, commands: Sequence[str], description: str) -> N
             sys.stdout.flush()
         sys.exit(code)
     except UsageError as error:
-        _fail(_usage(error), 2)
+        _fail(_usage(error, prog), 2)
     except RunError as error:
         _fail(error, 1)
     except HsvError as error:
@@ -179,26 +170,29 @@ def run(prog: str, package: str, commands: Sequence[str], description: str) -> N
         _fail(interrupted, _INTERRUPTED)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted", _INTERRUPTED)
-    except ImportError as error:
-        if extra := missing_extra(error):
-            _fail(f"needs hsv[{extra}]: pip install 'hsv[{extra}]'", 2)
-        raise
+    except ModuleNotFoundError as error:
+        extra = EXTRAS.get((error.name or "").partition(".")[0])
+        if not extra:
+            raise
+        _fail(f"needs hsv[{extra}]: pip install 'hsv[{extra}]'", 2)
     except BrokenPipeError:
-        _end(1)  # Nobody reads any more: no more words either, as of click and rich.
+        _end(1)  # The reader is gone; like click and rich, say nothing.
     except OSError as error:
-        # Of a file that it fails to open, the system says the name; not of the output that it fails to write.
+        # The system names a file that it fails to open, but not an output that it fails to write.
         place = f"{error.filename}: cannot be opened" if error.filename else "output: cannot be written"
         _fail(f"{place} ({reason(error)})", 2)
 
 
-def _usage(error: Any) -> str:
-    # Of a choice, typer reports the type of its own exception, too.
+def _usage(error: Any, prog: str) -> str:
+    # For a choice, typer also prints the type of its own exception.
     message = error.format_message().replace(": Value error, ", ": ")
-    return f"{message} (see {error.ctx.command_path if error.ctx else 'hsv'} --help)"
+    return f"{message} (see {error.ctx.command_path if error.ctx else prog} --help)"
 
 
 def _fail(problem: object, code: int) -> None:
     with suppress(OSError):
+        if os.environ.get("HSV_TRACEBACK", "0") not in ("", "0"):
+            traceback.print_exc()
         report_error(problem)
     _end(code)
 
@@ -208,10 +202,6 @@ def _end(code: int) -> None:
         try:
             stream.flush()
         except OSError:
-            # Python would try once more at its end, complain on several lines, and change the exit code.
+            # At its end Python would try once more, complain on several lines, and change the exit code.
             os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
     sys.exit(code)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,43 +1,64 @@
-"""Printing numbers with their units: a table for people, JSON with the unit in every key for programs."""
+"""Print numbers with their units: tables for people, JSON with the unit in every key for programs; check targets."""
 
 from __future__ import annotations
 
+import os
+import re
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from textwrap import fill
-from typing import Any
+from tempfile import mkdtemp
+from textwrap import TextWrapper
+from typing import TYPE_CHECKING, Any
+from unicodedata import category
 
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from hsv.base.errors import ParameterError, reason
 from hsv.base.json_text import json_text
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
 
-_UNPRINTABLE = {code: repr(chr(code))[1:-1] for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
-"""Control characters, with which a title could tell a terminal to do things, and how they are shown."""
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+    from hsv.bags.reader import Bag
+    from hsv.graph.snapshot import Snapshot
+
+Quantity = tuple[float, str]
+"""A number and its SI unit."""
+
+_COLUMN = 12
+"""Width (characters) of a column of a matrix, including the gap."""
+
+
+def _visible(text: str) -> str:
+    """Return ``text`` with control, bidirectional and invisible characters escaped, which could fool a reader."""
+    if text.isprintable():
+        return text
+    hidden = (character not in "\n\t" and category(character) in ("Cc", "Cf", "Cs", "Zl", "Zp") for character in text)
+    return "".join(repr(character)[1:-1] if hide else character for character, hide in zip(text, hidden, strict=True))
 
 
 class _Terminal(Console):
-    """A console on which a text is only text, whatever a file or a node has in it."""
+    """A console that prints every text as it stands, whatever a file or a node has put into it."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
-        """Yield the output of the base class, with control characters made visible."""
+        """Yield the output of the base class, with hidden characters made visible."""
         for segment in super().render(renderable, options):
-            text = segment.text if segment.control else segment.text.translate(_UNPRINTABLE)
-            yield Segment(text, segment.style, segment.control)
+            yield Segment(segment.text if segment.control else _visible(segment.text), segment.style, segment.control)
 
 
-# Paths, titles and what nodes say are printed as they stand: markup in them would be text of ours.
 console = _Terminal(highlight=False, markup=False, emoji=False)
 errors = _Terminal(stderr=True, highlight=False, markup=False, emoji=False)
 
 
-class Interrupted(Exception):  # noqa: N818 - what the user did is no error
-    """Ctrl-C in a long computation or a flight; the message says where its results are, and how to continue."""
+class Interrupted(Exception):  # noqa: N818 - an interruption by the user is no error
+    """Ctrl-C in a long computation or a flight; the message says where the results are, and how to continue."""
 
 
 @contextmanager
@@ -55,48 +76,35 @@ def resumable(folder: Path) -> Iterator[None]:
         ) from None
 
 
-UNIT_KEYS = {
-    "1": "",
-    "m": "m",
-    "ft": "ft",
-    "m/s": "m_per_s",
-    "ft/s": "ft_per_s",
-    "rad": "rad",
-    "deg": "deg",
-    "rad/s": "rad_per_s",
-    "deg/s": "deg_per_s",
-    "s": "s",
-    "m s": "m_s",
-    "ft s": "ft_s",
-    "N": "N",
-    "lbf": "lbf",
-    "N m": "N_m",
-    "lbf ft": "lbf_ft",
-    "Pa": "Pa",
-    "lbf/ft^2": "psf",
-    "kg^0.5 m": "sqrt_kg_m",
-    "kg^0.5 m/s": "sqrt_kg_m_per_s",
-    "slug^0.5 ft": "sqrt_slug_ft",
-    "slug^0.5 ft/s": "sqrt_slug_ft_per_s",
-}
-"""Spelling of units at the end of JSON keys."""
-
-Quantity = tuple[float, str]
-"""A number and its SI unit."""
+def unit_key(unit: str) -> str:
+    """Return how JSON keys spell a unit at their end: ``ft_per_s``, ``sqrt_slug_ft``; nothing for 1."""
+    words = re.sub(r"(\w+)\^0\.5", r"sqrt_\1", unit.replace("lbf/ft^2", "psf"))
+    return "" if unit == "1" else words.replace("/", "_per_").replace(" ", "_")
 
 
 def to_json(quantities: Mapping[str, Quantity], units: UnitSystem) -> dict[str, float]:
-    """Return the numbers, SI but for the paper's units, with the unit appended to every key, e.g. ``altitude_ft``."""
+    """Return the numbers with the unit appended to every key, e.g. ``altitude_ft``; units as in :func:`json_system`."""
     values = {}
     for name, quantity in quantities.items():
         value, unit = in_system(*quantity, json_system(units))
-        values["_".join(filter(None, (name, UNIT_KEYS[unit])))] = value
+        values["_".join(filter(None, (name, unit_key(unit))))] = value
     return values
 
 
 def json_system(units: UnitSystem) -> UnitSystem:
-    """Return the units of JSON: programs read strict SI, unless the paper's units are asked for."""
+    """Return the units of JSON: strict SI, unless the paper's units are requested."""
     return UnitSystem.si if units is UnitSystem.metric else units
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
+    sys.stdout.write(json_text(values, indent=2) + "\n")
+
+
+def say(*lines: object) -> None:
+    """Print each line as it stands; only the terminal folds it, so that a path can be copied."""
+    for line in lines:
+        console.print(line if isinstance(line, Text) else str(line), soft_wrap=True)
 
 
 def warn(text: str) -> None:
@@ -104,8 +112,17 @@ def warn(text: str) -> None:
     errors.print(Text.assemble(("hsv: warning:", "bold yellow"), f" {text}"), soft_wrap=True)
 
 
+def print_bag_warnings(*bags: Bag) -> None:
+    """Print one line per incomplete bag: damage, missing files, topics and steps, or that the bag is truncated."""
+    from hsv.bags.bag_warnings import bag_warnings
+
+    for bag in {bag.path: bag for bag in bags}.values():
+        if words := bag_warnings(bag):
+            warn(f"{bag.path}: {'; '.join(words)}")
+
+
 def report_error(problem: object) -> None:
-    """Print an error on standard error, a single line if ``problem`` is one."""
+    """Print an error on standard error, on one line if ``problem`` is one line."""
     errors.print(Text.assemble(("hsv: error:", "bold red"), f" {problem}"), soft_wrap=True)
 
 
@@ -114,13 +131,12 @@ def report_line(node: str, text: str) -> None:
     errors.print(Text.assemble((f"{node}:", "dim"), f" {text}"), soft_wrap=True)
 
 
-def print_written(paths: Sequence[Path], as_json: bool) -> None:
-    """Print which files were written; as JSON with their sizes."""
+def print_written(paths: Sequence[Path], as_json: bool, **others: Any) -> None:
+    """Print the names of written files; as JSON with their sizes, and with ``others``."""
     if as_json:
-        print_json({"written": [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths]})
-        return
-    for path in paths:
-        console.print(f"written {path}", soft_wrap=True)
+        print_json({"written": [{"path": str(path), "size_bytes": path.stat().st_size} for path in paths], **others})
+    else:
+        say(*(f"written {path}" for path in paths))
 
 
 def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
@@ -134,36 +150,25 @@ def print_titles(titles: Mapping[str, str], as_json: bool) -> None:
     console.print(table)
 
 
-def print_json(values: Mapping[str, Any]) -> None:
-    """Print ``values`` as JSON on standard output; a number that is not finite, which JSON lacks, as null."""
-    sys.stdout.write(json_text(values, indent=2) + "\n")
-
-
 def folded(text: str, indent: int = 0, first: int = 0) -> str:
-    """Return ``text`` as lines no wider than the terminal, or 80 columns, folded between words, which stay whole.
+    """Return ``text`` folded between words to the width of the terminal, or 80 columns; paths stay whole.
 
     Args:
         text: Text to fold.
         indent: Spaces before each line.
         first: Spaces before the first line.
     """
-    return fill(
-        text,
-        console.width,
-        initial_indent=" " * first,
-        subsequent_indent=" " * indent,
-        break_long_words=False,  # paths are copied
-        break_on_hyphens=False,
-    )
+    wrapper = TextWrapper(console.width, " " * first, " " * indent, break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(text)
 
 
 def new_table(*headings: str, title: str = "", right: Collection[str] = (), head: bool = True) -> Table:
-    """Return an empty table as all commands print it: without lines, folded between words to the terminal's width.
+    """Return an empty table without lines, folded between words to the terminal's width.
 
     Args:
         headings: Headings of the columns.
         title: Above the table.
-        right: Headings of the columns that stand at the right and are not folded, as numbers do.
+        right: Headings of the columns of numbers, which are aligned at the right and not folded.
         head: Whether the headings are shown.
     """
     table = Table(
@@ -181,9 +186,9 @@ def new_table(*headings: str, title: str = "", right: Collection[str] = (), head
 
 
 def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
-    """Print rows with the same keys, the headings: numbers at the right, as given to five digits, none as ``-``.
+    """Print rows whose keys are the headings: numbers at the right, to five digits; ``-`` for none.
 
-    Where they are wider than the terminal, the last column stands below the others, a paragraph a row.
+    If the rows are wider than the terminal, the last column stands below the others, a paragraph a row.
     """
     columns = []
     for heading in rows[0]:
@@ -195,9 +200,9 @@ def print_rows(rows: Sequence[Mapping[str, str | float | None]]) -> None:
     wide = sum(len(column[0]) + 2 for column in columns) - 2 > console.width
     below = columns.pop() if wide else []
     for number, line in enumerate(zip(*columns, strict=True)):
-        console.print(Text("  ".join(line).rstrip(), style="" if number else "bold"), soft_wrap=True)
+        say(Text("  ".join(line).rstrip(), style="" if number else "bold"))
         if below and number and (text := below[number].strip()):
-            console.print(folded(text, 4, first=4), soft_wrap=True)
+            say(folded(text, 4, first=4))
 
 
 def print_matrix(
@@ -211,11 +216,9 @@ def print_matrix(
         columns: Names of the columns.
         cells: Cells by row.
     """
-    label = max(map(len, rows))
-    count = max(1, (console.width - label) // _COLUMN)
+    count = max(1, (console.width - max(map(len, rows))) // _COLUMN)
     for first in range(0, len(columns), count):
-        shown = columns[first : first + count]
-        headings = [column.replace("_", "\n") for column in shown]
+        headings = [column.replace("_", "\n") for column in columns[first : first + count]]
         table = new_table("", *headings, title="" if first else title, right=headings)
         table.columns[0].no_wrap = True
         for column in table.columns[1:]:
@@ -225,33 +228,24 @@ def print_matrix(
         console.print(table)
 
 
-_COLUMN = 12
-"""Characters of a column of a matrix, the gap included."""
-
-
 def quantity_table(
-    title: str,
-    columns: Mapping[str, str],
-    rows: Sequence[tuple[str, list[float] | None]],
-    units: UnitSystem,
+    title: str, columns: Mapping[str, str], rows: Sequence[tuple[str, Sequence[float] | None]], units: UnitSystem
 ) -> Table:
     """Return a table of quantities with one row per item and the unit of each column below its heading.
 
     Args:
         title: Above the table.
         columns: The SI unit by heading.
-        rows: Name and values (SI) of each; ``None`` where it has no values.
-        units: Units of what is shown.
+        rows: Name and values (SI) of each; ``None`` for a row without values.
+        units: Units in which to print.
     """
     named = {name: unit_in(units, unit) for name, unit in columns.items()}
     headings = [f"{name}\n{'' if unit == '1' else unit}" for name, unit in named.items()]
     table = new_table("", *headings, title=title, right=headings)
     for name, values in rows:
-        cells = ["-"] * len(columns)
-        if values is not None:
-            pairs = zip(values, columns.values(), strict=True)
-            cells = [significant(in_system(float(value), unit, units)[0]) for value, unit in pairs]
-        table.add_row(name, *cells)
+        pairs = zip(values, columns.values(), strict=True) if values is not None else ()
+        cells = [significant(in_system(float(value), unit, units)[0]) for value, unit in pairs]
+        table.add_row(name, *(cells or ["-"] * len(columns)))
     return table
 
 
@@ -262,3 +256,132 @@ def print_table(title: str, quantities: Mapping[str, Quantity], units: UnitSyste
         value, unit = in_system(*quantity, units)
         table.add_row(name.replace("_", " "), significant(value, digits), "" if unit == "1" else unit)
     console.print(table)
+
+
+def _progress(bar: bool = True) -> Progress:
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        *([BarColumn()] if bar else []),
+        TextColumn("{task.percentage:>3.0f}%"),
+        TextColumn("{task.fields[note]}", markup=False),
+        *([TimeElapsedColumn()] if bar else []),
+        console=errors,
+        transient=True,
+        disable=not errors.is_terminal,
+    )
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a callback (stage, done, total) that shows one bar a stage, on a terminal only."""
+    with _progress() as bar:
+        tasks: dict[str, Any] = {}
+
+        def report(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=total, note="")
+            bar.update(tasks[stage], completed=done, total=total)
+
+        yield report
+
+
+@contextmanager
+def flight_line(
+    title: str, steps: int, units: UnitSystem
+) -> Iterator[tuple[Callable[[int], None], Callable[[Snapshot], None]]]:
+    """Yield two callbacks that update the line of a flight: with the step that is flown, and with a snapshot of it."""
+    with _progress(bar=False) as bar:
+        task = bar.add_task(title, total=steps, note="starting the nodes")
+        yield (
+            lambda number: bar.update(task, completed=number),
+            lambda snapshot: bar.update(task, note=snapshot.in_words(units)),
+        )
+
+
+@contextmanager
+def flights(title: str, total: int) -> Iterator[Callable[[int], None]]:
+    """Yield a callback (flights finished) that shows flights per second and the remaining time."""
+    with _progress() as bar:
+        task = bar.add_task(title, total=total, note="starting the workers")
+        begun: list[tuple[float, int]] = []
+
+        def report(finished: int) -> None:
+            # Flights of an interrupted campaign do not count in the pace.
+            begun[:1] = begun[:1] or [(time.monotonic(), finished)]
+            start, before = begun[0]
+            rate = (finished - before) / max(time.monotonic() - start, 1e-9)
+            left = f", {_clock((total - finished) / rate)} left" if finished > before else ""
+            bar.update(task, completed=finished, note=f"{finished} of {total} flights, {rate:.1f} / s{left}")
+
+        yield report
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes}:{seconds:02}"
+
+
+def check_target(path: Path, field: str, *suffixes: str) -> None:
+    """Refuse a file that could not be written, before any work is done for it.
+
+    Raises:
+        ParameterError: ``path`` ends in none of the ``suffixes``, is a folder, lies in none, or may not be written.
+    """
+    if suffixes and path.suffix not in suffixes:
+        *others, last = suffixes
+        ends = f"{', '.join(others)} or {last}" if others else last
+        raise ParameterError(f"{field} = {str(path)!r}: expected a file that ends in {ends}")
+    usable = os.access(path, os.W_OK) and not path.is_dir() if path.exists() else _takes_files(path.parent)
+    if not usable:
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a file in an existing folder")
+
+
+def check_new(path: Path, field: str, force: bool) -> None:
+    """Refuse a file that could not be written, or that exists unless ``force`` is given.
+
+    Raises:
+        ParameterError: See :func:`check_target`, or ``path`` exists.
+    """
+    check_target(path, field)
+    if path.exists() and not force:
+        raise ParameterError(f"{field} = {str(path)!r}: exists, expected a new file, or --force to overwrite it")
+
+
+def check_folder(path: Path, field: str) -> None:
+    """Refuse a folder that could not be written or made; it is not made yet.
+
+    Raises:
+        ParameterError: ``path`` is a file, lies below one, or may not be written or made.
+    """
+    there = path.absolute()
+    while not os.path.lexists(there):
+        there = there.parent
+    if not _takes_files(there):
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written, expected a folder or the name of a new one")
+
+
+@contextmanager
+def writing(path: Path, field: str) -> Iterator[None]:
+    """Convert system errors while ``path`` is written into one error; an incomplete file is removed.
+
+    Raises:
+        ParameterError: It could not be written.
+    """
+    try:
+        yield
+    except OSError as error:
+        if path.is_file():
+            path.unlink()
+        raise ParameterError(f"{field} = {str(path)!r}: cannot be written ({reason(error)})") from error
+
+
+def _takes_files(folder: Path) -> bool:
+    # Permissions do not tell: a file system may be read-only, or hold no files.
+    try:
+        Path(mkdtemp(dir=folder)).rmdir()
+    except OSError:
+        return False
+    return True

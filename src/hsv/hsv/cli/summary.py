@@ -1,97 +1,128 @@
-"""The summary of a flight: metrics, and the verdict against the limits of its scenario."""
+"""Summaries of a flight and of a campaign: on the terminal, as JSON, as a page."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from hsv.base.errors import RunError
-from hsv.base.units import UnitSystem, in_system, significant
-from hsv.cli.output import console, folded, new_table, print_json, to_json
+from hsv.base.units import UnitSystem, in_system, significant, unit_in
+from hsv.cli.output import console, errors, folded, json_system, new_table, print_json, say, to_json
 from hsv.flight.fingerprint import as_published, published_in_words
-from hsv.flight.limits import Verdict, in_units, not_judged, verdict_sentence, verdicts
-from hsv.flight.metrics import METRICS, Group
+from hsv.flight.limits import Verdict, in_units, limits_kept, not_judged, verdict_sentence, verdicts
+from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.flight.scenario import Scenario
+
+if TYPE_CHECKING:
+    from hsv.flight.campaign.capacity import Capacity
+    from hsv.flight.campaign.summary import Results
+
+_LISTED = 5
+"""Number of worst flights listed on the terminal; the page has more."""
+
+
+@dataclass(frozen=True)
+class FlightSummary:
+    """A flight that has ended, for its summary."""
+
+    scenario: Scenario
+    metrics: Mapping[str, float]
+    """Metrics by name, in SI units."""
+    fingerprint: str | None
+    """Fingerprint of the flight; ``None`` if steps are missing."""
+    design_hash: str
+    ending: str
+    """``finished``, ``diverged`` or ``broken off``."""
+    simulated_time: float
+    """Simulated time (s) of the last step."""
+    wall_time: float | None
+    """Wall time (s) that the flight took, where it is known."""
+    not_covered: Sequence[str] | None
+    """Items of the flight that the certificate does not cover; ``None``: not known."""
+    files: Mapping[str, Path] = field(default_factory=dict)
+    """Written files by name."""
 
 
 def report_flight(
-    scenario: Scenario,
-    metrics: Mapping[str, float],
-    *,
-    fingerprint: str | None,
-    design_hash: str,
-    ending: str,
-    wall_time: float | None,
-    simulated_time: float,
-    units: UnitSystem,
-    json: bool,
-    not_covered: Sequence[str] | None,
-    files: Mapping[str, Path] | None = None,
+    flight: FlightSummary, units: UnitSystem, json: bool, strict: bool = False, every: bool = False
 ) -> None:
     """Print the summary of a flight.
 
     Args:
-        scenario: Scenario that was flown.
-        metrics: Metrics by name, in SI units.
-        fingerprint: Fingerprint of the flight; ``None`` if steps are missing.
-        design_hash: Digest of the design's parameters.
-        ending: ``finished``, ``diverged`` or ``broken off``.
-        wall_time: Wall time (s) that the flight took, where it is known.
-        simulated_time: Simulated time (s) of the last step.
-        units: UnitSystem of what is printed.
+        flight: The flight.
+        units: Units in which to print.
         json: Whether to print JSON.
-        not_covered: Items of the flight that the certificate does not cover; ``None``: not known.
-        files: Written files by name.
+        strict: Whether a limit that is not kept is an error.
+        every: Whether to name the metrics that have no limit, too.
 
     Raises:
-        RunError: The flight diverged or was broken off; the message says when.
+        RunError: The flight diverged or was broken off, and the message says when; or with ``strict`` broke a limit.
     """
-    quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
-    finished = ending == "finished"
-    judged = verdicts(scenario, metrics, ended=finished)
-    factor = simulated_time / wall_time if wall_time else None
-    same = as_published(fingerprint, scenario, design_hash)
+    scenario, time, wall_time = flight.scenario, flight.simulated_time, flight.wall_time
+    finished = flight.ending == "finished"
+    judged = verdicts(scenario, flight.metrics, ended=finished)
+    kept = finished and all(verdict.within for verdict in judged.values())
+    factor = time / wall_time if wall_time else None
+    same = as_published(flight.fingerprint, scenario, flight.design_hash)
     if json:
         print_json(
             {
                 "scenario": scenario.name,
-                "diverged_at_s": simulated_time if ending == "diverged" else None,
-                "within_limits": finished and all(verdict.within for verdict in judged.values()),
-                "not_judged": not_judged(judged, metrics),
-                "metrics": to_json(quantities, units),
-                "fingerprint": fingerprint,
+                "diverged_at_s": time if flight.ending == "diverged" else None,
+                "within_limits": kept,
+                "not_judged": not_judged(judged, flight.metrics),
+                "metrics": to_json({name: (v, METRICS[name].unit) for name, v in flight.metrics.items()}, units),
+                "fingerprint": flight.fingerprint,
                 "as_published": same,
                 "wall_time_s": wall_time,
                 "real_time_factor": factor,
-                "not_covered": not_covered,
-                **{name: str(path) for name, path in (files or {}).items()},
+                "not_covered": flight.not_covered,
+                **{name: str(path) for name, path in flight.files.items()},
             }
         )
     else:
         pace = f" in {significant(wall_time)} s, {significant(factor)} x real time" if wall_time and factor else ""
         run: dict[str, object] = {
-            "flown": f"{simulated_time:.6g} s{pace}",
-            **({"not covered": "; ".join(not_covered)} if not_covered else {}),
-            **(files or {}),
-            # Alone on a line it is as wide as a terminal.
-            "fingerprint": f"{published_in_words(fingerprint, same)}\n{fingerprint or ''}".rstrip(),
+            "flown": f"{time:.6g} s{pace}",
+            **({"not covered": "; ".join(flight.not_covered)} if flight.not_covered else {}),
+            **flight.files,
+            # On a line of its own, it is as wide as a terminal.
+            "fingerprint": f"{published_in_words(flight.fingerprint, same)}\n{flight.fingerprint or ''}".rstrip(),
         }
-        print_metrics(scenario.title, metrics, units, judged)
+        print_metrics(scenario.title, flight.metrics, units, judged, every)
         print_section("run", run)
-        console.print(_verdict(judged, metrics, units, finished))
-    if ending == "diverged":
-        raise RunError(f"flight diverged at t = {simulated_time:.2f} s: the state left the range of the model")
+        words = verdict_sentence(judged, flight.metrics, units) if every else limits_kept(judged, units)
+        style = "bold red" if not kept else "bold green" if judged else "bold"
+        console.print(Text.assemble(("verdict ", "bold"), (words, style)))
+    if flight.ending == "diverged":
+        raise RunError(f"flight diverged at t = {time:.2f} s: the state left the range of the model")
     if not finished:
-        raise RunError(f"flight broken off at t = {simulated_time:.2f} s of {scenario.duration:.2f} s")
+        raise RunError(f"flight broken off at t = {time:.2f} s of {scenario.duration:.2f} s")
+    if strict and not kept:
+        raise RunError(limits_kept(judged, units))
 
 
 def print_metrics(
-    title: str, metrics: Mapping[str, float], units: UnitSystem, judged: Mapping[str, Verdict] | None = None
+    title: str,
+    metrics: Mapping[str, float],
+    units: UnitSystem,
+    judged: Mapping[str, Verdict] | None = None,
+    every: bool = False,
 ) -> None:
-    """Print metrics (SI) in groups, each in words, with its unit and, where ``judged`` is given, with the verdict."""
+    """Print metrics (SI) in groups with their units and, where ``judged`` is given, with their verdicts.
+
+    Args:
+        title: Title of the table.
+        metrics: Metrics by name, in SI units.
+        units: Units in which to print.
+        judged: Verdicts by metric.
+        every: Whether to say of metrics without a limit that they are not judged.
+    """
     table = new_table("metric", "value", "unit", "verdict", title=title, right=["value"], head=False)
     table.columns[2].no_wrap = True
     known = [*metrics, *(name for name in judged or () if name not in metrics)]
@@ -103,28 +134,13 @@ def print_metrics(
             metric, verdict = METRICS[name], (judged or {}).get(name)
             number, unit = in_system(metrics.get(name, nan), metric.unit, units, share=metric.share)
             value = significant(number) if name in metrics else "-"
-            remark = Text() if judged is None else _remark(name, verdict, units)
+            unjudged = Text("not judged" if every and judged is not None else "", "dim")
+            remark = _remark(name, verdict, units) if verdict else unjudged
             table.add_row("  " + metric.words, value, "" if unit == "1" else unit, remark)
     console.print(table)
 
 
-def print_section(title: str, lines: Mapping[str, object]) -> None:
-    """Print what has a name and is no number under a title, a line each, folded between words; no path, to be copied.
-
-    What follows a line break in a text stands on a line of its own.
-    """
-    console.print(Text(title, "bold"))
-    width = max(map(len, lines)) + 4
-    for name, text in lines.items():
-        first, *others = str(text).split("\n")
-        words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
-        for line in (f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others)):
-            console.print(line, soft_wrap=True)
-
-
-def _remark(name: str, verdict: Verdict | None, units: UnitSystem) -> Text:
-    if verdict is None:
-        return Text("not judged", "dim")
+def _remark(name: str, verdict: Verdict, units: UnitSystem) -> Text:
     if verdict.words == "not flown to the end":
         return Text(verdict.words, "red")
     limit = in_units(name, verdict.limit, units)
@@ -132,7 +148,123 @@ def _remark(name: str, verdict: Verdict | None, units: UnitSystem) -> Text:
     return Text(text, "green" if verdict.within else "red")
 
 
-def _verdict(judged: Mapping[str, Verdict], metrics: Mapping[str, float], units: UnitSystem, finished: bool) -> Text:
-    kept = finished and all(verdict.within for verdict in judged.values())
-    style = "bold red" if not kept else "bold green" if judged else "bold"
-    return Text.assemble(("verdict ", "bold"), (verdict_sentence(judged, metrics, units), style))
+def print_section(title: str, lines: Mapping[str, object]) -> None:
+    """Print named texts under a title, a line each, folded between words; paths stay whole, to be copied.
+
+    After a line break, a text continues on a line of its own.
+    """
+    console.print(Text(title, "bold"))
+    width = max(map(len, lines)) + 4
+    for name, text in lines.items():
+        first, *others = str(text).split("\n")
+        words = first if isinstance(text, Path) else folded(first, width, first=width)[width:]
+        say(f"  {name:{width - 2}}{words}", *(f"  {other}" for other in others))
+
+
+def announce(capacity: Capacity) -> None:
+    """Print the expected size and duration of a campaign."""
+    hours, minutes = divmod(capacity.wall_time / 60.0, 60.0)
+    duration = f"{hours:.0f} h {minutes:.0f} min" if hours else f"{significant(capacity.wall_time, 2)} s"
+    cores = "core" if capacity.cores == 1 else "cores"
+    errors.print(
+        f"{capacity.flights} flights on {capacity.cores} {cores}: about {duration} "
+        f"({significant(capacity.wall_time * capacity.cores / 3600.0, 2)} core hours), "
+        f"{significant(capacity.bytes / 1e6, 2)} MB of disk space"
+    )
+
+
+def show_campaign(results: Results, units: UnitSystem, json: bool, page: bool, flown: int | None = None) -> None:
+    """Print the summary of a campaign and write its page; ``flown`` is the number of flights flown just now."""
+    from hsv.flight.campaign.summary import CONFIDENCE, distributions, shares, worst_flights
+    from hsv.pages.campaign.page import write_page
+
+    written = results.path.with_suffix(".html") if page else None
+    if json:
+        print_json(
+            {
+                "result": str(results.path),
+                "page": str(written) if written else None,
+                "scenario": results.campaign.scenario_name,
+                "method": results.campaign.method,
+                "flights": results.campaign.samples,
+                "flown_now": flown,
+                "confidence": CONFIDENCE,
+                "limits": [
+                    {
+                        "name": share.name,
+                        "limit_si": share.limit,
+                        "within": share.within,
+                        "fraction": share.fraction,
+                        "interval": share.interval,
+                    }
+                    for share in shares(results)
+                ],
+                "distributions": {
+                    d.name: {
+                        statistic: in_system(getattr(d, statistic), d.unit, json_system(units))[0]
+                        for statistic in ("minimum", "median", "percentile_95", "maximum", "mean")
+                    }
+                    | {"unit": unit_in(json_system(units), d.unit), "flights": d.flights}
+                    for d in distributions(results)
+                },
+                "worst_flights": [
+                    {"flight": w.flight, "limit": w.limit, "of_limit": w.ratio, "sample_si": w.sample}
+                    for w in worst_flights(results, _LISTED)
+                ],
+            }
+        )
+    else:
+        _print_campaign(results, units)
+        say(f"results {results.path}")
+    if written:
+        write_page(results, written)
+        if not json:
+            say(f"page    {written}")
+
+
+def _print_campaign(results: Results, units: UnitSystem) -> None:
+    from hsv.flight.campaign.summary import ENDED, distributions, shares, worst_flights
+
+    headings = ("limit", "", "within", "share", "95 % interval")
+    title = f"{results.campaign.scenario.title}: {results.campaign.samples} flights"
+    table = new_table(*headings, title=title, right=headings[1:])
+    for share in shares(results):
+        limit = "" if share.limit is None else " ".join(_outcome(share.name, share.limit, units)).strip()
+        interval = (
+            "all corners" if share.interval is None else " to ".join(f"{100.0 * p:.3g} %" for p in share.interval)
+        )
+        within = f"{share.within} of {share.flights}", f"{100.0 * share.fraction:.3g} %"
+        table.add_row(in_words(share.name), limit, *within, interval)
+    console.print(table)
+    numbers = ("least", "median", "95 %", "largest")
+    table = new_table("metric", *numbers, "unit", right=numbers)
+    for d in distributions(results):
+        cells = [_outcome(d.name, v, units) for v in (d.minimum, d.median, d.percentile_95, d.maximum)]
+        table.add_row(in_words(d.name), *(number for number, _ in cells), cells[0][1])
+    console.print(table)
+    # Without limits, the worst flights are those that ended early.
+    worst = [w for w in worst_flights(results, _LISTED) if w.limit]
+    if worst:
+        console.print("worst flights, by the fraction of their limits that they use:")
+    for w in worst:
+        used = w.limit if w.limit in ENDED else f"{100 * w.ratio:.0f} % of {in_words(w.limit)}"
+        say(folded(f"{w.flight}: {used}; {sample_words(w.sample, units)}", 4, first=2))
+
+
+def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
+    """Return a sample (SI; uncertain parameters are relative changes) on one line."""
+    from hsv.model.vehicle_parameters import COEFFICIENT_UNITS
+
+    relative = COEFFICIENT_UNITS if units is UnitSystem.metric else ()
+    return ", ".join(
+        f"{name} {100.0 * value:+.3g} %" if name in relative else f"{name} {value:+.3g}"
+        for name, value in sample.items()
+    )
+
+
+def _outcome(name: str, value: float, units: UnitSystem) -> tuple[str, str]:
+    """Return an outcome of a flight (SI) as it is printed, and its unit."""
+    from hsv.flight.campaign.table import OUTCOMES
+
+    number, unit = in_system(value, OUTCOMES.get(name, "1"), units, share=is_share(name))
+    return significant(number), "" if unit == "1" else unit

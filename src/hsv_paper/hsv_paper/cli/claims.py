@@ -10,8 +10,7 @@ from rich.text import Text
 
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
 from hsv.cli.options import FlightsOption, JsonOption, UnitsOption
-from hsv.cli.output import console, new_table, print_json
-from hsv.cli.targets import check_folder, check_target
+from hsv.cli.output import check_folder, check_target, console, new_table, print_json, stages
 
 if TYPE_CHECKING:
     from hsv_paper.claims.claim import Judged
@@ -32,7 +31,6 @@ def claims(
 
     Example: hsv-paper claims --out docs/claims.md
     """
-    from hsv.cli.progress import stages
     from hsv_paper.claims.catalogue import judge
     from hsv_paper.claims.evidence import Evidence
     from hsv_paper.claims.page import page

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import FlightsOption, JsonOption
-from hsv.cli.output import console, errors, print_json
-from hsv.cli.targets import check_folder
+from hsv.cli.output import check_folder, console, errors, print_json, stages
 
 
 def figures(
@@ -29,7 +28,6 @@ def figures(
     import matplotlib
 
     from hsv.base.errors import QuantityError
-    from hsv.cli.progress import stages
     from hsv_paper.figures.catalogue import FIGURES
     from hsv_paper.figures.figure import Material
     from hsv_paper.figures.page import page

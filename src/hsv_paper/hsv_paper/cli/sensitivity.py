@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from hsv.cli.options import FlightsOption, JsonOption
-from hsv.cli.output import console, print_json
-from hsv.cli.targets import check_folder
+from hsv.cli.output import check_folder, console, print_json, stages
 
 
 def sensitivity(
@@ -32,7 +31,6 @@ def sensitivity(
     import matplotlib
 
     from hsv.base.errors import QuantityError
-    from hsv.cli.progress import stages
     from hsv_paper.figures.style import RC, save
     from hsv_paper.sensitivity.catalogue import STUDIES, page
 

@@ -1,0 +1,350 @@
+"""Commands on bags: replay, comparison, export, repair, and republishing."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.text import Text
+
+from hsv.base.errors import ParameterError, RecordingError, RunError, did_you_mean
+from hsv.base.units import significant
+from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, TrustOption
+from hsv.cli.output import console, folded, new_table, print_bag_warnings, print_json, print_written, say, stages
+
+if TYPE_CHECKING:
+    from hsv.bags.compare import Comparison, Difference
+    from hsv.bags.replay.engine import ProcessComparison
+
+
+def replay(
+    bag: BagArgument,
+    node: Annotated[str, typer.Option(help="Replay this node only.")] = "",
+    parameters: Annotated[
+        Path | None, typer.Option(help="Parameter YAML file to test instead of the attached design.")
+    ] = None,
+    design: SuppliedDesignOption = None,
+    scenario: SuppliedScenarioOption = None,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="Repeat the whole loop instead of each node separately.")
+    ] = False,
+    over_dds: Annotated[bool, typer.Option("--over-dds", help="Run the real node processes.")] = False,
+    trust: TrustOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Feed every node's algorithm with its recorded inputs, and compare its outputs with the recorded ones.
+
+    The exit code is 1 if anything differs. A run in which the controller was hardly active is rejected.
+
+    Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
+    """
+    from hsv.bags.description import CONTROLLER, controller_node
+    from hsv.bags.former import require_interface_version
+    from hsv.bags.reader import Bag
+    from hsv.bags.replay import engine
+    from hsv.bags.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
+    from hsv.bags.replay.processes import processes_of
+    from hsv.flight.trust import require_trust
+
+    opened = Bag(bag)
+    require_interface_version(opened)
+    supply(opened, design, scenario)
+    refuse_vacuous(opened)
+    values = flown_parameters(opened, parameters)
+    controller = controller_of(values)
+    # Every section needs the controller: that of a single node in the bag's parameters may lack it.
+    values = values.updated({"controller": controller})
+    processes = processes_of(controller, estimated(values))
+    if node and node not in processes:
+        raise ParameterError(f"node = {node!r}: expected one of {', '.join(processes)}{did_you_mean(node, processes)}")
+    if node and rerun:
+        raise ParameterError(f"node = {node!r}: a rerun repeats the whole loop, expected one of --node and --rerun")
+    if controller_node(controller).foreign and rerun and over_dds:
+        raise ParameterError(
+            f"controller = {controller!r}: a separate node, which a bag does not start: expected --rerun without "
+            "--over-dds, which uses its recorded commands"
+        )
+    if rerun or node in ("", CONTROLLER.name):
+        require_trust(controller, bag, trust)
+    names = [node] if node else list(processes)
+    results = []
+    with stages() as progress:
+        if over_dds:
+            from hsv.graph import replay_over_dds as real
+
+            given = (controller, values, progress)
+            compared = real.rerun(opened, *given) if rerun else real.replay_all(opened, names, *given)
+        elif rerun:
+            compared = iter(engine.rerun(opened, controller, values, progress))
+        else:
+            compared = (engine.replay(opened, processes[name], values, progress) for name in names)
+        for result in compared:
+            results.append(result)
+            if not json:
+                _print_replay(result)
+    failed = [result.process.node.name for result in results if not result.passed]
+    if json:
+        print_json({"bag": str(bag), "passed": not failed, "processes": [_replay_json(result) for result in results]})
+    print_bag_warnings(opened)
+    if failed:
+        raise RunError(f"{', '.join(failed)}: differs from the recording in {bag}")
+
+
+def _print_replay(result: ProcessComparison) -> None:
+    messages = sum(topic.actual_count for topic in result.topics)
+    line = f"{result.process.node.name:18} {messages:7} messages  "
+    padding = sum(topic.different_padding for topic in result.topics)
+    different = sum(topic.different_bytes for topic in result.topics) - padding
+    largest = [(value, t.topic, name) for t in result.topics for name, value in t.largest.items()]
+    if result.identical:
+        remark = f" except the padding of {padding}" if padding else ""
+        say(Text.assemble(line, (f"identical in every byte{remark}", "green")))
+    elif not result.passed:
+        first = min((t.first for t in result.topics if t.first), key=lambda d: d.step)
+        say(Text.assemble(line, ("differ", "bold red"), f" {first}"))
+    elif largest:
+        value, topic, name = max(largest)
+        within = f"equal within {result.process.tolerance:g}, {different} differ in bytes"
+        say(f"{line}{within}: largest {value:.3g} in {topic} {name}")
+    else:
+        say(f"{line}equal in every number, but {different} differ in bytes (sign of zero or NaN)")
+
+
+def _replay_json(result: ProcessComparison) -> dict[str, Any]:
+    return {
+        "node": result.process.node.name,
+        "passed": result.passed,
+        "identical": result.identical,
+        "tolerance": result.process.tolerance,
+        "reason": result.process.reason,
+        "topics": [
+            {
+                "topic": topic.topic,
+                "recorded": topic.expected_count,
+                "replayed": topic.actual_count,
+                "different_bytes": topic.different_bytes,
+                "different_padding": topic.different_padding,
+                "largest_difference": topic.largest,
+                "first_difference": _difference(topic.first, "recorded", "replayed"),
+            }
+            for topic in result.topics
+        ],
+    }
+
+
+def _difference(difference: Difference | None, expected: str, actual: str) -> dict[str, Any] | None:
+    """Return a difference as JSON, or ``None``; the two names are the keys of its two values."""
+    if difference is None:
+        return None
+    return {
+        "step": difference.step,
+        "time_s": difference.time_ns * 1e-9,
+        "field": difference.field,
+        expected: difference.expected,
+        actual: difference.actual,
+    }
+
+
+def diff(
+    first: BagArgument,
+    second: BagArgument,
+    tolerance: Annotated[float, typer.Option(help="Absolute and relative tolerance; 0: compare every bit.")] = 0.0,
+    json: JsonOption = False,
+) -> None:
+    """Compare two bags step by step: print the first difference, and the largest difference of every field.
+
+    The exit code is 0 if all step topics are equal, and 1 if not, or if a topic is missing in one of the bags.
+
+    Example: hsv diff bags/case1_20260101T000000Z bags/case1_20260102T000000Z
+    """
+    from hsv.bags.compare import compare
+    from hsv.bags.description import TOPICS
+    from hsv.bags.reader import Bag
+
+    if not 0.0 <= tolerance < math.inf:
+        raise ParameterError(f"tolerance = {tolerance}: expected a finite number, not below zero")
+    bags = Bag(first), Bag(second)
+    # A topic that both lack is no difference.
+    topics = [topic for topic in TOPICS if all(topic in bag.roles for bag in bags)]
+    alone = {topic: bag for bag in bags for topic in TOPICS if topic in bag.roles and topic not in topics}
+    if not topics:
+        raise RecordingError(f"{bags[1].path}: no step topic that {bags[0].path} has, too")
+    compared = [compare(bags[0].track(topic), bags[1].track(topic), tolerance=tolerance) for topic in topics]
+    earliest = min((c.first for c in compared if c.first), key=lambda d: d.time_ns, default=None)
+    if json:
+        found = _difference(earliest, "first", "second")
+        print_json(
+            {
+                "equal": earliest is None and not alone,
+                "identical": all(c.identical for c in compared) and not alone,
+                "in_one_only": {bag.name_of(topic): str(bag.path) for topic, bag in alone.items()},
+                "first_difference": found and earliest and {"topic": earliest.topic, **found},
+                "largest_difference": {c.topic: c.largest for c in compared if c.largest},
+                "messages": {c.topic: [c.expected_count, c.actual_count] for c in compared},
+                "messages_of_the_same_step": {c.topic: c.common_count for c in compared},
+            }
+        )
+    else:
+        say(*(f"{bag.name_of(topic)} is in {bag.path} only" for topic, bag in alone.items()))
+        _print_comparison(compared, earliest)
+    print_bag_warnings(*bags)
+    raise typer.Exit(1 if earliest or alone else 0)
+
+
+def _print_comparison(compared: list[Comparison], earliest: Difference | None) -> None:
+    count = sum(c.actual_count for c in compared)
+    common = sum(c.common_count for c in compared)
+    if earliest is None:
+        padding = sum(c.different_padding for c in compared)
+        identical = f"identical{f' in every byte except the padding of {padding}' if padding else ''}"
+        say(f"{count} messages: {identical if all(c.identical for c in compared) else 'equal within the tolerance'}")
+    else:
+        say(folded(f"first difference at t = {earliest.time_ns * 1e-9:.2f} s: {earliest}"))
+        if common < max(sum(c.expected_count for c in compared), count):
+            equal = "" if any(c.largest for c in compared) else ", and they are equal"
+            say(f"{common} messages of the same steps are compared{equal}")
+    table = new_table("topic", "field", "largest difference", right=["largest difference"])
+    for comparison in compared:
+        for name, value in comparison.largest.items():
+            table.add_row(comparison.topic, name, "no number" if math.isnan(value) else significant(value))
+    if table.row_count:
+        console.print(table)
+
+
+def export(
+    bag: BagArgument,
+    csv: Annotated[bool, typer.Option("--csv", help="A folder of CSV files, one per topic.")] = False,
+    parquet: Annotated[bool, typer.Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
+    npz: Annotated[bool, typer.Option("--npz", help="One .npz file.")] = False,
+    scene: Annotated[
+        bool,
+        typer.Option(
+            "--scene", help="One MCAP file: a copy of the bag with the vehicle in 3-D, for Foxglove and Lichtblick."
+        ),
+    ] = False,
+    exaggeration: Annotated[
+        float | None, typer.Option(help="Factor on the bending in the scene; default: that of docs/airframe.md.")
+    ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option(help="Topic to export, can be repeated; default: all topics with one message per step."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="What to write; default: in the bag's folder, named after the format.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write the topics of a bag as tables with field names and units (SI) in the header, or add a 3-D scene to the bag.
+
+    Example: hsv export bags/case1_20260101T000000Z --csv --topic /hsv/state
+    """
+    from hsv.bags import export as tables
+    from hsv.bags.description import TOPICS
+    from hsv.bags.reader import Bag
+
+    chosen = [form for form, given in zip(tables.Format, (csv, parquet, npz), strict=True) if given]
+    if len(chosen) + scene != 1:
+        raise ParameterError("format: expected one of --csv, --parquet, --npz and --scene")
+    opened = Bag(bag)
+    if scene:
+        from hsv.bags.scene import scene_path, write_scene
+        from hsv.model.airframe.geometry import airframe
+
+        if topic:
+            raise ParameterError("topic: expected with a table, --scene holds every topic")
+        most = airframe().largest_exaggeration
+        if exaggeration is not None and not 0.0 <= exaggeration <= most:
+            raise ParameterError(f"exaggeration = {exaggeration:g}: expected a number from 0 to {most:g}")
+        out = out or scene_path(opened)
+        write_scene(opened, out, exaggeration)
+        written = [out]
+    else:
+        if exaggeration is not None:
+            raise ParameterError("exaggeration: expected with --scene, tables hold what was recorded")
+        # Tables lie in the bag's folder, so that bags/* remains a list of bags.
+        home = opened.folder.absolute()
+        out = out or home / (f"{home.name}.npz" if npz else str(chosen[0]))
+        written = tables.export(opened, topic or [name for name in TOPICS if name in opened.roles], chosen[0], out)
+    print_written(written, json)
+    print_bag_warnings(opened)
+
+
+def recover(
+    bag: BagArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Bag to write; default: next to the old one, with _recovered appended to its name."),
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Write a new bag from the intact data of a truncated or damaged one, which is not modified.
+
+    The loss is reported in messages and in seconds of simulated time.
+
+    Example: hsv recover bags/case1_20260101T000000Z
+    """
+    from hsv.bags.bag_warnings import loss_in_words
+    from hsv.bags.reader import Bag
+    from hsv.bags.recover import recover as mend
+    from hsv.bags.steps import irregularities, lost_seconds
+
+    recovery = mend(bag, out)
+    kept = Bag(recovery.path)
+    start, end = kept.span
+    seconds = (end - start) * 1e-9
+    lost: float | None
+    try:
+        lost, missing = lost_seconds(kept), irregularities(kept)
+    except RecordingError as error:
+        if not recovery.changed:
+            raise
+        # A definition is damaged: its messages are kept, but cannot be decoded.
+        lost, missing = None, [str(error).removeprefix(f"{kept.path}: ")]
+    loss = recovery.bag.loss
+    if json:
+        print_json(
+            {
+                "path": str(recovery.path),
+                "changed": recovery.changed,
+                "messages": recovery.messages,
+                "duration_s": seconds,
+                "lost_messages": loss.messages,
+                "lost_messages_counted": loss.counted,
+                "lost_attachments": loss.attachments,
+                "lost_s": lost,
+                "loss": loss_in_words(loss) + missing,
+            }
+        )
+        return
+    complete = "" if recovery.changed else "already complete: "
+    say(f"{recovery.path}: {complete}{recovery.messages} messages, {seconds:.2f} s")
+    if recovery.changed:
+        say(*loss_in_words(loss))
+        if lost != 0.0:
+            say(f"{'an unknown time' if lost is None else f'{lost:.2f} s'} lost: {'; '.join(missing)}")
+
+
+def play(
+    bag: BagArgument,
+    rate: Annotated[float, typer.Option(help="Pace: 1 is as recorded, 10 ten times as fast.")] = 1.0,
+    topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, can be repeated; default: all.")] = None,
+    clock: Annotated[bool, typer.Option(help="Publish the clock.")] = True,
+    paused: Annotated[
+        bool, typer.Option("--paused", help="Start paused; continue with the services /player/step and /player/resume.")
+    ] = False,
+    namespace: Annotated[str, typer.Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
+    delay: Annotated[float, typer.Option(help="Wall time (s) that subscribers get to discover the player.")] = 1.0,
+) -> None:
+    """Republish a bag over DDS, for a viewer or a node under test.
+
+    Example: hsv play bags/case1_20260101T000000Z --rate 10 --topic /hsv/state
+    """
+    from hsv.bags.description import PLAYER
+    from hsv.bags.reader import Bag
+    from hsv.graph.launcher import become
+
+    print_bag_warnings(Bag(bag))
+    words = [str(bag), "--rate", str(rate), "--delay", str(delay), *(["--topics", *topic] if topic else [])]
+    become(PLAYER, [*words, *([] if clock else ["--no-clock"]), *(["--paused"] if paused else [])], namespace)

@@ -1,0 +1,179 @@
+"""Commands on a running flight: each becomes a client node that talks to the graph, however that was started."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from hsv.base.units import UnitSystem
+from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
+
+if TYPE_CHECKING:
+    from hsv.bags.description import NodeDescription
+
+fault = typer.Typer(
+    no_args_is_help=True,
+    help="""Inject, clear and list faults in a running flight, no matter how it was started.
+
+    Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8""",
+)
+
+
+@fault.command(context_settings={"ignore_unknown_options": True})  # a negative value is no option
+def inject(
+    channel: Annotated[str, typer.Argument(help="What fails, e.g. elevator_deflection, engine, pitch_rate.")],
+    type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
+    parameters: Annotated[
+        list[str] | None,
+        typer.Argument(help="Parameters of the type, e.g. 'amplitude=1 deg' 'frequency=2 Hz'; a single one as 0.8."),
+    ] = None,
+    duration: Annotated[
+        str, typer.Option(help="Simulated time after which the fault ends, e.g. '5 s'; default: until it is cleared.")
+    ] = "0 s",
+    namespace: GraphNamespaceOption = "",
+    json: JsonOption = False,
+) -> None:
+    """Start a fault at the next step that is not flown yet, and print this step. hsv list faults lists the types.
+
+    Example: hsv fault inject elevator_deflection loss_of_effectiveness 0.8 --duration "5 s"
+    """
+    from hsv.bags.description import FAULT
+    from hsv.model.faults.table import read_fault
+
+    found = read_fault(channel, type, parameters or [])
+    given = [f"{name}={value!r}" for name, value in found.parameters.items()]
+    options = ["inject", "--duration", _si(duration, "s", "duration")]
+    _become(FAULT, "fault", options, [channel, type, *given], namespace, json)
+
+
+@fault.command()
+def clear(
+    channel: Annotated[str, typer.Argument(help="What fails; default: everything.")] = "",
+    type: Annotated[str, typer.Argument(help="Type of the fault; default: all of them.")] = "",
+    namespace: GraphNamespaceOption = "",
+    json: JsonOption = False,
+) -> None:
+    """End the faults of one channel or of all channels at the next step that is not flown yet.
+
+    Example: hsv fault clear elevator_deflection
+    """
+    from hsv.bags.description import FAULT
+
+    _become(FAULT, "fault", ["clear"], filter(None, (channel, type)), namespace, json)
+
+
+@fault.command(name="list")
+def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> None:
+    """List the active faults.
+
+    Example: hsv fault list --json
+    """
+    from hsv.bags.description import FAULT
+
+    _become(FAULT, "fault", ["list"], (), namespace, json)
+
+
+def set_(
+    name: Annotated[str, typer.Argument(help="Parameter that may change in flight: tau (feedback.tau).")],
+    value: Annotated[str, typer.Argument(help="Its value, with a unit where it has one: 0.8, or 0.8,0.8,0.9,0.9,1.")],
+    namespace: GraphNamespaceOption = "",
+    json: JsonOption = False,
+) -> None:
+    """Change a parameter of a running flight at the next step that is not flown yet.
+
+    Example: hsv set tau 0.8
+    """
+    from hsv.bags.description import SET_PARAMETER
+
+    _become(SET_PARAMETER, "set", (), (name, value), namespace, json)
+
+
+def command(
+    altitude: Annotated[str, typer.Argument(help="Altitude to fly to, e.g. '86000 ft'.")],
+    velocity: Annotated[str, typer.Argument(help="Velocity to fly at, e.g. '8100 ft/s'.")],
+    duration: Annotated[str, typer.Option(help="Least length of the ramp; default: as short as possible.")] = "0 s",
+    blend: Annotated[
+        str, typer.Option(help="Half the time in which climb rate and acceleration change at a corner.")
+    ] = "2 s",
+    namespace: GraphNamespaceOption = "",
+    json: JsonOption = False,
+) -> None:
+    """Command another point of altitude and velocity in a running flight, and print the first step that changes.
+
+    The reference becomes the fastest ramp for which the nominal trajectory stays inside U minus F Z, as with
+    hsv govern. It begins as soon as earlier commands are flown. A command for which nothing fits is rejected, with the
+    reason.
+
+    Example: hsv command "86000 ft" "8100 ft/s" --blend "4 s"
+    """
+    from hsv.bags.description import SET_COMMAND_CLIENT
+
+    point = _si(altitude, "m", "altitude"), _si(velocity, "m/s", "velocity")
+    options = ["--duration", _si(duration, "s", "duration"), "--blend", _si(blend, "s", "blend")]
+    _become(SET_COMMAND_CLIENT, "command", options, point, namespace, json)
+
+
+def watch(
+    namespace: GraphNamespaceOption = "", units: UnitsOption = UnitSystem.metric, json: JsonOption = False
+) -> None:
+    """Show the current state of a running flight, no matter how it was started, on a line that is updated.
+
+    The graph never waits for this command. With --json, or into a file, at most five lines per second are printed.
+
+    Example: hsv watch --units paper
+    """
+    from hsv.bags.description import WATCH
+
+    _become(WATCH, "watch", ["--units", units], (), namespace, json)
+
+
+def topic(
+    name: Annotated[str, typer.Argument(help="Topic, e.g. /hsv/state; default: list the topics.")] = "",
+    once: Annotated[bool, typer.Option("--once", help="Print one message only.")] = False,
+    every: Annotated[int, typer.Option(min=1, help="Print every N-th message.")] = 1,
+    namespace: GraphNamespaceOption = "",
+    json: JsonOption = False,
+) -> None:
+    """Print the messages of a topic of a running graph, with units, until its publisher is gone.
+
+    Without a topic: list the topics with their types, publishers and subscribers. With --json: one object per line.
+
+    Example: hsv topic /hsv/state --every 50
+    """
+    from hsv.bags.description import TOPIC
+    from hsv.base.errors import ParameterError
+
+    if not name and (once or every > 1):
+        option = "once" if once else f"every = {every}"
+        raise ParameterError(f"{option}: expected with a topic only")
+    options = [*(["--once"] if once else []), "--every", str(every)]
+    _become(TOPIC, "topic", options, filter(None, [name]), namespace, json)
+
+
+def _si(text: str, unit: str, name: str) -> str:
+    """Return a quantity in words as a number in an SI unit, with all digits."""
+    from hsv.base.units import parse_quantity
+
+    return repr(parse_quantity(text, unit, name))
+
+
+def _become(
+    node: NodeDescription, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
+) -> NoReturn:
+    """Run the client ``node`` in place of this process.
+
+    Args:
+        node: The client.
+        command: Name of the command, which error messages have.
+        options: Options of the client, after a command of its own if it has several.
+        values: Positional arguments; they may begin with a dash, like negative numbers.
+        namespace: Namespace of the graph, or empty.
+        json: Whether to print JSON.
+    """
+    from hsv.graph.launcher import become
+
+    words = ["--prog", f"hsv {command}", *(["--json"] if json else []), *options]
+    values = list(values)
+    become(node, [*words, *(["--", *values] if values else [])], namespace)

@@ -1,0 +1,365 @@
+"""Commands to know what there is, whether a controller is reproducible, and how fast this machine is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.text import Text
+
+from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, did_you_mean
+from hsv.base.units import UnitSystem, in_system, significant
+from hsv.cli.options import JsonOption, ListJsonOption, UnitsOption
+from hsv.cli.output import (
+    check_target,
+    console,
+    errors,
+    folded,
+    json_system,
+    new_table,
+    print_json,
+    print_rows,
+    print_titles,
+    report_error,
+    say,
+    stages,
+)
+
+if TYPE_CHECKING:
+    from hsv.bench.figure import Figure
+    from hsv.bench.record import Change
+
+
+class Kind(StrEnum):
+    """Kinds of things that can be listed."""
+
+    scenarios = "scenarios"
+    vehicles = "vehicles"
+    faults = "faults"
+    equipment = "equipment"
+    controllers = "controllers"
+
+
+def list_(
+    kind: Annotated[Kind, typer.Argument(help="What to list.", metavar="|".join(Kind))],
+    name: Annotated[
+        str, typer.Argument(help="Print this one: a whole scenario or vehicle, shipped or a file; numbers of others.")
+    ] = "",
+    units: UnitsOption = UnitSystem.metric,
+    json: ListJsonOption = False,
+) -> None:
+    """List scenarios, vehicles, types of faults, published actuators and sensors, or controllers; or print one.
+
+    A scenario or vehicle is printed with everything that it inherits from the one it extends, a fault with the units,
+    ranges and defaults of its parameters, equipment with its numbers and source.
+
+    Example: hsv list scenarios case2_derived
+    """
+    system = json_system(units) if json else units
+    if kind is Kind.scenarios:
+        _list_scenarios(name, json)
+    elif kind is Kind.vehicles:
+        _list_vehicles(name, json)
+    elif kind is Kind.faults:
+        _list_faults(name, system, json)
+    elif kind is Kind.equipment:
+        _list_equipment(name, system, json)
+    else:
+        _list_controllers(name, json)
+
+
+def _known(kind: Kind, name: str, names: Mapping[str, Any]) -> None:
+    if name and name not in names:
+        raise ParameterError(
+            f"{kind.removesuffix('s')} = {name!r}: expected one of {', '.join(names)}{did_you_mean(name, names)}"
+        )
+
+
+def _list_scenarios(name: str, json: bool) -> None:
+    from hsv.flight.scenario import load_scenario, scenario_at_means, scenario_names, scenario_table, scenario_text
+
+    if not name:
+        print_titles({name: load_scenario(name).title for name in scenario_names()}, json)
+        return
+    text, stem = scenario_text(name), Path(name).stem
+    table = scenario_table(text, stem)
+    scenario_at_means(table, stem)
+    if json:
+        print_json(table)
+    else:
+        print(text, end="")
+
+
+def _list_vehicles(name: str, json: bool) -> None:
+    from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_tables, vehicle_text
+
+    if not name:
+        print_titles({name: load_vehicle(name).title for name in vehicle_names()}, json)
+    elif json:
+        vehicle_text(name)
+        print_json(vehicle_tables(name))
+    else:
+        print(vehicle_text(name), end="")
+
+
+def _list_controllers(name: str, json: bool) -> None:
+    from hsv.control.controllers import controller_class, controller_names
+
+    titles = {}
+    for known in controller_names():
+        try:
+            description = (controller_class(known).__doc__ or "").strip().partition("\n")[0]
+        except HsvError as error:
+            description = str(error)  # of an installed package that cannot be loaded
+        titles[known] = description
+    _known(Kind.controllers, name, titles)
+    print_titles({name: titles[name]} if name else titles, json)
+
+
+def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
+    from hsv.model.dynamics import STATE_NAMES
+    from hsv.model.faults.table import FAULT_KINDS
+
+    _known(Kind.faults, name, FAULT_KINDS)
+    kinds: dict[str, dict[str, Any]] = {
+        name: {"side": kind.side, "channels": list(kind.channels), "meaning": kind.meaning}
+        for name, kind in FAULT_KINDS.items()
+    }
+    channels = {
+        name: "every state" if kind["channels"] == list(STATE_NAMES) else ", ".join(kind["channels"])
+        for name, kind in kinds.items()
+    }
+    if name:
+        parameters = list(_fault_parameters(name, units))
+        if json:
+            print_json({"type": name, **kinds[name], "parameters": parameters})
+            return
+        say(folded(f"{name}: {kinds[name]['meaning']}"))
+        say(folded(f"side: {kinds[name]['side']}; channels: {channels[name]}"))
+        for row in parameters:
+            # One column holds a parameter and its channel.
+            channel = row.pop("channel")
+            row["parameter"] += f" of {channel}" if channel else ""
+        print_rows(parameters)
+    elif json:
+        print_json(kinds)
+    else:
+        print_rows([{"type": name, **kind, "channels": channels[name]} for name, kind in kinds.items()])
+
+
+def _fault_parameters(type: str, units: UnitSystem) -> Iterator[dict[str, Any]]:
+    """Yield a row per parameter of a fault type, and per channel if its unit depends on the channel."""
+    from hsv.model.faults.table import FAULT_KINDS, fault_parameters
+
+    channels = FAULT_KINDS[type].channels
+    for parameter in fault_parameters(channels[0], type):
+        own = "{}" in parameter.unit
+        for channel in channels if own else channels[:1]:
+            described = parameter.of(channel)
+            # The paper has angles in degrees, but natural frequencies in rad/s.
+            system = units if own or parameter.unit != "rad/s" else UnitSystem.si
+            least, largest, default = (
+                None if value is None else in_system(value, described.unit, system)[0]
+                for value in (described.minimum, described.maximum, parameter.default)
+            )
+            yield {
+                "parameter": parameter.name,
+                "channel": channel if own else "",
+                "least": least,
+                "largest": largest,
+                "default": default,
+                "unit": in_system(1.0, described.unit, system)[1],
+                "meaning": parameter.description,
+            }
+
+
+def _list_equipment(name: str, units: UnitSystem, json: bool) -> None:
+    sets = _equipment_sets(units)
+    _known(Kind.equipment, name, sets)
+    if json:
+        print_json({"name": name, **sets[name]} if name else sets)
+    elif name:
+        say(folded(f"{name}: {sets[name]['source']}"), f'in a scenario: [{sets[name]["table"]}] set = "{name}"')
+        if sets[name]["numbers"]:
+            print_rows(sets[name]["numbers"])
+    else:
+        print_rows([{"set": key, "table": entry["table"], "source": entry["source"]} for key, entry in sets.items()])
+
+
+def _equipment_sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
+    """Return the sets by name: the table of a scenario that may name them, their source and numbers."""
+    from hsv.model.actuators import ACTUATOR_SETS
+    from hsv.model.plant import EQUIPMENT_PARAMETERS
+    from hsv.model.sensors import SENSOR_SETS
+
+    si = {parameter.name: parameter.unit for parameter in EQUIPMENT_PARAMETERS}
+
+    def number(channel: str, quantity: str, value: float, table: str) -> dict[str, Any]:
+        # The paper has angles in degrees, but natural frequencies in rad/s.
+        system = UnitSystem.si if quantity == "natural_frequency" else units
+        value, unit = in_system(value, si[f"{table}.{quantity}"], system)
+        return {"channel": channel, "quantity": quantity, "value": value, "unit": unit}
+
+    sets = {}
+    for name, actuator in ACTUATOR_SETS.items():
+        table = f"actuator.{actuator.channel}"
+        fields = ["order", "natural_frequency", "damping_ratio", "stop", "rate_limit"]
+        given = {field: getattr(actuator, field) for field in fields if actuator.order > 1 or field != "damping_ratio"}
+        numbers = [number(actuator.channel, *pair, table) for pair in given.items() if isfinite(pair[1])]
+        sets[name] = {"table": table, "source": actuator.source, "numbers": numbers}
+    for name, sensors in SENSOR_SETS.items():
+        numbers = [
+            number(channel, quantity, value, f"sensors.{channel}")
+            for channel, fields_of_channel in sensors.channels.items()
+            for quantity, value in fields_of_channel.items()
+        ]
+        if sensors.inertial_angle_of_attack:
+            numbers.append({"channel": "", "quantity": "inertial_angle_of_attack", "value": 1.0, "unit": ""})
+        sets[name] = {"table": "sensors", "source": sensors.source, "numbers": numbers}
+    return sets
+
+
+def check(
+    flown: Annotated[
+        str,
+        typer.Argument(
+            metavar="CONTROLLER|SCENARIO", help="A controller as a scenario names it, flown in case1, or a scenario."
+        ),
+    ],
+    json: JsonOption = False,
+) -> None:
+    """Check that a controller is reproducible: fly it twice, after a reset, from a copied state and under load.
+
+    Every byte is compared. On a difference, the first step and number that differ are printed, and the exit code is 1.
+
+    Example: hsv check tube_mpc
+    """
+    from hsv.flight.repeatability import findings, scenario_of
+
+    scenario = scenario_of(flown)
+    found = []
+    with stages() as progress:
+        for finding in findings(scenario):
+            found.append(finding)
+            progress(scenario.controller, len(found), 4)
+    failing = [finding for finding in found if finding.difference]
+    if json:
+        checks = [vars(finding) | {"same": not finding.difference} for finding in found]
+        print_json({"controller": scenario.controller, "scenario": scenario.name, "ok": not failing, "checks": checks})
+    else:
+        title = f"{scenario.controller} in {scenario.name}"
+        table = new_table("check", "flights", "bytes", title=title, right=["flights"])
+        for finding in found:
+            style = "bold red" if finding.difference else None
+            table.add_row(finding.check, str(finding.flights), finding.difference or "the same", style=style)
+        console.print(table)
+    if failing:
+        report_error(f"{scenario.controller}, {failing[0].check}: {failing[0].difference}")
+        raise typer.Exit(1)
+
+
+def bench(
+    only: Annotated[list[str] | None, typer.Option(help="Measure only this group; can be repeated.")] = None,
+    scale: Annotated[float, typer.Option(help="Factor on the number of repetitions.")] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Page whose table to replace, e.g. docs/benchmarks.md.")] = None,
+    compare: Annotated[
+        Path | None, typer.Option(help="Report what became slower or faster since this run, saved with --json > FILE.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Measure the performance of this machine, as ratios whose two sides are measured alternately.
+
+    The exit code is 1 if a group of --only could not be measured, and with --compare if anything became slower.
+
+    Example: hsv bench --only in_process --only mcap
+    """
+    from hsv.bench.machine import busy, machine
+    from hsv.bench.page import Page
+    from hsv.bench.record import as_json, changes, not_measured, read_run
+    from hsv.bench.suite import groups
+
+    if not 0.0 < scale <= 100.0:
+        raise QuantityError(f"scale = {scale}: expected above 0, at most 100")
+    if out and only:
+        raise QuantityError(f"out = {str(out)!r}: expected no --only with it, the page has the table of a complete run")
+    page = None
+    if out:
+        check_target(out, "out")
+        page = Page(out)
+    recorded = read_run(compare) if compare else None
+    available = groups(scale)
+    for name in only or ():
+        if name not in available:
+            raise QuantityError(
+                f"only = {name!r}: expected one of {', '.join(available)}{did_you_mean(name, available)}"
+            )
+    chosen = [name for name in available if not only or name in only]
+    measured_on = machine()
+    if warning := busy():
+        errors.print(warning, style="yellow", soft_wrap=True)
+    measured: dict[str, list[Figure]] = {}
+    skipped: dict[str, str] = {}
+    with stages() as progress:
+        for number, name in enumerate(chosen):
+            progress("measuring", number, len(chosen))
+            try:
+                measured[name] = available[name]()
+            except RunError as error:
+                # Without a compiler or a built workspace, the rest can still be measured.
+                skipped[name] = str(error)
+                continue
+            if not measured[name]:
+                skipped[name] = "not installed"
+    figures = [figure for found in measured.values() for figure in found]
+    since = changes(figures, recorded) if recorded else []
+    absent = not_measured(figures, recorded, only) if recorded else []
+    if json:
+        slower = {change.figure.name: change.slower for change in since}
+        compared = {"slower_than_recorded": slower, "recorded_but_not_measured": absent} if recorded else {}
+        print_json(as_json(measured, skipped) | compared)
+    else:
+        _print_figures(figures)
+        if not only:
+            for name, reason in skipped.items():
+                errors.print(f"{name}: not measured: {reason}", soft_wrap=True)
+        if recorded:
+            _print_changes(since, recorded.commit, len(figures), absent)
+    if page:
+        page.write(measured_on, figures, skipped)
+    if only and skipped:
+        raise RunError("; ".join(f"only = {name!r}: not measured: {reason}" for name, reason in skipped.items()))
+    if any(change.slower > 0.0 for change in since):
+        raise typer.Exit(1)
+
+
+def _print_figures(figures: list[Figure]) -> None:
+    """Print one paragraph per figure: the table of all figures, as in the documentation, is wider than a terminal."""
+    from hsv.bench.page import cells
+
+    for figure in figures:
+        what, against, ours, theirs, ratio, spread, promise = cells(figure)
+        compared = f" against {theirs} of {against}: ratio {ratio}" if theirs else ""
+        say(Text(folded(what), "bold"))
+        say(folded(f"{ours}{compared}{f' ({spread})' if spread else ''}", 4, first=4))
+        if promise:
+            say(Text(folded(promise, 4, first=4), "bold red" if "WORSE" in promise else ""))
+
+
+def _print_changes(since: list[Change], commit: str, measured: int, absent: list[str]) -> None:
+    """Print what became slower or faster since a recorded run of a ``commit``, and what could not be compared."""
+    say(Text(f"since {commit}", "bold"))
+    for change in since:
+        if change.slower:
+            word, style = ("SLOWER", "bold red") if change.slower > 0.0 else ("faster", "green")
+            text = f"{word} by {abs(change.slower):.0%}, {significant(change.before)} before: {change.figure.what}"
+            say(Text(folded(text, 4, first=4), style))
+    same = sum(not change.slower for change in since)
+    alone = measured - len(since)
+    others = f"; {alone} not in that run, or of other hardware" if alone else ""
+    say(folded(f"as before: {same} of {measured}{others}", 4, first=4))
+    if absent:
+        say(folded(f"recorded there, not measured here: {', '.join(absent)}", 4, first=4))

@@ -1,0 +1,290 @@
+"""Commands that look at recorded flights: report, plots, contents, and viewers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from hsv.base.units import UnitSystem, in_words, significant
+from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
+from hsv.cli.output import (
+    check_target,
+    console,
+    new_table,
+    print_bag_warnings,
+    print_json,
+    print_written,
+    say,
+    to_json,
+    writing,
+)
+
+if TYPE_CHECKING:
+    from hsv.bags.reader import Bag
+    from hsv.base.errors import RecordingError
+
+SHOWN_EXCURSIONS = 5
+"""Number of departures from the tube that are listed one by one."""
+
+
+class Program(StrEnum):
+    """A viewer that can be asked for."""
+
+    foxglove = "foxglove"
+    lichtblick = "lichtblick"
+    plotjuggler = "plotjuggler"
+    rerun = "rerun"
+
+
+def report(
+    bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are compared in the same plots.")],
+    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
+    design: SuppliedDesignOption = None,
+    scenario: SuppliedScenarioOption = None,
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Write a report on recorded flights: verdict, metrics, linked plots, events, parameters, how to repeat them.
+
+    The report is a single file that works offline; its units can be switched.
+
+    Example: hsv report bags/case1_20260101T000000Z bags/case1_no_notch_20260101T000000Z --out comparison.html
+    """
+    from hsv.bags.reader import Bag
+    from hsv.pages.report.page import write_report
+
+    check_target(out, "out", ".html", ".htm")
+    opened = [Bag(bag) for bag in bags]
+    if design or scenario:
+        from hsv.bags.replay.attached import supply
+
+        for bag in opened:
+            supply(bag, design, scenario)
+    write_report(opened, out, units=units)
+    print_written([out], json)
+    print_bag_warnings(*opened)
+
+
+def plot(
+    bags: Annotated[list[Path], typer.Argument(help="Bags to plot together.")],
+    out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Plot trajectory, attitude, elastic rates and inputs of recorded flights.
+
+    Example: hsv plot bags/case1_20260101T000000Z --units paper --out case1.png
+    """
+    from hsv.bags.bag_warnings import bag_warnings
+    from hsv.bags.flight import flight_data, labels
+    from hsv.bags.reader import Bag
+    from hsv.pages.plots import flight_figure, save_figure
+
+    check_target(out, "out", ".png", ".svg", ".pdf")
+    opened = [Bag(path) for path in bags]
+    named = dict(zip(labels(opened), opened, strict=True))
+    flights = {name: flight_data(bag) for name, bag in named.items()}
+    remarks = [f"{name}: {'; '.join(words)}" for name, bag in named.items() if (words := bag_warnings(bag))]
+    with writing(out, "out"):
+        save_figure(flight_figure(flights, units, remarks), out)
+    print_written([out], json)
+    print_bag_warnings(*opened)
+
+
+def view(
+    bag: BagArgument,
+    program: Annotated[
+        Program | None, typer.Option("--with", help="Viewer; default: the first that is installed.")
+    ] = None,
+    json: JsonOption = False,
+) -> None:
+    """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
+
+    Foxglove and Lichtblick show the vehicle in 3-D: they open a copy with a 3-D scene, in the folder scene of the bag.
+
+    Example: hsv view bags/case1_20260101T000000Z --with plotjuggler
+    """
+    import subprocess
+
+    from hsv.bags.reader import Bag
+    from hsv.bags.scene import scene_of
+    from hsv.base.errors import RecordingError
+    from hsv.pages.viewers import VIEWERS, layout_for
+
+    opened = Bag(bag)
+    if len(opened.files) != 1 or opened.path.suffix != ".mcap":
+        raise RecordingError(
+            f"{opened.path}: viewers open one MCAP file, expected a bag that is neither split nor compressed by rosbag2"
+        )
+    mcap = opened.path.absolute()
+    tried = [VIEWERS[program]] if program else list(VIEWERS.values())
+    viewer = next((viewer for viewer in tried if viewer.program()), None)
+    if viewer is None:
+        sources = "; ".join(f"{viewer.name}: {viewer.source}" for viewer in tried)
+        raise RecordingError(
+            f"{mcap}: no viewer is installed, expected one of these ({sources}); "
+            f"or drop the file into a browser at https://app.foxglove.dev, or use: hsv report {bag}"
+        )
+    made = layout_for(opened, viewer.layout) if viewer.layout else None
+    if viewer.scene:
+        mcap = scene_of(opened).absolute()
+    command = [str(viewer.program()), *viewer.arguments(mcap, made)]
+    subprocess.Popen(command, start_new_session=True, stdin=subprocess.DEVNULL)
+    layout = str(made) if viewer.imports else None
+    if json:
+        print_json({"path": str(mcap), "viewer": viewer.name, "command": command, "layout_to_import": layout})
+    else:
+        say(f"opening {mcap} with {viewer.name}", *([f"layout to import there: {layout}"] if layout else []))
+    print_bag_warnings(opened)
+
+
+def info(
+    bags: Annotated[list[Path], typer.Argument(help="Bag directories, or their .mcap files.")],
+    units: UnitsOption = UnitSystem.metric,
+    json: JsonOption = False,
+) -> None:
+    """Show the contents of bags: duration, topics, scenario, design, faults, metrics.
+
+    With --json, several bags are printed as a list.
+
+    Example: hsv info bags/case1_20260101T000000Z
+    """
+    from hsv.bags.reader import Bag
+
+    described = []
+    for number, opened in enumerate([Bag(bag) for bag in bags]):
+        if number and not json:
+            console.print()
+        description, problem = _described(opened, units, json)
+        described.append(description)
+        if problem:
+            break
+    if json:
+        print_json(described[0] if len(bags) == 1 else {"bags": described})
+    if problem:
+        raise problem
+
+
+def _described(opened: Bag, units: UnitSystem, json: bool) -> tuple[dict[str, Any], RecordingError | None]:
+    """Return the contents of a bag, and the reason if its metrics are missing; print them unless as ``json``."""
+    from hsv.bags.bag_warnings import completeness
+    from hsv.bags.flight import flight_data
+    from hsv.bags.info import describe
+    from hsv.base.errors import RecordingError
+    from hsv.cli.summary import print_metrics
+    from hsv.flight.metrics import METRICS, flight_metrics
+
+    description = describe(opened)
+    problem, remark = None, ""
+    try:
+        metrics, remark = flight_metrics(flight_data(opened)), completeness(opened)
+    except RecordingError as error:
+        # The other contents help to see what is wrong with the bag.
+        metrics, problem = {}, error
+    quantities = {name: (value, METRICS[name].unit) for name, value in metrics.items()}
+    if not json:
+        _print_description(description, units)
+        if not problem:
+            print_metrics(f"Metrics of an incomplete bag: {remark}" if remark else "Metrics", metrics, units)
+    if not problem:
+        print_bag_warnings(opened)
+    measured = {"metrics_complete": not remark, "metrics": to_json(quantities, units)}
+    return description | ({"metrics": None} if problem else measured), problem
+
+
+def _print_description(description: dict[str, Any], units: UnitSystem) -> None:
+    from hsv.cli.summary import print_section
+    from hsv.flight.fingerprint import published_in_words
+
+    attached = ", ".join(f"{a['name']} ({a['size_bytes']} bytes)" for a in description["attachments"])
+    published = published_in_words(description["fingerprint"], description["as_published"])
+    heading = {
+        "path": Path(description["path"]),
+        "duration": f"{description['duration_s']:.6g} s",
+        "messages": description["messages"],
+        "complete": f"no: {'; '.join(description['warnings'])}" if description["warnings"] else "yes",
+        "ending": description["ending"] or "not recorded",
+        **description["custom_data"],
+        "attached": attached or "nothing",
+        "faults": _intervals(description["faults"], partial(_fault, units)),
+        **_equipment(description["equipment"], units),
+        "saturation": _saturation(description["saturation"]),
+        "tube": _tube(description["tube"]),
+        "fingerprint": f"{published}\n{description['fingerprint'] or ''}".rstrip(),
+    }
+    if description["not_covered"]:
+        heading["not covered"] = "; ".join(map(str, description["not_covered"]))
+    print_section("bag", heading)
+    table = new_table("topic", "type", "messages", "rate Hz", right=("messages", "rate Hz"))
+    for topic in description["topics"]:
+        table.add_row(topic["name"], topic["type"], str(topic["messages"]), significant(topic["rate_hz"] or 0.0))
+    console.print(table)
+
+
+def _intervals(intervals: list[dict[str, Any]] | None, name: Callable[[dict[str, Any]], str]) -> str:
+    if intervals is None:
+        return "not recorded"
+    ends = ("to the end" if i["end_s"] is None else f"to {i['end_s']:g} s" for i in intervals)
+    found = zip(intervals, ends, strict=True)
+    return "; ".join(f"{name(i)}from {i['start_s']:g} s {end}" for i, end in found) or "none"
+
+
+def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
+    from hsv.bags.info import parameters_in_words
+
+    parameters = parameters_in_words(fault, lambda value, unit: in_words(value, unit, units))
+    return f"{fault['type']} {parameters}{' ' if parameters else ''}of {fault['channel']}, "
+
+
+def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
+    """Return a line for each kind of equipment that is not ideal."""
+    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+    from hsv.pages.report.panels import AIR_PANELS
+
+    if equipment is None:
+        return {}
+    si = dict(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
+
+    def quantities(numbers: dict[str, float]) -> str:
+        return ", ".join(f"{name} {in_words(value, si[name], units)}" for name, value in numbers.items())
+
+    def span(name: str, ends: list[float]) -> str:
+        return f"{name} {' to '.join(in_words(value, AIR_PANELS[name].unit, units) for value in ends)}"
+
+    held = ", ".join(f"{name} in {count} steps" for name, count in equipment["held_steps"].items())
+    lines = {
+        "sensors": ("rms error ", quantities(equipment["measurement_error_rms"]), ""),
+        "links": ("held ", held, ""),
+        "effectors": ("up to ", quantities(equipment["effector_largest_difference"]), " from the commanded position"),
+        "air": ("", ", ".join(span(name, ends) for name, ends in equipment["air_range"].items()), ""),
+    }
+    return {key: f"{head}{text}{end}" for key, (head, text, end) in lines.items() if text}
+
+
+def _saturation(saturation: dict[str, Any] | None) -> str:
+    if saturation is None:
+        return "not recorded"
+    fuel, elevator = saturation["fuel_equivalence_ratio_steps"], saturation["elevator_deflection_steps"]
+    return f"{saturation['steps']} steps (fuel equivalence ratio {fuel}, elevator deflection {elevator})"
+
+
+def _tube(tube: dict[str, Any] | None) -> str:
+    if tube is None:
+        return "not recorded"
+    if not tube["checked_steps"]:
+        return "no invariant set in this design"
+    outside = f"{tube['outside_steps']} of {tube['checked_steps']} steps outside"
+    text = f"largest level {tube['largest_level']:.3g}, {outside}"
+    if tube["uncertified_steps"]:
+        text += ", for a vehicle that the design is not certified for"
+    if tube["uncertified_hardware_steps"]:
+        text += ", with hardware or air that the design is not certified for"
+    excursions = tube["excursions"]
+    shown = _intervals(excursions[:SHOWN_EXCURSIONS], lambda _: "")
+    more = f" and {len(excursions) - SHOWN_EXCURSIONS} more" if len(excursions) > SHOWN_EXCURSIONS else ""
+    return f"{text}: {shown}{more}" if excursions else text
