@@ -197,9 +197,10 @@ def test_mcap_ros2_decodes_it_alike(written: Written) -> None:
             theirs = [message.decoded_message for message in reader.iter_decoded_messages([topic])]
             columns = bag.columns(topic)
             assert [message.step for message in theirs] == columns["step"].tolist()
-            path_ = "elastic_rate" if topic == "/hsv/any_vehiclestate" else "deviation.elastic_rate"
-            values = [message if path_ == "elastic_rate" else message.deviation for message in theirs]
-            np.testing.assert_array_equal([value.elastic_rate for value in values], columns[path_])
+            nested = topic == "/hsv/any_nominalstate"
+            values = [message.deviation if nested else message for message in theirs]
+            path_ = "deviation.elastic_rate_2" if nested else "elastic_rate_2"
+            np.testing.assert_array_equal([value.elastic_rate_2 for value in values], columns[path_])
 
 
 def test_bag_without_messages(kit: SimpleNamespace, tmp_path: Path) -> None:

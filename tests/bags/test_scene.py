@@ -69,7 +69,8 @@ def test_frames_are_those_of_the_recorded_state(case1_bag, written):
         sample = Sample(
             float(state["angle_of_attack"][row]),
             float(state["pitch_angle"][row]),
-            *state["elastic_coordinate"][row].tolist(),
+            float(state["elastic_coordinate_1"][row]),
+            float(state["elastic_coordinate_2"][row]),
             float(actuator["fuel_equivalence_ratio"][row]),
             float(actuator["elevator_deflection"][row]),
         )

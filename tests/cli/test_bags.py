@@ -81,7 +81,7 @@ def test_export_writes_into_the_folder_of_the_bag(hsv: Hsv, bag: Path) -> None:
     done = hsv("export", str(bag), "--csv", "--topic", "/hsv/state")
     assert done.code == 0
     header = (bag / "csv" / "hsv_state.csv").read_text().splitlines()[0]
-    assert '"altitude [m]"' in header and '"elastic_rate[0] [kg^0.5 m/s]"' in header
+    assert '"altitude [m]"' in header and '"elastic_rate_1 [kg^0.5 m/s]"' in header
     again = hsv("export", str(bag), "--csv")
     assert again.code == 2 and "exists already" in again.error
     assert hsv("export", str(bag), "--csv", "--npz").code == 2

@@ -51,8 +51,8 @@ def test_markers_follow_the_state_of_a_flight_that_is_not_changed(processes: Pro
         assert [marker["ns"] for marker in markers] == [*(solid.name for solid in solids()), "label"]
         assert markers[-1]["text"] == "bending x 40"
         [row] = np.flatnonzero(state["header.stamp"] == markers[0]["header"]["stamp"])
-        angles = (float(state[name][row]) for name in ("angle_of_attack", "pitch_angle"))
-        frames = composed(transforms(Sample(*angles, *state["elastic_coordinate"][row].tolist(), 0.0, 0.0)))
+        names = ("angle_of_attack", "pitch_angle", "elastic_coordinate_1", "elastic_coordinate_2")
+        frames = composed(transforms(Sample(*(float(state[name][row]) for name in names), 0.0, 0.0)))
         for marker in markers:
             if marker["ns"] in SEGMENTS:
                 frame, pose = frames[marker["ns"]], marker["pose"]

@@ -260,8 +260,8 @@ def test_faults_and_factors_come_and_go_in_flight(processes: Processes) -> None:
     bags = processes.folder / "bags"
     wait_until(lambda: any(recorded_steps(bag) > 50 for bag in bags.glob("*")) or flight.poll(), [flight.pid])
     for beginning, said in (
-        ("ros2 service call /hsv/inject_fault", "accepted=True, message='loss_of_effectiveness 0.8 of elevator"),
-        ("ros2 service call /hsv/clear_fault", "accepted=True, message='no fault of elevator_deflection from step"),
+        ("ros2 service call /hsv/inject_fault", "success=True, message='loss_of_effectiveness 0.8 of elevator"),
+        ("ros2 service call /hsv/clear_fault", "success=True, message='no fault of elevator_deflection from step"),
         ("ros2 param set", "Set parameter successful"),
         ("ros2 param dump", "tau: - 0.9 "),
         ("ros2 topic echo", "tau: - 0.9 "),

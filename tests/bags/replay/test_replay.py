@@ -110,7 +110,7 @@ def test_faults_injected_and_cleared_in_flight_are_repeated_at_their_steps(tmp_p
             "filter_state: 4 numbers, expected 2 of the notch filter flown, or none",
         ),
         ("hsv/nominal", "tube_mpc", {"gain": [0.0] * 9}, "gain: 9 numbers, expected 18, or none"),
-        ("hsv/actuator", "plant", {"since": [1]}, "since: 1 steps, expected one a fault in active, 0"),
+        ("hsv/actuator", "plant", {"since": [1]}, "since: 1 steps, expected 0, one for each fault in active"),
     ],
 )
 def test_a_message_that_no_block_can_take_is_named(

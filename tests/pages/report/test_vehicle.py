@@ -12,6 +12,7 @@ from hsv.pages.report.page import write_report
 pytestmark = pytest.mark.viewer
 
 FAULT = 8.0
+ELASTIC = ("elastic_coordinate_1", "elastic_coordinate_2")
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +69,10 @@ def test_the_outline_is_the_bent_body_of_the_recorded_state(opened, quiet, at, e
     vehicle, nominal = shown(opened, at, exaggeration)
     row = round(at / 0.02)
     state, plan = quiet.columns("hsv/state"), quiet.columns("hsv/nominal")
-    expected = expected_body(state["elastic_coordinate"][row], state["pitch_angle"][row], exaggeration)
+    eta = np.array([state[name][row] for name in ELASTIC])
+    expected = expected_body(eta, state["pitch_angle"][row], exaggeration)
     np.testing.assert_allclose(body_of(vehicle), expected, atol=2e-3)
-    eta = plan["reference.elastic_coordinate"][row] + plan["deviation.elastic_coordinate"][row]
+    eta = np.array([plan[f"reference.{name}"][row] + plan[f"deviation.{name}"][row] for name in ELASTIC])
     pitch = plan["reference.pitch_angle"][row] + plan["deviation.pitch_angle"][row]
     np.testing.assert_allclose(body_of(nominal), expected_body(eta, pitch, exaggeration), atol=2e-3)
     # The nominal one is also the dashed outline about the vehicle.
@@ -87,9 +89,8 @@ def test_numbers_are_those_of_the_bag_and_true_to_scale(opened, quiet):
     assert (alpha, pitch) == tuple(f"{angle:.2f}°" for angle in angles)
     assert path.replace("−", "-") == f"{angles[1] - angles[0]:.2f}°"
     frame = airframe()
-    for text, x, eta in zip(
-        (nose, tail), (frame.fore_body, -frame.aft_body), state["elastic_coordinate"][500], strict=True
-    ):
+    for text, x, name in zip((nose, tail), (frame.fore_body, -frame.aft_body), ELASTIC, strict=True):
+        eta = state[name][500]
         assert text == f"{1000.0 * frame.shape(x) * eta:.1f} mm"
 
 

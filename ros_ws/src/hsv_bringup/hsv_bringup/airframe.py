@@ -74,8 +74,8 @@ class AirframeNode(ProcessNode):
         sample = Sample(
             state.angle_of_attack,
             state.pitch_angle,
-            float(state.elastic_coordinate[0]),
-            float(state.elastic_coordinate[1]),
+            state.elastic_coordinate_1,
+            state.elastic_coordinate_2,
             self._actuator.fuel_equivalence_ratio,
             self._actuator.elevator_deflection,
         )

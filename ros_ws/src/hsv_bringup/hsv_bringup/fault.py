@@ -9,7 +9,7 @@ from hsv_msgs.msg import Actuator, Fault
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.bags.description import FAULT_INJECTOR
-from hsv.bags.exchange import fault_in
+from hsv.bags.messages import fault_in
 from hsv.base.errors import ParameterError, RunError
 from hsv.model.faults.injector import read_parameters
 from hsv_bringup.client import GraphClient, OneLineParser, acting_from, answer, run_client
@@ -34,7 +34,7 @@ def _clear(client: GraphClient, options: argparse.Namespace) -> None:
 def _change(client: GraphClient, options: argparse.Namespace, kind: type, request: object) -> None:
     run = client.find_run()
     response = client.call(FAULT_INJECTOR, kind, request)
-    if not response.accepted:
+    if not response.success:
         raise ParameterError(response.message)
     time, values = acting_from(run, response.step)
     answer(f"{response.message}, {time}", {"message": response.message, **values}, options.json)

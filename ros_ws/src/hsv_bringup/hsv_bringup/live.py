@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -37,6 +36,7 @@ from hsv.bags.description import (
     NodeDescription,
 )
 from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS
+from hsv.bags.messages import stamp_in
 from hsv.graph.settable import SETTABLE, step_in
 from hsv.graph.standstill import Standstill
 from hsv.pages.live.commands import Change, Command, Inject
@@ -69,8 +69,6 @@ WATCHING = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 _LOOK = 1.0
 """Seconds between two looks for the plant."""
-
-_STAMP = struct.Struct("<iI")
 
 
 class LiveExecutor(FlowExecutor):
@@ -172,9 +170,7 @@ class LiveNode(ProcessNode):
         return deserialize_message(data, self._kinds[topic])
 
     def _on_step_message(self, topic: str, name: str, data: bytes) -> None:
-        # Every step topic begins with the simulated time, right behind the four bytes of the CDR header.
-        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
-        stamp = seconds * 1_000_000_000 + nanoseconds
+        stamp = stamp_in(data)
         self.foxglove.send(name, stamp, data)
         self.hub.offer(topic, stamp, data)
 
@@ -256,7 +252,7 @@ class LiveNode(ProcessNode):
                     acknowledge(result.reason, step_in(result.reason))
                 else:
                     refuse(result.reason)
-            elif response.accepted:
+            elif response.success:
                 acknowledge(response.message, response.step)
             else:
                 refuse(response.message)

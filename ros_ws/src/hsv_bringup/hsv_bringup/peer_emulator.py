@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from hsv.bags import description
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.description import NodeDescription
 from hsv.bags.infrastructure_parameters import PEER_EMULATOR_PARAMETERS
+from hsv.bags.messages import stamp_in
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps
 from hsv.bags.topic import Qos, Topic
@@ -26,8 +26,6 @@ from hsv_node.main import run_node
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare
 from hsv_node.qos import LATCHED, STEP
-
-_STAMP = struct.Struct("<iI")
 
 
 class PeerEmulatorNode(LockstepNode):
@@ -101,8 +99,7 @@ class PeerEmulatorNode(LockstepNode):
             self._ready = True
 
     def _on_answer(self, topic: str, name: str, data: bytes) -> None:
-        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
-        self._output.write(name, seconds * 1_000_000_000 + nanoseconds, data)
+        self._output.write(name, stamp_in(data), data)
         self._answered[topic] += 1
         self._feed()
 

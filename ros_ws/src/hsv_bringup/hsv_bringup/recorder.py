@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 import mimetypes
-import struct
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -12,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hsv_msgs.msg import RecorderProgress, Run, VehicleState
+from rclpy.serialization import deserialize_message
 
 from hsv.bags.definitions import definition, type_hash
 from hsv.bags.description import (
@@ -31,15 +31,16 @@ from hsv.bags.description import (
     step_topics,
 )
 from hsv.bags.infrastructure_parameters import RECORDER_PARAMETERS
+from hsv.bags.messages import StepMessages, stamp_in
 from hsv.bags.roles import naming
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
 from hsv.core.noise import SEED_PARAMETER
+from hsv.flight.blocks import Signals
 from hsv.graph.snapshot import Snapshot
 from hsv_bringup.flow_executor import BatchExecutor
 from hsv_bringup.peer_parameters import GIVE_UP_AFTER, PeerParameters
-from hsv_node.codec import codec
 from hsv_node.lockstep import SAID_EVERY, PeerNode
 from hsv_node.main import run_node
 from hsv_node.messages import message_class
@@ -51,8 +52,6 @@ CONFIRMATION_INTERVAL = 50
 
 TOLD_EVERY = 0.2
 """Seconds of the wall clock between two lines of numbers."""
-
-_STAMP = struct.Struct("<iI")
 
 
 class RecorderNode(PeerNode):
@@ -89,9 +88,9 @@ class RecorderNode(PeerNode):
             qos = Qos(depth=LATCHED.depth, durability="transient_local") if latched else Qos(depth=STEP.depth)
             self.bag.add_topic(Topic(self._names[topic], kind, definition(kind), type_hash(kind), qos))
         self._order = tuple(self._names[topic] for topic in recorded)
-        self._state_name = self._names[STATE]
+        self._state_messages, self._signals = StepMessages(STATE), Signals()
         for topic, name in zip(recorded, self._order, strict=True):
-            self.create_step_subscription(topic, partial(self._on_step_message, name), raw=True)
+            self.create_step_subscription(topic, partial(self._on_step_message, name))
         for topic, kind in OTHER_TOPICS.items():
             profile = LATCHED if topic in LATCHED_TOPICS else STEP
             callback: Callable[[bytes], None] = partial(self._on_other_message, self._names[topic])
@@ -162,9 +161,7 @@ class RecorderNode(PeerNode):
         self.bag.attach(name, mimetypes.guess_type(name)[0] or "text/plain", data)
 
     def _on_step_message(self, topic: str, data: bytes) -> None:
-        # Every step topic begins with the simulated time, right behind the four bytes of the CDR header.
-        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
-        stamp = seconds * 1_000_000_000 + nanoseconds
+        stamp = stamp_in(data)
         if stamp <= self._now and self._complete >= 0:
             # Each topic keeps its order: whoever sends this is not of the graph.
             self.get_logger().error(
@@ -182,10 +179,8 @@ class RecorderNode(PeerNode):
             self.bag.write(topic, stamp, messages[topic])
         self._now = stamp
         self._complete = round(stamp / self._nanoseconds_per_step)
-        final = (
-            self._complete >= self._last_step
-            or codec(TOPICS[STATE]).decode(messages[self._state_name]).status != VehicleState.RUNNING
-        )
+        self._state_messages.unpack(messages[self._names[STATE]], self._signals)
+        final = self._complete >= self._last_step or self._signals.status != VehicleState.RUNNING
         if self._complete % CONFIRMATION_INTERVAL == 0 or final:
             # What is confirmed is on its way to the disk, whatever happens to this process.
             self.bag.flush()
@@ -200,7 +195,7 @@ class RecorderNode(PeerNode):
             return
         self._told = now
         read = {
-            topic: codec(TOPICS[topic]).decode(messages[name])
+            topic: deserialize_message(messages[name], message_class(TOPICS[topic]))
             for topic in (STATE, NOMINAL, TUBE_STATUS, ACTUATOR)
             if (name := self._names.get(topic)) in messages
         }

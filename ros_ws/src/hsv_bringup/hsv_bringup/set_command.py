@@ -16,7 +16,7 @@ def _command(client: GraphClient, options: argparse.Namespace) -> None:
     run = client.find_run()
     fields = {name: getattr(options, name) for name in ("altitude", "velocity", "duration", "blend")}
     response = client.call(NOMINAL_TRAJECTORY, SetCommand, SetCommand.Request(**fields))
-    if not response.accepted:
+    if not response.success:
         raise ParameterError(response.message)
     time, values = acting_from(run, response.step)
     answer(

@@ -37,9 +37,9 @@ class ControllerNode(BlockNode):
         self.component = build_controller(values | {"controller": name}, design)
 
     def stepped(self, signals: Signals) -> None:
-        """Tell whether its command is limited."""
-        if self.diagnosis_due(signals.header.stamp):
-            self.diagnose(signals.header.stamp, step=signals.step, saturated=bool(signals.saturated.any()))
+        """Report whether its command is limited."""
+        if self.diagnosis_due(signals):
+            self.diagnose(signals, saturated=bool(signals.saturated.any()))
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -8,7 +8,7 @@ from hsv_msgs.msg import Reference, Run
 from hsv_msgs.srv import SetCommand
 
 from hsv.bags.description import NOMINAL_TRAJECTORY, REFERENCE, SET_COMMAND
-from hsv.bags.exchange import stamp_of
+from hsv.bags.messages import FRAME, stamp_of
 from hsv.base.errors import HsvError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory
@@ -51,13 +51,12 @@ class NominalTrajectoryNode(BlockNode):
         """Tell how the law fares; a solver that begins to fail is a warning."""
         failed = bool(int(signals.nominal_status) & _SOLVER_FAILED)
         fails, self._failed = failed and not self._failed, failed
-        if fails or self.diagnosis_due(signals.header.stamp):
+        if fails or self.diagnosis_due(signals):
             status = NominalStatus(signals.nominal_status)
             self.diagnose(
-                signals.header.stamp,
+                signals,
                 "running" if status is NominalStatus.OK else str(status.name),
                 warning=fails,
-                step=signals.step,
                 gain_index=signals.gain_index,
                 step_time_p99_ms=self._times,
             )
@@ -72,9 +71,9 @@ class NominalTrajectoryNode(BlockNode):
                 request.altitude, request.velocity, request.duration, request.blend
             )
         except HsvError as error:
-            response.accepted, response.message = False, str(error)
+            response.success, response.message = False, str(error)
             return response
-        response.accepted = True
+        response.success = True
         response.message = (
             f"to {request.altitude:.6g} m and {request.velocity:.6g} m/s from step {response.step} on, at rest at "
             f"{response.end:.2f} s"
@@ -85,6 +84,7 @@ class NominalTrajectoryNode(BlockNode):
 
     def _publish_reference(self, step: int) -> None:
         message = Reference(step=step, **self._trajectory.reference.columns)
+        message.header.frame_id = FRAME
         message.header.stamp.sec, message.header.stamp.nanosec = stamp_of(step, self._period)
         self._references.publish(message)
 

@@ -26,8 +26,8 @@ class NotchFilterNode(BlockNode):
 
     def stepped(self, signals: Signals) -> None:
         """Report that the node continues."""
-        if self.diagnosis_due(signals.header.stamp):
-            self.diagnose(signals.header.stamp, step=signals.step)
+        if self.diagnosis_due(signals):
+            self.diagnose(signals)
 
 
 def main(args: Sequence[str] | None = None) -> int:

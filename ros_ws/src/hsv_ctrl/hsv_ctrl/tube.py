@@ -45,14 +45,13 @@ class TubeNode(BlockNode):
             super().advance(signals)
 
     def stepped(self, signals: Signals) -> None:
-        """Tell of the tube; leaving it is a warning."""
+        """Report the tube status; warn when the error leaves the tube."""
         result = signals.diagnostics
         assert isinstance(result, TubeResult)
         outside = result.status is TubeStatusCode.OUTSIDE
         left, self._outside = outside and not self._outside, outside
-        stamp = signals.header.stamp
-        time = stamp.sec + 1e-9 * stamp.nanosec
         if left:
+            time = signals.stamp[0] + 1e-9 * signals.stamp[1]
             self.get_logger().warning(f"left the tube at {time:.2f} s: {result.component}, level {result.level:.3f}")
         found, changed, known = result.effectiveness, False, {}
         if found:
@@ -65,12 +64,11 @@ class TubeNode(BlockNode):
             }
         if found and changed:
             self.get_logger().warning(f"elevator {found}")
-        if left or changed or self.diagnosis_due(stamp):
+        if left or changed or self.diagnosis_due(signals):
             self.diagnose(
-                stamp,
+                signals,
                 f"elevator {found}" if changed else result.status.name,
                 warning=left or changed,
-                step=signals.step,
                 saturated=bool(result.saturated.any()),
                 level=result.level,
                 component=result.component,

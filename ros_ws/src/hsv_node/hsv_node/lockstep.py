@@ -17,10 +17,10 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from hsv.bags import description
 from hsv.bags.description import NodeDescription
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
-from hsv.base.errors import RunError, SignalError
+from hsv.base.errors import RunError
 from hsv.control.controllers import class_place
 from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
-from hsv_node.codec import codec
+from hsv.flight.blocks import Signals
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown
 from hsv_node.process import ProcessNode
@@ -88,38 +88,27 @@ class LockstepNode(ProcessNode):
             for topic, peer in description.links(self.role, self.controller, self.recorded, self.estimator):
                 self._links.setdefault(topic, []).append(peer)
 
-    def create_step_subscription(self, topic: str, callback: Callable[[Any], None], raw: bool = False) -> None:
-        """Subscribe a step topic of the graph description.
+    def create_step_subscription(self, topic: str, callback: Callable[[bytes], None]) -> None:
+        """Subscribe to a step topic of the graph description; ``callback`` takes the bytes of a message."""
 
-        ``callback`` takes what stands in a message (:meth:`hsv_node.codec.Codec.unpack`), or its bytes if it is
-        ``raw``.
-        """
-        kind = description.TOPICS[topic]
-        unpack = codec(kind).unpack
-
-        def take(data: bytes) -> None:
+        def take(message: bytes) -> None:
             if self.exit_code is not None:
-                return  # this node wants to end, and why is said
+                return  # The node is shutting down; the reason has been logged.
             try:
-                values = unpack(data)
+                callback(message)
             except RunError as error:
-                self._refuse_message(topic, error)
-                return
-            callback(values)
+                self.refuse_message(topic, error)
 
-        taken = callback if raw else take
-        self._inputs[topic] = self.create_subscription(message_class(kind), topic, taken, STEP, raw=True)
+        kind = message_class(description.TOPICS[topic])
+        self._inputs[topic] = self.create_subscription(kind, topic, take, STEP, raw=True)
 
-    def refuse_signal(self, error: SignalError) -> str:
-        """End for a signal that cannot be taken from its message, or not be flown; return what has been said."""
-        return self._refuse_message(description.TOPIC_OF[error.signal], error)
-
-    def _refuse_message(self, topic: str, error: RunError) -> str:
-        said = f"{self.resolve_topic_name(topic)}: {error}"
+    def refuse_message(self, topic: str, error: RunError) -> str:
+        """Shut down because of a message that cannot be used; return what has been logged."""
+        logged = f"{self.resolve_topic_name(topic)}: {error}"
         # Not raised: the executor would print a traceback.
-        self.get_logger().fatal(said)
+        self.get_logger().fatal(logged)
         self.finish(1)
-        return said
+        return logged
 
     def create_step_publisher(self, topic: str) -> Callable[[bytes], None]:
         """Return the function that publishes the bytes of a message on a step topic of the graph description."""
@@ -221,22 +210,22 @@ class LockstepNode(ProcessNode):
         self._changed = words
         self.get_logger().info(words)
 
-    def diagnosis_due(self, step_stamp: Any) -> bool:
-        """Tell whether a simulated second has begun since the last diagnosis."""
-        return bool(step_stamp.sec != self._diagnosed_second)
+    def diagnosis_due(self, signals: Signals) -> bool:
+        """Return whether a simulated second has begun since the last diagnosis."""
+        return signals.stamp[0] != self._diagnosed_second
 
-    def diagnose(self, step_stamp: Any, summary: str = "running", warning: bool = False, **values: object) -> None:
+    def diagnose(self, signals: Signals, summary: str = "running", warning: bool = False, **values: object) -> None:
         """Publish this node's diagnostics: once a simulated second, see :meth:`diagnosis_due`, and as a warning."""
-        self._diagnosed_second = step_stamp.sec
+        self._diagnosed_second = signals.stamp[0]
         status = DiagnosticStatus(
             level=DiagnosticStatus.WARN if warning else DiagnosticStatus.OK,
             name=f"{self.get_name()}: {self._task}",
             message=summary,
             hardware_id="hsv",
-            values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+            values=[KeyValue(key=key, value=str(value)) for key, value in ({"step": signals.step} | values).items()],
         )
         message = DiagnosticArray(status=[status])
-        message.header.stamp.sec, message.header.stamp.nanosec = step_stamp.sec, step_stamp.nanosec
+        message.header.stamp.sec, message.header.stamp.nanosec = signals.stamp
         self._diagnostics.publish(message)
 
     def _watching(self, seen: Sequence[TopicEndpointInfo], topic: str, linked: Mapping[str, str]) -> int:
@@ -323,10 +312,10 @@ class PeerNode(LockstepNode):
 
     def _on_last_state(self, state: VehicleState) -> None:
         if state.status == VehicleState.RUNNING:
-            self._end(f"broken off by the plant at {step_in_words(state)}")
+            how = "broken off by the plant"
         else:
             how = "finished" if state.status == VehicleState.FINISHED else "diverged"
-            self._end(f"{how} at {step_in_words(state)}")
+        self._end(f"{how} at {step_in_words(state.step, self._run.period if self._run else 0.0)}")
 
     def _on_plant(self, info: QoSSubscriptionMatchedInfo) -> None:
         if info.current_count == 0:
@@ -349,6 +338,6 @@ def run_in_words(run: Run) -> str:
     return f"run {short_id(run)}: {run.last_step + 1} steps, {run.last_step * run.period:g} s"
 
 
-def step_in_words(state: Any) -> str:
-    """Return at which time and step a state is, a VehicleState as rclpy or the codec makes it."""
-    return f"t = {state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec:.2f} s, step {state.step}"
+def step_in_words(step: int, period: float) -> str:
+    """Return time and step in words."""
+    return f"t = {step * period:.2f} s, step {step}"

@@ -8,7 +8,7 @@ from hsv_msgs.msg import Run
 from hsv_msgs.srv import ClearFault, InjectFault
 
 from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
-from hsv.bags.exchange import fault_in, stamp_of
+from hsv.bags.messages import fault_in, stamp_in, stamp_of
 from hsv.base.errors import ParameterError
 from hsv.base.timing import NEVER, first_step
 from hsv.flight.blocks import Signals
@@ -17,7 +17,6 @@ from hsv.model.links import command_link
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle
-from hsv_node.wire import STEP_PLACE, Values, head_of
 
 
 class FaultInjectorNode(BlockNode):
@@ -32,7 +31,7 @@ class FaultInjectorNode(BlockNode):
             values = declare(self, FaultInjector.PARAMETERS)
         self._period = values["period"]
         self._controller = controller_node(self.controller)
-        self._due = 0
+        self._due_step = 0
         """The step that the controller has to answer next."""
         self.component = self._injector = FaultInjector.from_parameters(values)
         self.create_service(InjectFault, INJECT_FAULT, self._inject)
@@ -41,17 +40,17 @@ class FaultInjectorNode(BlockNode):
     def start_run(self, run: Run) -> None:
         """Begin with step 0 and the scheduled faults."""
         super().start_run(run)
-        self._due = 0
+        self._due_step = 0
 
-    def on_message(self, topic: str, values: Values) -> None:
+    def on_message(self, topic: str, message: bytes) -> None:
         """Step; in a run, a step or time other than the expected one ends it."""
         if self.announced is not None:
-            step, stamp = values[STEP_PLACE], head_of(values)
-            if step != self._due or stamp[:2] != stamp_of(step, self.announced.period):
-                self._refuse(topic, step, stamp.sec + 1e-9 * stamp.nanosec)
+            step, (seconds, nanoseconds) = self.messages[topic].step(message), stamp_of(self._due_step, self._period)
+            if step != self._due_step or stamp_in(message) != seconds * 10**9 + nanoseconds:
+                self._refuse(topic, step, stamp_in(message) * 1e-9)
                 return
-            self._due += 1
-        super().on_message(topic, values)
+            self._due_step += 1
+        super().on_message(topic, message)
 
     def missing(self) -> list[str]:
         """Wait for the links; two controllers in them end the run before it begins."""
@@ -66,10 +65,10 @@ class FaultInjectorNode(BlockNode):
             self._end_for_two(names)
             return
         name = names[0] if names else self._controller.name
-        due = self._due * self._period
+        due = self._due_step * self._period
         self.get_logger().fatal(
             f"{name} answered step {step} at {time:.2f} s on {self.resolve_topic_name(topic)}, expected step "
-            f"{self._due} at {due:.2f} s"
+            f"{self._due_step} at {due:.2f} s"
         )
         self.finish(1)
 
@@ -80,10 +79,9 @@ class FaultInjectorNode(BlockNode):
         self.finish(1)
 
     def stepped(self, signals: Signals) -> None:
-        """Tell whether a fault acts."""
-        if self.diagnosis_due(signals.header.stamp):
-            said = "faults act" if signals.active_faults else "no fault"
-            self.diagnose(signals.header.stamp, said, step=signals.step)
+        """Report whether a fault acts."""
+        if self.diagnosis_due(signals):
+            self.diagnose(signals, "faults act" if signals.active_faults else "no fault")
 
     def _inject(self, request: InjectFault.Request, response: InjectFault.Response) -> InjectFault.Response:
         try:
@@ -93,11 +91,11 @@ class FaultInjectorNode(BlockNode):
                     f"duration = {request.duration:g}: expected at least 0 (seconds; 0: until cleared)"
                 )
         except ParameterError as error:
-            response.accepted, response.message = False, str(error)
+            response.success, response.message = False, str(error)
             return response
         steps = first_step(request.duration, self._period) if request.duration else NEVER
         response.step = self._injector.inject(fault, steps)
-        response.accepted = True
+        response.success = True
         until = f" to step {response.step + steps - 1}" if request.duration else " on"
         response.message = f"{fault} from step {response.step}{until}"
         self.get_logger().info(response.message)
@@ -107,9 +105,9 @@ class FaultInjectorNode(BlockNode):
         try:
             response.step = self._injector.clear(request.channel, request.type)
         except ParameterError as error:
-            response.accepted, response.message = False, str(error)
+            response.success, response.message = False, str(error)
             return response
-        response.accepted = True
+        response.success = True
         what = f"no {request.type or 'fault'} of {request.channel or 'any channel'}"
         response.message = f"{what} from step {response.step} on"
         self.get_logger().info(response.message)

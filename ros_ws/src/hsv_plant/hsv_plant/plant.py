@@ -28,8 +28,8 @@ from hsv.bags.description import (
     controller_node,
     peers,
 )
-from hsv.bags.exchange import Head
 from hsv.bags.infrastructure_parameters import PACE_PARAMETERS, STEP_TIMEOUT
+from hsv.bags.messages import StepMessages, stamp_of
 from hsv.base.errors import SignalError
 from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
@@ -39,7 +39,6 @@ from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, s
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time
 from hsv_node.qos import LATCHED, STEP
-from hsv_node.wire import STEP_PLACE, Values, giver, taker
 from hsv_plant.liveness import unresponsive
 
 MAX_AHEAD = 100
@@ -66,8 +65,8 @@ class PlantNode(LockstepNode):
         """Full name of the controller where it is a node that is not of this bench."""
         self._ready: set[str] = set()
         # The measurement first: the other nodes work on it while the rest is published.
-        self._answers = [(giver(topic), self.create_step_publisher(topic)) for topic in PLANT.publishes]
-        self._take_actuator = taker(ACTUATOR)
+        self._answers = [(StepMessages(topic).pack, self.create_step_publisher(topic)) for topic in PLANT.publishes]
+        self._actuator_messages = StepMessages(ACTUATOR)
         self.create_step_subscription(ACTUATOR, self._on_actuator)
         self._readies = self.create_subscription(Ready, READY, self._on_ready, LATCHED)
         self._confirmations = self.create_subscription(RecorderProgress, RECORDER_PROGRESS, self._on_progress, STEP)
@@ -117,18 +116,18 @@ class PlantNode(LockstepNode):
         self._messages += 1
         self._continue()
 
-    def _on_actuator(self, values: Values) -> None:
+    def _on_actuator(self, message: bytes) -> None:
         signals = self._signals
-        step = values[STEP_PLACE]
+        step = self._actuator_messages.step(message)
         if not self._started or step != signals.step:
             self.say_foreign(ACTUATOR, step, signals.step)
             return
         self._messages += 1
         if signals.status is FlightStatus.RUNNING:
             try:
-                self._take_actuator(values, signals)
+                self._actuator_messages.unpack(message, signals)
             except SignalError as error:
-                self._broken_off = self.refuse_signal(error)
+                self._broken_off = self.refuse_message(ACTUATOR, error)
                 return
             if not all(map(math.isfinite, signals.actuator.tolist())):
                 self._refuse_answer(signals)
@@ -158,7 +157,7 @@ class PlantNode(LockstepNode):
     def _advance(self) -> None:
         signals = self._signals
         VEHICLE.step(self.plant, signals)
-        signals.header = Head.at(signals.step, signals.period)
+        signals.stamp = stamp_of(signals.step, signals.period)
 
     def _room(self) -> bool:
         return not self.recorded or self._signals.step < self._recorded_step + MAX_AHEAD
@@ -173,13 +172,13 @@ class PlantNode(LockstepNode):
 
     def _publish(self) -> None:
         signals = self._signals
-        for give, publish in self._answers:
-            publish(give(signals))
+        for pack, publish in self._answers:
+            publish(pack(signals))
         status = FlightStatus(signals.status)
         if self.values["progress"] and (signals.step % 50 == 0 or status is not FlightStatus.RUNNING):
             print(f"step {signals.step} of {self.plant.steps}", flush=True)
-        if self.diagnosis_due(stamp := signals.header.stamp):
-            self.diagnose(stamp, step=signals.step, status=status.name)
+        if self.diagnosis_due(signals):
+            self.diagnose(signals, status=status.name)
 
     def poll(self) -> None:
         """Start when all nodes are ready, keep the pace, and name a node that is silent for too long."""
@@ -216,13 +215,13 @@ class PlantNode(LockstepNode):
         """Say how the run ended, here and to the other nodes."""
         if not self._started:
             return
-        run, where = f"run {short_id(self._run)}", step_in_words(self._signals)
+        run, where = f"run {short_id(self._run)}", step_in_words(self._signals.step, self.plant.period)
         match self._signals.status:
             case FlightStatus.RUNNING:
                 self.get_logger().info(f"{run} broken off at {where}: {self._broken_off or 'an error'}")
             case FlightStatus.FINISHED:
                 self.get_logger().info(f"{run} finished at {where}")
-        self._last_state.publish(giver(STATE)(self._signals))
+        self._last_state.publish(StepMessages(STATE).pack(self._signals))
         self._last_state.wait_for_all_acked(Duration(seconds=LAST_WORDS))
 
     def _try_start(self) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from hsv.bags.description import MEASUREMENT, TUBE_MPC, step_topics
+from hsv.bags.description import TUBE_MPC, step_topics
 from hsv.bags.files import being_recorded
-from hsv.bags.former import FAULT_STATUS
 from hsv.bags.reader import Bag, Loss
 from hsv.bags.steps import complete_stamps, expected_stamps, irregularities
 from hsv.base.errors import RecordingError
@@ -22,19 +21,14 @@ def bag_warnings(bag: Bag) -> list[str]:
         words.append(f"truncated after {bag.span[1] * 1e-9:.2f} s, hsv recover completes it")
     elif bag.loss:
         words.append("hsv recover makes a whole bag of the rest")
-    if missing := [bag.name_of(topic) for topic in _expected(bag) if topic not in bag.roles]:
+    expected = step_topics(bag.custom_data.get("controller", TUBE_MPC.name))
+    if missing := [bag.name_of(topic) for topic in expected if topic not in bag.roles]:
         words.append(f"no topic {', '.join(missing)}")
     try:
         words += irregularities(bag)
     except RecordingError as error:
         words.append(str(error).removeprefix(f"{bag.path}: "))
     return words
-
-
-def _expected(bag: Bag) -> list[str]:
-    """Return the step topics that a bag should hold: which of them depends on its controller, and on its age."""
-    topics = step_topics(bag.custom_data.get("controller", TUBE_MPC.name))
-    return [topic for topic in topics if not (topic == MEASUREMENT and FAULT_STATUS in bag.roles)]
 
 
 def loss_in_words(loss: Loss) -> list[str]:

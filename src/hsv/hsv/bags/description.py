@@ -57,23 +57,32 @@ TOPICS = {
 """Topics with exactly one message a step, in the order in which a step is recorded; which of them there are depends on
 the controller, see :func:`step_topics`."""
 
-CARRIED = {
-    MEASUREMENT: (signals.MEASUREMENT, signals.STATUS),
-    STATE: (signals.STATE, signals.STATUS),
-    FORCES: (signals.FORCES, signals.EFFECTOR, signals.AIR),
-    FILTERED_STATE: (
-        signals.MEASUREMENT,
-        signals.ESTIMATE,
-        signals.FILTERED_PITCH_RATE,
-        signals.FILTER_STATE,
-        signals.STATUS,
-    ),
-    NOMINAL: blocks.NOMINAL_TRAJECTORY.outputs,
-    COMMAND: (signals.COMMAND, signals.SATURATED),
-    TUBE_STATUS: (signals.DIAGNOSTICS,),
-    ACTUATOR: blocks.FAULT_INJECTOR.outputs,
+CARRIED: dict[str, dict[SignalType, str]] = {
+    MEASUREMENT: {signals.MEASUREMENT: "state", signals.STATUS: "status"},
+    STATE: {signals.STATE: "altitude", signals.STATUS: "status"},
+    FORCES: {signals.FORCES: "lift", signals.EFFECTOR: "effector", signals.AIR: "wind_forward"},
+    FILTERED_STATE: {
+        signals.MEASUREMENT: "state",
+        signals.ESTIMATE: "estimate",
+        signals.FILTERED_PITCH_RATE: "filtered_pitch_rate",
+        signals.FILTER_STATE: "filter_state",
+        signals.STATUS: "status",
+    },
+    NOMINAL: {
+        signals.REFERENCE: "reference",
+        signals.REFERENCE_INPUT: "reference_input",
+        signals.DEVIATION: "deviation",
+        signals.NOMINAL_INPUT: "input",
+        signals.GAIN: "gain",
+        signals.GAIN_INDEX: "gain_index",
+        signals.NOMINAL_STATUS: "status",
+    },
+    COMMAND: {signals.COMMAND: "fuel_equivalence_ratio", signals.SATURATED: "saturated"},
+    TUBE_STATUS: {signals.DIAGNOSTICS: "level"},
+    ACTUATOR: {signals.ACTUATOR: "fuel_equivalence_ratio", signals.ACTIVE_FAULTS: "active"},
 }
-"""The signals of the loop that the messages of a topic carry, passed on or from the block that publishes them."""
+"""The signals of the loop in the messages of a topic, and the field in which each one begins: the message within the
+message, the sequence, or the first of the consecutive numbers."""
 
 TOPIC_OF = {signal.name: topic for topic, carried in CARRIED.items() for signal in carried}
 """The topic that carries a signal, by its name; of one that is passed on, the last."""
@@ -99,6 +108,9 @@ Those with a leading slash are ROS's own: every node of a domain has them under 
 LAST_STATE = "hsv/last_state"
 """Topic on which the plant says, latched, with which state a run ended: finished, diverged, or running where it was
 broken off. One message a run, and not recorded: the bag holds the state itself."""
+
+INTERFACE_VERSION = 3
+"""Version of the messages and services, as ``hsv_msgs/msg/Run`` states it."""
 
 EXIT_DIVERGED = 3
 """Exit code of the plant after a flight that left the range of the model."""
@@ -156,7 +168,7 @@ RECORDER = NodeDescription(
 
 
 def _publisher(topic: str) -> Block:
-    """Return the last block of the loop that gives something of what a topic carries; the rest is passed on."""
+    """Return the last block of the loop that makes a signal of a topic; the other signals are passed on."""
     return next(block for block in reversed(LOOP) if set(block.outputs) & set(CARRIED[topic]))
 
 

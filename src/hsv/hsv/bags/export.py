@@ -33,8 +33,8 @@ def export(bag: Bag, topics: Iterable[str], form: Format, target: Path) -> list[
     """Write ``topics``, by name or role; return the files written.
 
     CSV and Parquet: a folder ``target`` with a file per topic, ``/hsv/state`` as ``hsv_state.csv``; a column a number,
-    ``elastic_rate[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
-    per field, ``hsv_state.elastic_rate [kg^0.5 m/s]``.
+    ``filter_state[0] [kg^0.5 m/s]``, texts and lists of messages as they stand or as JSON. npz: one file with an array
+    per field, ``hsv_state.elastic_rate_1 [kg^0.5 m/s]``.
 
     Raises:
         RecordingError: A topic is missing, or the target exists or cannot be written.

@@ -8,13 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE
-from hsv.bags.former import fault_topic, saturation_topic
 from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.metrics import FlightData
-
-_RIGID = ("altitude", "velocity", "angle_of_attack", "pitch_angle", "pitch_rate")
+from hsv.model.dynamics import STATE_NAMES
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:
@@ -36,9 +34,7 @@ def labels(bags: Sequence[Bag]) -> list[str]:
 
 def state_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
     """Return x (n, 9) from the columns of a message with the fields of LongitudinalState."""
-    coordinate, rate = columns[f"{prefix}elastic_coordinate"], columns[f"{prefix}elastic_rate"]
-    rigid = [columns[f"{prefix}{name}"] for name in _RIGID]
-    return np.column_stack((*rigid, coordinate[:, 0], rate[:, 0], coordinate[:, 1], rate[:, 1]))
+    return np.column_stack([columns[f"{prefix}{name}"] for name in STATE_NAMES])
 
 
 def input_columns(columns: dict[str, np.ndarray], prefix: str = "") -> np.ndarray:
@@ -52,10 +48,9 @@ def flight_data(bag: Bag) -> FlightData:
     Raises:
         RecordingError: A topic is missing, or no step is complete.
     """
-    limited = saturation_topic(bag)
-    rows = joined(bag, tuple(dict.fromkeys((STATE, NOMINAL, COMMAND, limited))))
+    rows = joined(bag, (STATE, NOMINAL, COMMAND))
     state, nominal, command = rows[STATE], rows[NOMINAL], rows[COMMAND]
-    status = bag.columns(fault_topic(bag))
+    status = bag.columns(ACTUATOR)
     acting = np.flatnonzero([len(faults) > 0 for faults in status["active"]])
     u = input_columns(command)
     return FlightData(
@@ -64,7 +59,7 @@ def flight_data(bag: Bag) -> FlightData:
         reference=state_columns(nominal, "reference."),
         deviation=state_columns(nominal, "deviation."),
         command=u,
-        unlimited=np.where(rows[limited]["saturated"], np.nan, u),
+        unlimited=np.where(command["saturated"], np.nan, u),
         gain_index=nominal["gain_index"],
         fault_start=float(status["header.stamp"][acting[0]]) * 1e-9 if len(acting) else None,
     )

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsv.bags.bag_warnings import bag_warnings
-from hsv.bags.description import ACTUATOR, STATE, TUBE_MPC, TUBE_STATUS
+from hsv.bags.description import ACTUATOR, COMMAND, STATE, TUBE_MPC, TUBE_STATUS
 from hsv.bags.equipment import effectors, equipment_topics, held, measurement_errors, moving_air
 from hsv.bags.flight import flight_fingerprint, input_columns
-from hsv.bags.former import fault_parameters, fault_topic, saturation_topic
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.steps import complete_stamps, cut_off, joined
@@ -42,7 +41,7 @@ def describe(bag: Bag) -> dict[str, Any]:
     start, end = bag.span
     fingerprint = _fingerprint(bag)
     topics = [_topic(bag, name) for name in sorted(bag.topics)]
-    faults = _faults(bag) if fault_topic(bag) in bag.roles else None
+    faults = _faults(bag) if ACTUATOR in bag.roles else None
     return {
         "path": str(bag.path),
         "folder": str(bag.folder),
@@ -62,7 +61,7 @@ def describe(bag: Bag) -> dict[str, Any]:
         "ending": ending(bag) if STATE in bag.roles else None,
         "faults": faults,
         "equipment": _equipment(bag) if STATE in bag.roles else None,
-        "saturation": _saturation(bag) if saturation_topic(bag) in bag.roles else None,
+        "saturation": _saturation(bag) if COMMAND in bag.roles else None,
         "tube": _tube(bag) if TUBE_STATUS in bag.roles else None,
         "not_covered": _not_covered(bag, faults) if TUBE_STATUS in bag.roles else None,
     }
@@ -103,9 +102,14 @@ def ending(bag: Bag) -> str:
     return endings.get(int(status[-1]), "broken off") if len(status) else "broken off"
 
 
+def _described(fault: dict[str, Any]) -> tuple[Any, ...]:
+    parameters = zip(fault["parameter_names"], map(float, fault["parameter_values"]), strict=False)
+    return fault["channel"], fault["type"], *parameters
+
+
 def _faults(bag: Bag) -> list[dict[str, Any]]:
-    columns = bag.columns(fault_topic(bag))
-    active = [[(f["channel"], f["type"], *fault_parameters(f).items()) for f in faults] for faults in columns["active"]]
+    columns = bag.columns(ACTUATOR)
+    active = [[_described(fault) for fault in faults] for faults in columns["active"]]
     intervals = []
     for key in sorted({fault for faults in active for fault in faults}):
         channel, kind, *parameters = key
@@ -169,7 +173,7 @@ def _not_covered(bag: Bag, faults: list[dict[str, Any]] | None) -> list[str] | N
 
 
 def _saturation(bag: Bag) -> dict[str, Any]:
-    saturated = bag.columns(saturation_topic(bag))["saturated"]
+    saturated = bag.columns(COMMAND)["saturated"]
     return {
         "steps": int(saturated.any(axis=1).sum()),
         "fuel_equivalence_ratio_steps": int(saturated[:, 0].sum()),

@@ -16,7 +16,7 @@ from rosbags.interfaces.typing import ConstValue
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Columns
-from hsv.bags.description import ROOT, TOPICS, resolved
+from hsv.bags.description import INTERFACE_VERSION, ROOT, RUN, TOPICS, resolved
 from hsv.bags.files import find_files, read_file, read_message
 from hsv.bags.metadata import (
     CUSTOM_DATA,
@@ -28,7 +28,7 @@ from hsv.bags.metadata import (
     parsed,
     read_metadata,
 )
-from hsv.bags.roles import KINDS, namespace_of, roles
+from hsv.bags.roles import TYPES, namespace_of, roles
 from hsv.bags.scan import MESSAGE_HEADER, Damage, Scan, content
 from hsv.bags.topic import Qos
 from hsv.bags.track import Track
@@ -37,7 +37,7 @@ from hsv.base.errors import RecordingError
 
 _OURS = "/hsv/"
 """Common prefix of this project's topics, unless they are remapped."""
-_USUAL = {resolved(role): kinds for role, kinds in KINDS.items()}
+_USUAL = {resolved(role): kind for role, kind in TYPES.items()}
 """Types of the topics of a graph by the names that they have unless they are moved or remapped."""
 _STAMP_START, _STAMP_END = 4, 12
 """Range of bytes of the stamp in the messages of a step: seconds and nanoseconds, four bytes each."""
@@ -377,8 +377,8 @@ class Bag:
             return
         if schema is None or not decodable:
             raise RecordingError(f"{self.path}: topic {name}: expected a ROS 2 message in CDR")
-        if schema.name not in (expected := _USUAL.get(name, (schema.name,))):
-            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected[0]}")
+        if schema.name != (expected := _USUAL.get(name, schema.name)):
+            raise RecordingError(f"{self.path}: topic {name} is {schema.name}, expected {expected}")
         first = self._topics.setdefault(name, _Recorded(channel, schema)).schema
         if (schema.name, schema.data) != (first.name, first.data):
             raise RecordingError(f"{self.path}: topic {name}: recorded with two definitions, expected one")
@@ -389,6 +389,11 @@ class Bag:
             raise RecordingError(f"{file}: is damaged, and nothing of it can be read ({damage})")
         if not self._topics and not self.complete:
             raise RecordingError(f"{self.path}: is truncated before its first messages")
+        if RUN in self.roles and (found := self.constants(RUN).get("INTERFACE_VERSION", 1)) != INTERFACE_VERSION:
+            raise RecordingError(
+                f"{self.path}: interface version {found}, recorded by commit "
+                f"{self.custom_data.get('commit', 'unknown')}: expected version {INTERFACE_VERSION}"
+            )
         if not any(_OURS in topic for topic in (*self._topics, *map(resolved, self.roles))):
             raise RecordingError(f"{self.path}: has no topic below {_OURS}, expected a bag of this project")
 

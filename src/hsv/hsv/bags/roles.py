@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping
 
 from hsv.bags.description import OTHER_TOPICS, ROOT, STATE, TOPICS, resolved
-from hsv.bags.former import FORMER_TYPES
 from hsv.base.documents import parse_json
 from hsv.base.errors import DocumentError, RecordingError
 
@@ -14,10 +13,9 @@ NAMESPACE_KEY, REMAPPED_KEY = "namespace", "remapped"
 """Under which a bag says it in its custom data: the namespace of the graph and, as JSON, by role, the names of topics
 that have not their usual ones there. A graph that was not moved has neither."""
 
-KINDS = {role: (kind,) for role, kind in (TOPICS | OTHER_TOPICS).items()}
-KINDS |= {role: (*KINDS.get(role, ()), former) for role, former in FORMER_TYPES.items()}
-"""Types that the topic of a role may have, today's first."""
-_OURS = [role for role in KINDS if role.startswith("hsv/")]
+TYPES = TOPICS | OTHER_TOPICS
+"""Type of the topic of each role."""
+_OURS = [role for role in TYPES if role.startswith("hsv/")]
 
 
 def naming(names: Mapping[str, str], namespace: str) -> dict[str, str]:
@@ -44,20 +42,19 @@ def roles(topics: Mapping[str, str], custom_data: Mapping[str, str], source: str
     remapped = _remapped(custom_data)
     found = {role: name for role, name in remapped.items() if name in topics}
     namespace = custom_data.get(NAMESPACE_KEY) or _namespace(topics, source)
-    for role in KINDS:
+    for role in TYPES:
         if role not in remapped and (name := resolved(role, namespace)) in topics and name not in found.values():
             found[role] = name
     for role, name in found.items():
-        if topics[name] not in KINDS[role]:
-            raise RecordingError(f"{source}: topic {name} is {topics[name]}, expected {KINDS[role][0]}")
-    # What is left over is told by its type only in what is a graph without doubt.
+        if topics[name] != TYPES[role]:
+            raise RecordingError(f"{source}: topic {name} is {topics[name]}, expected {TYPES[role]}")
+    # A remapped topic is known by its type alone, if most of the graph's topics were found by their names.
     for role in _OURS if 2 * sum(role in found for role in TOPICS) > len(TOPICS) else ():
-        alike = [name for name, kind in topics.items() if kind in KINDS[role] and name not in found.values()]
-        wanting = [other for other in _OURS if {*KINDS[other]} & {*KINDS[role]} and other not in found]
-        if wanting == [role] and len(alike) == 1:
+        alike = [name for name, kind in topics.items() if kind == TYPES[role] and name not in found.values()]
+        if role not in found and len(alike) == 1:
             found[role] = alike[0]
     # In the order of the graph, whatever the order in the bag.
-    return {role: found[role] for role in KINDS if role in found}
+    return {role: found[role] for role in TYPES if role in found}
 
 
 def namespace_of(names: Mapping[str, str]) -> str:
@@ -76,7 +73,7 @@ def _remapped(custom_data: Mapping[str, str]) -> dict[str, str]:
     except DocumentError:
         return {}
     known = values.items() if isinstance(values, dict) else ()
-    return {role: name for role, name in known if role in KINDS and isinstance(name, str)}
+    return {role: name for role, name in known if role in TYPES and isinstance(name, str)}
 
 
 def _namespace(topics: Mapping[str, str], source: str) -> str:
@@ -88,7 +85,7 @@ def _namespace(topics: Mapping[str, str], source: str) -> str:
     spaces: dict[str, set[str]] = {}
     for role in _OURS:
         for name, kind in topics.items():
-            if name.endswith(f"/{role}") and (kind in KINDS[role] or name == resolved(role)):
+            if name.endswith(f"/{role}") and (kind == TYPES[role] or name == resolved(role)):
                 spaces.setdefault(name.removesuffix(f"/{role}") or ROOT, set()).add(role)
     # A graph has a plant; a single node of another one, recorded with it, is no second graph.
     spaces = {space: there for space, there in spaces.items() if STATE in there} or spaces

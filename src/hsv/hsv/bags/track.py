@@ -12,15 +12,16 @@ from rosbags.typesys.store import Typestore
 
 from hsv.bags.columns import Columns, NoCommonLayoutError, columns_at_once, columns_one_by_one
 from hsv.bags.description import TOPIC_OF
+from hsv.bags.messages import MessageError
 from hsv.base.errors import RecordingError, SignalError
 
 
 @contextmanager
 def expecting_fields(source: object) -> Iterator[None]:
-    """Convert a field that the definition of a message does not have, or that no block can take, into a clear error.
+    """Convert the error of a message whose definition lacks a field, or that no block can take.
 
     Raises:
-        RecordingError: It names ``source``, the message's type or the topic, and the field.
+        RecordingError: It names ``source``, the type or the topic of the message, and the field.
     """
     try:
         yield
@@ -32,6 +33,8 @@ def expecting_fields(source: object) -> Iterator[None]:
         ) from None
     except SignalError as error:
         raise RecordingError(f"{source}: topic {TOPIC_OF[error.signal]}: {error}") from error
+    except MessageError as error:
+        raise RecordingError(f"{source}: {error}") from error
 
 
 @dataclass(frozen=True)

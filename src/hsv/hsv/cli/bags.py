@@ -41,7 +41,6 @@ def replay(
     Example: hsv replay bags/case1_20260101T000000Z --parameters offline_design/baseline.yaml
     """
     from hsv.bags.description import CONTROLLER, controller_node
-    from hsv.bags.former import require_interface_version
     from hsv.bags.reader import Bag
     from hsv.bags.replay import engine
     from hsv.bags.replay.attached import controller_of, estimated, flown_parameters, refuse_vacuous, supply
@@ -49,7 +48,6 @@ def replay(
     from hsv.flight.trust import require_trust
 
     opened = Bag(bag)
-    require_interface_version(opened)
     supply(opened, design, scenario)
     refuse_vacuous(opened)
     values = flown_parameters(opened, parameters)

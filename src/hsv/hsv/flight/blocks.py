@@ -35,15 +35,15 @@ if TYPE_CHECKING:  # a node imports its own component alone
 class Signals:
     """Signals between the blocks in a step, SI units and radians; each block writes its outputs.
 
-    The attributes beside step, period and header are the signals of :mod:`hsv.model.signals`, by name.
+    The attributes other than step, period and stamp are the signals of :mod:`hsv.model.signals`, by name.
     """
 
     step = -1
     """k; -1 before the vehicle has said where it starts"""
     period: float
     """T, s"""
-    header: Any = None
-    """Header of the messages that carried the signals, if any."""
+    stamp: tuple[int, int] = (0, 0)
+    """Seconds and nanoseconds of simulated time in the messages of the step, if there are any"""
 
     state: np.ndarray
     """x (9), the truth"""

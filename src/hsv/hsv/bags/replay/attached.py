@@ -23,9 +23,9 @@ from hsv.bags.description import (
     TUBE_MPC,
     TUBE_STATUS,
 )
-from hsv.bags.exchange import active_faults
 from hsv.bags.flight import input_columns
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
+from hsv.bags.messages import StepMessages
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
@@ -40,6 +40,7 @@ from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
 from hsv.control.reference_trajectory import COLUMNS
 from hsv.control.tube_factor import TAU, change_parameters, rigid_factors, scheduled_changes
 from hsv.flight.assembly import blamed_on
+from hsv.flight.blocks import Signals
 from hsv.flight.scenario import parse_scenario, scenario_text
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.vehicle import vehicle_label
@@ -182,9 +183,11 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
     injector = FaultInjector.from_parameters(values)
     command = np.zeros(2)
     changed = False
-    for _, status in bag.decode(ACTUATOR):
-        recorded = active_faults(status)
-        planned = injector.acting(status.step)
+    messages, signals = StepMessages(ACTUATOR, bag.types), Signals()
+    for data in bag.track(ACTUATOR).data:
+        messages.unpack(data, signals)
+        recorded = signals.active_faults
+        planned = injector.acting(signals.step)
         if planned != recorded:
             changed = True
             for fault, _ in set(planned) - set(recorded):
@@ -192,7 +195,7 @@ def _faults_as_flown(bag: Bag, values: dict[str, Any]) -> dict[str, Any]:
             for fault, since in recorded:
                 if (fault, since) not in planned:
                     injector.inject(fault)
-        injector.step(status.step, command)
+        injector.step(signals.step, command)
     return injector.parameters() if changed else {}
 
 
@@ -209,10 +212,6 @@ def _tau_as_flown(bag: Bag, sections: ParameterSections) -> dict[str, Any]:
     if controller_of(sections) != TUBE_MPC.name:
         return {}
     recorded_status = [status for _, status in bag.decode(TUBE_STATUS)]
-    if recorded_status and not np.shape(recorded_status[0].tau):
-        raise RecordingError(
-            f"{bag.path}: topic {bag.name_of(TUBE_STATUS)}: recorded with another definition, one number for tau"
-        )
     values = sections.of(TUBE_MPC.name)
     design = ControlDesign.from_parameters(values)
     schedule = [(0, design.tau), *scheduled_changes(values, design.tau_minimum, design.period)]

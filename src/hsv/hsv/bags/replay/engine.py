@@ -1,19 +1,15 @@
-"""Feeding processes with messages in lockstep and comparing what they make of them with what was recorded."""
+"""Feed processes with recorded messages in lockstep and compare their answers with the recorded ones."""
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import chain
-from typing import Any
 
-from rosbags.serde import SerdeError
 from rosbags.typesys.store import Typestore
 
 from hsv.bags.compare import Comparison, compare
-from hsv.bags.description import CLOCK, COMMAND, PLANT, STATE, TOPICS, WIRE_ALIGNMENT, step_topics
-from hsv.bags.fields import blank, nanoseconds
+from hsv.bags.description import COMMAND, FAULT_INJECTOR, STATE, TOPICS, step_topics
+from hsv.bags.messages import StepMessages, stamp_in, stamp_of
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import broken_off, complete_steps, estimated
@@ -21,6 +17,7 @@ from hsv.bags.replay.processes import Process, processes_of
 from hsv.bags.track import Track, expecting_fields
 from hsv.base.errors import RecordingError
 from hsv.base.progress import Progress
+from hsv.flight.blocks import Signals
 
 PROGRESS_INTERVAL = 200
 
@@ -43,34 +40,36 @@ class ProcessComparison:
         return all(topic.identical for topic in self.topics)
 
 
-class _Outputs:
-    """Output messages of a process, refilled at every step and stored as bytes."""
+class _Replica:
+    """A process under test in this program: its component, and its messages as bytes."""
 
-    def __init__(self, types: Typestore, topics: Mapping[str, str], source: str) -> None:
-        self._source = source
-        self._types = types
-        self._kinds = topics
-        self.messages = {topic: blank(types, kind) for topic, kind in topics.items()}
-        self._fields = {topic: set(vars(message)) for topic, message in self.messages.items()}
-        self.tracks = {topic: Track(topic, kind, types, [], [], "replay") for topic, kind in topics.items()}
+    def __init__(self, process: Process, values: ParameterSections, types: Typestore) -> None:
+        self.process = process
+        self.component = process.block.build(values.of(process.node.name))
+        self._inputs = {topic: StepMessages(topic, types) for topic in process.inputs}
+        self._outputs = {topic: StepMessages(topic, types) for topic in process.outputs}
+        self.tracks = {topic: Track(topic, TOPICS[topic], types, [], [], "replay") for topic in process.outputs}
 
-    def keep(self) -> None:
-        """Serialize the current messages."""
-        for topic, message in self.messages.items():
-            if vars(message).keys() != self._fields[topic]:
-                new = ", ".join(sorted(vars(message).keys() - self._fields[topic]))
-                raise RecordingError(
-                    f"{self._source}: topic {topic}: recorded with another definition, expected a field {new}"
-                )
-            try:
-                data = bytes(self._types.serialize_cdr(message, self._kinds[topic]))
-            except (struct.error, TypeError, ValueError, SerdeError) as error:
-                raise RecordingError(
-                    f"{self._source}: topic {topic}: recorded with another definition, {error}"
-                ) from None
-            track = self.tracks[topic]
-            track.data.append(data + bytes(-len(data) % WIRE_ALIGNMENT))
-            track.times.append(nanoseconds(message.clock if topic == CLOCK else message.header.stamp))
+    def step(self, inputs: Mapping[str, bytes]) -> dict[str, bytes]:
+        """Step the component, and return and keep its output messages by topic.
+
+        Args:
+            inputs: Input messages by topic, without those of a step before the first; none for the first state.
+
+        Raises:
+            RunError: A message cannot be used.
+        """
+        signals = Signals()
+        for topic, message in inputs.items():
+            self._inputs[topic].unpack(message, signals)
+        self.process.block.step(self.component, signals)
+        if self.process.restarts:
+            signals.stamp = stamp_of(signals.step, signals.period)
+        made = {topic: messages.pack(signals) for topic, messages in self._outputs.items()}
+        for topic, message in made.items():
+            self.tracks[topic].data.append(message)
+            self.tracks[topic].times.append(stamp_in(message))
+        return made
 
 
 def replay(bag: Bag, process: Process, values: ParameterSections, progress: Progress) -> ProcessComparison:
@@ -79,38 +78,28 @@ def replay(bag: Bag, process: Process, values: ParameterSections, progress: Prog
     Args:
         bag: The recorded run.
         process: The process under test.
-        values: Parameters of the nodes; the component under test takes those of its own.
-        progress: Told how far it is.
+        values: Parameters of the nodes; the component under test takes its own.
+        progress: Called with the progress.
 
     Raises:
         RecordingError: A topic is missing or recorded with another definition.
         ParameterError, DesignError: The component refuses its parameters.
     """
     require(bag, process.outputs)
-    component = process.block.build(values.of(process.node.name))
-    outputs = _Outputs(bag.types, {topic: TOPICS[topic] for topic in process.outputs}, str(bag.path))
-    recorded = [bag.track(topic) for topic in process.inputs]
+    replica = _Replica(process, values, bag.types)
+    recorded = {topic: bag.track(topic).data for topic in process.inputs}
     steps = complete_steps(bag) if broken_off(bag) else complete_steps(bag, process.inputs)
-
-    def step(inputs: tuple[Any, ...]) -> None:
-        process.step(component, inputs, outputs.messages)
-        outputs.keep()
-
-    if process.restarts:
-        step(())
-        steps -= 1
-    delayed = [topic in process.delayed for topic in process.inputs]
-    columns = (
-        chain([(0, None)] * late, t.cut(steps - late).decode()) for t, late in zip(recorded, delayed, strict=True)
-    )
-    messages = zip(*columns, strict=True)
     with expecting_fields(bag.path):
-        for number, inputs in enumerate(messages):
+        if process.restarts:
+            replica.step({})
+            steps -= 1
+        for number in range(steps):
             if number % PROGRESS_INTERVAL == 0:
                 progress(process.node.name, number, steps)
-            step(tuple(message for _, message in inputs))
+            rows = {topic: number - (topic in process.delayed) for topic in process.inputs}
+            replica.step({topic: recorded[topic][row] for topic, row in rows.items() if row >= 0})
     progress(process.node.name, steps, steps)
-    return compare_process(bag, process, outputs.tracks)
+    return compare_process(bag, process, replica.tracks)
 
 
 def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progress) -> list[ProcessComparison]:
@@ -120,16 +109,17 @@ def rerun(bag: Bag, controller: str, values: ParameterSections, progress: Progre
         bag: The recorded run.
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
-        progress: Told how far it is.
+        progress: Called with the progress.
 
     Raises:
         As :func:`replay`.
     """
     require(bag, step_topics(controller))
+    processes = processes_of(controller, estimated(values))
+    known = any(COMMAND in process.outputs for process in processes.values())
     with expecting_fields(bag.path):
-        commands = None if COMMAND in _published(controller) else bag.decode(COMMAND)
-        tracks = fly(bag.types, controller, values, progress, str(bag.path), commands)
-    return [compare_process(bag, process, tracks) for process in processes_of(controller, estimated(values)).values()]
+        tracks = fly(bag.types, controller, values, progress, None if known else bag.track(COMMAND))
+    return [compare_process(bag, process, tracks) for process in processes.values()]
 
 
 def fly(
@@ -137,8 +127,7 @@ def fly(
     controller: str,
     values: ParameterSections,
     progress: Progress,
-    source: str = "types",
-    commands: Iterator[tuple[int, Any]] | None = None,
+    commands: Track | None = None,
 ) -> dict[str, Track]:
     """Fly the loop in this process, message by message as the graph does, and return every step topic.
 
@@ -146,49 +135,34 @@ def fly(
         types: Definitions of the messages.
         controller: Name of the controller that closes the loop.
         values: Parameters of the nodes.
-        progress: Told how far it is.
-        source: Source of ``types``, for error messages.
-        commands: Recorded ones, with their times, of a controller that is a node of its own and not here.
+        progress: Called with the progress.
+        commands: Recorded commands of a controller that is an external node.
 
     Raises:
-        RecordingError: ``types`` lack a field, or commands are missing.
+        RunError: ``types`` lack a field.
+        RecordingError: There are fewer ``commands`` than steps.
     """
-    flown = processes_of(controller, estimated(values))
-    components = {name: process.block.build(values.of(name)) for name, process in flown.items()}
-    made = {
-        name: _Outputs(types, {topic: TOPICS[topic] for topic in process.outputs}, source)
-        for name, process in flown.items()
-    }
-    latest: dict[str, Any] = {}
-    for outputs in made.values():
-        latest |= outputs.messages
-    last = components[PLANT.name].steps
-    first = True
-    while first or latest[STATE].status == 0:
-        for name, process in flown.items():
-            delayed = process.delayed
-            if commands is not None and COMMAND in process.inputs and COMMAND not in delayed:
-                latest[COMMAND] = _next(commands, source)
-            given = () if process.restarts and first else process.inputs
-            inputs = tuple(None if first and topic in delayed else latest[topic] for topic in given)
-            outputs = made[name]
-            process.step(components[name], inputs, outputs.messages)
-            outputs.keep()
-        first = False
-        if latest[STATE].step % PROGRESS_INTERVAL == 0:
-            progress("rerun", latest[STATE].step, last)
-    progress("rerun", last, last)
-    return {topic: track for outputs in made.values() for topic, track in outputs.tracks.items()}
-
-
-def _published(controller: str) -> set[str]:
-    return {topic for process in processes_of(controller).values() for topic in process.outputs}
-
-
-def _next(commands: Iterator[tuple[int, Any]], source: str) -> Any:
-    for _, message in commands:
-        return message
-    raise RecordingError(f"{source}: fewer commands than the flight has steps, and their controller is not here")
+    replicas = [_Replica(process, values, types) for process in processes_of(controller, estimated(values)).values()]
+    plant = next(replica for replica in replicas if replica.process.restarts)
+    signals, state = Signals(), StepMessages(STATE, types)
+    latest: dict[str, bytes] = {}
+    for step in range(plant.component.steps + 1):
+        for replica in replicas:
+            if replica.process.node is FAULT_INJECTOR and commands is not None:
+                if step >= len(commands.data):
+                    raise RecordingError(
+                        f"{commands.source}: fewer commands than the flight has steps, and their controller is not here"
+                    )
+                latest[COMMAND] = commands.data[step]
+            inputs = () if step == 0 and replica is plant else replica.process.inputs
+            latest |= replica.step({topic: latest[topic] for topic in inputs if topic in latest})
+        state.unpack(latest[STATE], signals)
+        if step % PROGRESS_INTERVAL == 0:
+            progress("rerun", step, plant.component.steps)
+        if signals.status:
+            break
+    progress("rerun", plant.component.steps, plant.component.steps)
+    return {topic: track for replica in replicas for topic, track in replica.tracks.items()}
 
 
 def require(bag: Bag, topics: Iterable[str]) -> None:

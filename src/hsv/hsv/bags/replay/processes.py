@@ -1,14 +1,11 @@
-"""The processes that a bag can repeat: how each steps its messages, and how equal is equal."""
+"""The processes that a replay can repeat, with the tolerance of each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from hsv.bags.description import STATE, NodeDescription, graph
-from hsv.bags.exchange import Head, Message, filler, reader
-from hsv.flight.blocks import LOOP, VEHICLE, Block, Signals
+from hsv.flight.blocks import LOOP, VEHICLE, Block
 
 _TOLERANCES = {
     "plant": (
@@ -26,10 +23,10 @@ _TOLERANCES = {
     ),
     "tube_mpc": (1e-10, "the level in the set is a quadratic form whose terms of both signs nearly cancel"),
     "robust_mpc": (1e-12, "one matrix product without memory"),
-    "controller": (1e-10, "a controller of one's own may call libraries that round as their processor does"),
+    "controller": (1e-10, "a custom controller may call libraries that round as their processor does"),
     "fault_injector": (0.0, "one multiplication, the same on every processor"),
 }
-"""Absolute and relative at once, at most 1e-10, by node; and why that much."""
+"""Tolerance of every node, absolute and relative at once, and its reason."""
 
 
 @dataclass(frozen=True)
@@ -41,17 +38,17 @@ class Process:
 
     @property
     def tolerance(self) -> float:
-        """Within which numbers count as equal, absolute and relative at once."""
+        """Tolerance within which numbers count as equal, absolute and relative at once."""
         return _TOLERANCES[self.node.name][0]
 
     @property
     def reason(self) -> str:
-        """Why that much."""
+        """The reason for the tolerance."""
         return _TOLERANCES[self.node.name][1]
 
     @property
     def restarts(self) -> bool:
-        """Whether it owns time: a step starts from recorded state and input of the previous one; the first has none."""
+        """Whether it is the plant: every step starts from the recorded state and input of the previous one."""
         return self.block is VEHICLE
 
     @property
@@ -69,27 +66,11 @@ class Process:
         """Topics that one step gives."""
         return self.node.publishes
 
-    def step(self, component: Any, inputs: Sequence[Message | None], outputs: Mapping[str, Message]) -> None:
-        """Step ``component`` from its input messages, none for the first step of the owner of time, to its ``outputs``.
-
-        None stands for one of the step before the first. Outputs are by topic, and filled in place.
-        """
-        signals = Signals()
-        if inputs:
-            for topic, message in zip(self.inputs, inputs, strict=True):
-                if message is not None:
-                    reader(topic)(message, signals)
-        self.block.step(component, signals)
-        if self.restarts:
-            signals.header = Head.at(signals.step, signals.period)
-        for topic, message in outputs.items():
-            filler(topic)(signals, message)
-
 
 def processes_of(controller: str, estimator: bool = False) -> dict[str, Process]:
     """Return the processes of a graph with ``controller``, by node, in the order in which a step passes through them.
 
-    A controller that is a foreign node is none of them: nobody here can repeat what it did.
+    A controller that is an external node is not among them, because it cannot be repeated here.
     """
     nodes = graph(controller, estimator)
     found = [Process(node, node.block) for node in nodes if node.block is not None and not node.foreign]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from hsv.bags.description import ACTUATOR, NOMINAL, STATE, TUBE_STATUS
-from hsv.bags.exchange import fault_in
+from hsv.bags.messages import fault_in
 from hsv.model.plant import FlightStatus
 from hsv.pages.live.columns import columns, row
 

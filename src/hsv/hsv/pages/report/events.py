@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup, escape
 
-from hsv.bags.description import DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
-from hsv.bags.former import saturation_topic
+from hsv.bags.description import COMMAND, DIAGNOSTICS, PARAMETER_EVENTS, ROSOUT, STATE
 from hsv.bags.info import parameters_in_words
 from hsv.bags.reader import Bag
 from hsv.bags.track import expecting_fields
@@ -90,9 +89,9 @@ def _uncertified(description: dict[str, Any]) -> Iterator[Event]:
 
 
 def _saturation(bag: Bag) -> Iterator[Event]:
-    if (topic := saturation_topic(bag)) not in bag.roles:
+    if COMMAND not in bag.roles:
         return
-    columns = bag.columns(topic)
+    columns = bag.columns(COMMAND)
     time, saturated = columns["header.stamp"] * 1e-9, columns["saturated"]
     for column, name in enumerate(INPUTS):
         edges = np.flatnonzero(np.diff(np.concatenate(([False], saturated[:, column], [False])).astype(np.int8)))

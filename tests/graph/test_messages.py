@@ -1,10 +1,8 @@
-"""Signals to messages and back, in the nodes and in the replay: what rclpy reads and writes, whatever they hold."""
+"""Signals to messages and back: the same numbers and bytes as those of rclpy, whatever the messages hold."""
 
 from __future__ import annotations
 
 import random
-import struct
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,25 +11,25 @@ from builtin_interfaces.msg import Time
 from flown_bags import types
 from hsv_msgs import msg
 from rclpy.serialization import serialize_message
+from rosbags.serde import SerdeError
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Header
 
 from hsv.bags import description
-from hsv.bags.description import TOPICS, WIRE_ALIGNMENT
-from hsv.bags.exchange import Head, filler, reader
-from hsv.bags.fields import blank
-from hsv.base.errors import RunError, SignalError
+from hsv.bags.description import INTERFACE_VERSION, TOPICS, WIRE_ALIGNMENT
+from hsv.bags.messages import FRAME, MessageError, StepMessages, Structure, stamp_in, stamp_of
+from hsv.base.errors import SignalError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
 from hsv.flight.blocks import Signals
+from hsv.model.dynamics import STATE_NAMES
 from hsv.model.faults.schedule import ActiveFault
 from hsv.model.faults.table import Fault
 from hsv.model.plant import FlightStatus
-from hsv_node.codec import codec
-from hsv_node.messages import type_name
-from hsv_node.wire import giver, taker
 
 PERIOD = 0.02
+
+STORE = types()
 
 LOSS = ActiveFault(Fault.of("elevator_deflection", "loss_of_effectiveness", {"effectiveness": 0.9}), 12)
 REVERSAL = ActiveFault(Fault.of("fuel_equivalence_ratio", "reversal", {"about_start": 1.0}), 3)
@@ -43,6 +41,7 @@ def signals_of(seed: int, *, sizes: tuple[int, int, int], active: tuple[ActiveFa
     filter_size, gain_rows, tube_size = sizes
     signals = Signals()
     signals.step, signals.period = int(draw.integers(10_000)), PERIOD
+    signals.stamp = stamp_of(signals.step, PERIOD)
     for name in ("state", "measurement", "reference", "deviation"):
         setattr(signals, name, draw.normal(size=9))
     for name in ("effector", "reference_input", "nominal_input", "command", "actuator"):
@@ -83,22 +82,13 @@ CASES = [
 ]
 
 
-def head(step: int) -> Header:
+def header(step: int, frame: str = FRAME) -> Header:
     sec, nanosec = divmod(round(step * PERIOD * 1e9), 10**9)
-    return Header(stamp=Time(sec=sec, nanosec=nanosec), frame_id="body")
+    return Header(stamp=Time(sec=sec, nanosec=nanosec), frame_id=frame)
 
 
-def longitudinal(x: np.ndarray) -> dict[str, Any]:
-    h, V, alpha, theta, q, coordinate_1, rate_1, coordinate_2, rate_2 = map(float, x)
-    return {
-        "altitude": h,
-        "velocity": V,
-        "angle_of_attack": alpha,
-        "pitch_angle": theta,
-        "pitch_rate": q,
-        "elastic_coordinate": [coordinate_1, coordinate_2],
-        "elastic_rate": [rate_1, rate_2],
-    }
+def longitudinal(x: np.ndarray) -> dict[str, float]:
+    return dict(zip(STATE_NAMES, map(float, x), strict=True))
 
 
 def inputs(u: np.ndarray) -> dict[str, float]:
@@ -115,10 +105,10 @@ def fault(acting: ActiveFault) -> msg.Fault:
     )
 
 
-def typed(topic: str, signals: Signals) -> Any:
+def typed(topic: str, signals: Signals, frame: str = FRAME) -> Any:
     """Return the message of rclpy that holds these signals, field by field."""
     s, tube = signals, signals.diagnostics
-    place = {"header": head(s.step), "step": s.step}
+    place = {"header": header(s.step, frame), "step": s.step}
     match topic:
         case description.CLOCK:
             return Clock(clock=place["header"].stamp)
@@ -181,11 +171,19 @@ def typed(topic: str, signals: Signals) -> Any:
 
 def sent(message: Any) -> bytes:
     """Return the bytes of a message of rclpy as DDS sends them: with zeros between the fields, and no surplus."""
-    kind = codec(type_name(type(message)))
-    return kind.pack(kind.unpack(serialize_message(message))[1:])
+    kind = "/".join((*type(message).__module__.split(".")[:2], type(message).__name__))
+    data = serialize_message(message)
+    while True:
+        try:
+            read = STORE.deserialize_cdr(data, kind)
+        except SerdeError:
+            data = data[:-4]  # rmw_fastrtps adds four bytes for some empty sequences
+        else:
+            data = bytes(STORE.serialize_cdr(read, kind))
+            return data + bytes(-len(data) % WIRE_ALIGNMENT)
 
 
-TAKEN = {
+NEEDED = {
     description.MEASUREMENT: {"measurement", "status"},
     description.STATE: {"state", "status"},
     description.FILTERED_STATE: {"measurement", "estimate", "filtered_pitch_rate", "filter_state", "status"},
@@ -193,72 +191,98 @@ TAKEN = {
     description.COMMAND: {"command"},
     description.ACTUATOR: {"actuator", "active_faults"},
 }
-"""What a block needs of each topic, or passes on."""
+"""The signals of each topic that a block needs, or passes on."""
 
 
 def same(first: Any, second: Any) -> bool:
-    """Compare signals: arrays by their bits and layout, for compiled functions take only those they were made for."""
+    """Compare signals: arrays by their bits; the core needs them aligned."""
     if isinstance(first, np.ndarray):
-        layout = second.flags.c_contiguous and second.flags.aligned and second.flags.owndata
-        return layout and first.dtype == second.dtype and first.tobytes() == second.tobytes()
+        aligned = second.flags.c_contiguous and second.ctypes.data % 8 == 0
+        return aligned and first.dtype == second.dtype and first.tobytes() == second.tobytes()
     return bool(first == second)
 
 
-def assert_taken(topic: str, given: Signals, taken: Signals) -> None:
-    assert vars(taken).keys() == TAKEN[topic] | {"header", "step"}
-    assert [n for n in (*TAKEN[topic], "step") if not same(getattr(given, n), getattr(taken, n))] == []
-    stamp, frame = taken.header.stamp, taken.header.frame_id
-    assert ((stamp.sec, stamp.nanosec), frame) == (Head.at(given.step, PERIOD)[:2], "body")
+def assert_unpacked(topic: str, given: Signals, unpacked: Signals) -> None:
+    assert vars(unpacked).keys() == NEEDED[topic] | {"stamp", "step"}
+    assert [n for n in (*NEEDED[topic], "step", "stamp") if not same(getattr(given, n), getattr(unpacked, n))] == []
     if topic == description.FILTERED_STATE:
-        assert (taken.estimate is taken.measurement) == (given.estimate is given.measurement)
+        assert (unpacked.estimate is unpacked.measurement) == (given.estimate is given.measurement)
 
 
-def headed(signals: Signals) -> Signals:
-    signals.header = Head.at(signals.step, PERIOD)._replace(length=5, frame=b"body\0")
-    return signals
+def test_the_interface_version_is_that_of_the_messages():
+    assert msg.Run.INTERFACE_VERSION == INTERFACE_VERSION
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_the_bytes_of_a_node_are_those_of_rclpy(topic):
-    give = giver(topic)  # one for all: what it remembers of one message must not come back in another
+def test_packed_bytes_are_those_of_rclpy(topic):
+    messages = StepMessages(topic)  # one for all: nothing of one message may remain in the next
     for signals in (*CASES, *reversed(CASES)):
-        assert give(headed(signals)) == sent(typed(topic, signals))
+        data = messages.pack(signals)
+        assert data == sent(typed(topic, signals))
+        assert stamp_in(data) == signals.stamp[0] * 10**9 + signals.stamp[1]
 
 
-@pytest.mark.parametrize("topic", TAKEN)
-def test_a_node_takes_what_rclpy_writes(topic):
-    take, unpack = taker(topic), codec(TOPICS[topic]).unpack
+@pytest.mark.parametrize("topic", NEEDED)
+@pytest.mark.parametrize("frame", [FRAME, "", "body"])
+def test_unpacked_signals_are_those_that_rclpy_wrote(topic, frame):
+    messages = StepMessages(topic)
     for given in (*CASES, *reversed(CASES)):
-        taken = Signals()
-        take(unpack(serialize_message(typed(topic, given))), taken)
-        assert_taken(topic, given, taken)
+        unpacked, data = Signals(), serialize_message(typed(topic, given, frame))
+        assert messages.step(data) == given.step
+        messages.unpack(data, unpacked)
+        assert_unpacked(topic, given, unpacked)
+
+
+def test_an_empty_text_may_lack_its_closing_zero():
+    topic, given, unpacked = description.COMMAND, CASES[2], Signals()
+    data = sent(typed(topic, given, ""))
+    # With the closing zero the length is 1, and three bytes of padding follow.
+    assert data[12:20] == bytes([1, 0, 0, 0, 0, 0, 0, 0])
+    StepMessages(topic).unpack(data[:12] + bytes(8) + data[20:], unpacked)
+    assert_unpacked(topic, given, unpacked)
 
 
 @pytest.mark.parametrize("topic", TOPICS)
-def test_the_bytes_of_the_replay_are_those_of_rclpy(topic):
-    store = types()
-    filled = blank(store, TOPICS[topic])  # one for all: what was in it before must not remain
-    for signals in (*CASES, *reversed(CASES)):
-        filler(topic)(headed(signals), filled)
-        data = bytes(store.serialize_cdr(filled, TOPICS[topic]))
-        assert data + bytes(-len(data) % WIRE_ALIGNMENT) == sent(typed(topic, signals))
+def test_a_structure_reads_a_whole_topic(topic):
+    kind = TOPICS[topic]
+    messages = [sent(typed(topic, signals_of(seed, sizes=(2, 0, 7)))) for seed in (1, 3, 5)]
+    structure = Structure(STORE.fielddefs, kind, messages[0])
+    assert structure.complete and len(messages[0]) - 4 - structure.size < WIRE_ALIGNMENT
+    rows = structure.rows(messages)
+    for row, message in zip(rows, messages, strict=True):
+        read = STORE.deserialize_cdr(message, kind)
+        for path in structure.dtype.names:
+            value = read
+            for name in path.split("."):
+                value = getattr(value, name)
+            found = row[path].decode() if isinstance(value, str) else row[path].tolist()
+            np.testing.assert_array_equal(found.rstrip("\0") if isinstance(value, str) else found, value)
+    assert structure.rows([*messages, messages[0] + bytes(4)]) is None
 
 
-@pytest.mark.parametrize("topic", TAKEN)
-def test_the_replay_reads_what_rclpy_writes(topic):
-    store = types()
-    for given in CASES:
-        taken = Signals()
-        reader(topic)(store.deserialize_cdr(sent(typed(topic, given)), TOPICS[topic]), taken)
-        assert_taken(topic, given, taken)
+def test_a_structure_ends_where_a_list_of_messages_begins():
+    kind = TOPICS[description.ACTUATOR]
+    data = sent(typed(description.ACTUATOR, CASES[1]))
+    structure = Structure(STORE.fielddefs, kind, data)
+    assert not structure.complete and structure.dtype.names[-1] == "elevator_deflection"
+    assert not structure.fits(sent(typed(description.STATE, CASES[1]))[:40])
 
 
-def test_a_bag_from_before_there_were_estimators_says_the_measurement_alone():
-    signals = Signals()
-    fields = vars(blank(types(), TOPICS[description.FILTERED_STATE]))
-    former = SimpleNamespace(**{name: value for name, value in fields.items() if name != "estimate"})
-    reader(description.FILTERED_STATE)(former, signals)
-    assert signals.estimate is signals.measurement
+@pytest.mark.parametrize("topic", NEEDED)
+def test_messages_cut_short_or_of_another_byte_order_are_refused(topic):
+    whole, messages = sent(typed(topic, CASES[2])), StepMessages(topic)
+    with pytest.raises(MessageError, match="begins with 0000, expected 0001, little-endian"):
+        messages.unpack(b"\0\0" + whole[2:], Signals())
+    for length in range(len(whole) - 3):
+        with pytest.raises(MessageError, match=TOPICS[topic]):
+            messages.unpack(whole[:length], Signals())
+
+
+def test_a_length_beyond_the_message_is_refused_at_once():
+    whole = bytearray(sent(typed(description.FILTERED_STATE, CASES[0])))
+    whole[12:16] = b"\xff\xff\xff\x7f"
+    with pytest.raises(MessageError, match=r"header\.frame_id: length 2147483647 in a message of"):
+        StepMessages(description.FILTERED_STATE).unpack(bytes(whole), Signals())
 
 
 def loss(**fields: Any) -> msg.Fault:
@@ -282,7 +306,7 @@ def loss(**fields: Any) -> msg.Fault:
             (
                 description.FILTERED_STATE,
                 msg.FilteredState(filter_state=[1.0] * size, estimate=[1.0] * 9),
-                f"filter_state: {size} numbers, expected two a section of the notch filter",
+                f"filter_state: {size} numbers, expected two for each section of the notch filter",
             )
             for size in (1, 3)
         ),
@@ -290,7 +314,7 @@ def loss(**fields: Any) -> msg.Fault:
         (
             description.ACTUATOR,
             msg.Actuator(active=[loss(parameter_values=[])], since=[3]),
-            r"active\[0\]: fault\.parameter_values: 0 values, expected one a name, 1",
+            r"active\[0\]: fault\.parameter_values: 0 values, expected 1, one for each name",
         ),
         (
             description.ACTUATOR,
@@ -307,8 +331,12 @@ def loss(**fields: Any) -> msg.Fault:
             msg.Actuator(active=[loss(parameter_values=[float("nan")])], since=[3]),
             r"active\[0\]: fault\.effectiveness = nan: expected",
         ),
-        (description.ACTUATOR, msg.Actuator(active=[loss()]), "since: 0 steps, expected one a fault in active, 1"),
-        (description.ACTUATOR, msg.Actuator(since=[3]), "since: 1 steps, expected one a fault in active, 0"),
+        (
+            description.ACTUATOR,
+            msg.Actuator(active=[loss()]),
+            "since: 0 steps, expected 1, one for each fault in active",
+        ),
+        (description.ACTUATOR, msg.Actuator(since=[3]), "since: 1 steps, expected 0, one for each fault in active"),
         (
             description.ACTUATOR,
             msg.Actuator(active=[loss()], since=[2**64 - 1]),
@@ -316,59 +344,36 @@ def loss(**fields: Any) -> msg.Fault:
         ),
     ],
 )
-def test_what_no_block_can_take_is_refused_by_both_and_sets_no_signal(topic: str, message: Any, words: str) -> None:
-    data, store = serialize_message(message), types()
-    taken = Signals()
+def test_unusable_signals_are_refused_and_none_is_set(topic: str, message: Any, words: str) -> None:
+    unpacked = Signals()
     with pytest.raises(SignalError, match=words) as refused:
-        taker(topic)(codec(TOPICS[topic]).unpack(data), taken)
+        StepMessages(topic).unpack(sent(message), unpacked)
     assert description.TOPIC_OF[refused.value.signal] == topic
-    with pytest.raises(SignalError, match=words):
-        reader(topic)(store.deserialize_cdr(sent(message), TOPICS[topic]), taken)
-    assert not vars(taken)
+    assert not vars(unpacked)
 
 
-def test_a_message_after_one_that_was_refused_is_taken():
-    unpack, take, taken = codec(TOPICS[description.ACTUATOR]).unpack, taker(description.ACTUATOR), Signals()
-    good = unpack(serialize_message(typed(description.ACTUATOR, CASES[2])))
-    take(good, taken)
+def test_a_message_after_a_refused_one_is_unpacked():
+    messages, unpacked = StepMessages(description.ACTUATOR), Signals()
+    good = sent(typed(description.ACTUATOR, CASES[2]))
+    messages.unpack(good, unpacked)
     with pytest.raises(SignalError, match="since: 0 steps"):
-        take(unpack(serialize_message(msg.Actuator(active=[loss()]))), taken)
-    assert taken.active_faults == (LOSS, REVERSAL) and taken.step == CASES[2].step
-    take(good, taken)
-    assert taken.active_faults == (LOSS, REVERSAL)
+        messages.unpack(sent(msg.Actuator(active=[loss()])), unpacked)
+    assert unpacked.active_faults == (LOSS, REVERSAL) and unpacked.step == CASES[2].step
+    messages.unpack(good, unpacked)
+    assert unpacked.active_faults == (LOSS, REVERSAL)
 
 
-def test_an_empty_text_of_no_bytes_shifts_nothing():
-    """Some write an empty text as the length 0, without the zero that ends it."""
-    for topic in TAKEN:
-        taken, given = Signals(), CASES[2]
-        kind = codec(TOPICS[topic])
-        values = kind.unpack(serialize_message(typed(topic, given)))
-        data = kind.pack((*values[1:3], 0, b"", *values[5:]))
-        assert len(data) < len(kind.pack(values[1:])) and data[12:16] == bytes(4)
-        taker(topic)(kind.unpack(data), taken)
-        assert [n for n in (*TAKEN[topic], "step") if not same(getattr(given, n), getattr(taken, n))] == []
-        assert taken.header.frame_id == ""
-
-
-def test_of_whatever_numbers_no_other_error_is_raised_than_that_of_a_signal():
+def test_random_bytes_raise_no_other_error():
     draw = random.Random(0)
-    for topic in TAKEN:
-        take, kind = taker(topic), codec(TOPICS[topic])
+    for topic in NEEDED:
+        messages = StepMessages(topic)
         for _ in range(300):
             data = bytearray(sent(typed(topic, draw.choice(CASES))))
             for _ in range(draw.randrange(1, 4)):
                 data[draw.randrange(4, len(data))] = draw.choice([0, 1, 2, 4, draw.randrange(256)])
-            taken = Signals()
+            del data[draw.randrange(len(data) - 4, len(data) + 1) :]
+            unpacked = Signals()
             try:
-                take(kind.unpack(bytes(data)), taken)
-            except RunError as error:
-                assert isinstance(error, SignalError) or str(error).startswith(TOPICS[topic])
-                assert not vars(taken)
-
-
-@pytest.mark.parametrize("more", [(), (0, 1)])
-def test_values_that_are_not_as_many_as_their_lengths_say_are_refused(more):
-    kind = codec(TOPICS[description.ACTUATOR])
-    with pytest.raises((struct.error, IndexError)):
-        kind.pack((0, 0, 1, b"\0", 3, 1.0, 2.0, 0, *more))
+                messages.unpack(bytes(data), unpacked)
+            except (MessageError, SignalError):
+                assert not vars(unpacked)

@@ -1,0 +1,382 @@
+"""Messages of the step topics: the layout of their bytes, and the signals of the loop in them.
+
+In one run, the sequences and the ``frame_id`` of a topic have constant lengths. All its messages (XCDR1, little-endian)
+then have the same layout, which follows from the message definition: one numpy structured type, :class:`Structure`. One
+view of the bytes replaces the conversion of a message field by field, in the nodes, in the replay and in the reader.
+Only a list of messages, such as the active faults, is converted by rosbags, and only when its bytes change.
+
+:data:`hsv.bags.description.CARRIED` declares which field of which message holds which signal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces.typing import Typesdict
+from rosbags.serde import SerdeError
+from rosbags.typesys.store import Typestore
+
+from hsv.bags.definitions import definition
+from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGNMENT
+from hsv.bags.fields import blank, fields_of
+from hsv.bags.typestore import message_types
+from hsv.base.errors import ParameterError, RunError, SignalError
+from hsv.base.timing import NEVER
+from hsv.flight.blocks import LOOP
+from hsv.model import signals as types
+from hsv.model.airframe.pose import LEVEL
+from hsv.model.dynamics import N_INPUTS, N_STATES
+from hsv.model.signals import VARYING, SignalType
+
+if TYPE_CHECKING:
+    from hsv.flight.blocks import Signals
+    from hsv.model.faults.schedule import ActiveFault
+    from hsv.model.faults.table import Fault
+
+FRAME = LEVEL
+"""``frame_id`` of every message of a step: the vehicle-carried frame, in which the state is given."""
+
+ENCAPSULATION = 4
+"""Bytes in front of the message; alignment counts from their end."""
+
+_LITTLE_ENDIAN = b"\x00\x01"
+
+
+def stamp_of(step: int, period: float) -> tuple[int, int]:
+    """Return seconds and nanoseconds of simulated time at ``step`` of a flight with a ``period`` (s)."""
+    return divmod(round(step * period * 1e9), 1_000_000_000)
+
+
+def stamp_in(message: bytes) -> int:
+    """Return the simulated time (ns) with which every message of a step begins."""
+    seconds = int.from_bytes(message[4:8], "little", signed=True)
+    return seconds * 1_000_000_000 + int.from_bytes(message[8:12], "little")
+
+
+class MessageError(RunError):
+    """Bytes that are not a message of their type, or a type that is not defined as expected."""
+
+
+class Structure:
+    """The layout of a message and of all others of its type whose texts and sequences have the same lengths.
+
+    Attributes:
+        dtype: Structured type of the message behind its encapsulation; its fields are named by their paths, such as
+            ``header.stamp.sec`` or ``state.altitude``. A text has its bytes, the closing zero included.
+        lengths: Offset and value of the length of every text and sequence, by path.
+        size: Number of bytes of :attr:`dtype`.
+        complete: Whether the type describes the whole message. It ends where a list of messages or texts begins.
+    """
+
+    def __init__(self, store: Typesdict, message_type: str, message: bytes) -> None:
+        """Find the layout of ``message``.
+
+        Args:
+            store: Definitions of the type and of those it depends on.
+            message_type: ``package/msg/Type``.
+            message: The message in CDR.
+
+        Raises:
+            MessageError: It is not little-endian CDR, or shorter than its definition demands.
+        """
+        if message[:2] != _LITTLE_ENDIAN:
+            raise MessageError(
+                f"{message_type}: CDR that begins with {message[:2].hex()}, expected 0001, little-endian"
+            )
+        self.lengths: dict[str, tuple[int, int]] = {}
+        self.complete = True
+        self.type = message_type
+        self.size = 0
+        self._places: dict[str, tuple[np.dtype[Any], int]] = {}
+        self._walk(store, message_type, message)
+        if len(message) < ENCAPSULATION + self.size:
+            raise MessageError(f"{message_type}: {len(message)} bytes, expected at least {ENCAPSULATION + self.size}")
+        self.dtype = np.dtype(
+            {
+                "names": list(self._places),
+                "formats": [dtype for dtype, _ in self._places.values()],
+                "offsets": [offset for _, offset in self._places.values()],
+                "itemsize": self.size,
+            }
+        )
+        self._checked = [(ENCAPSULATION + at, value.to_bytes(4, "little")) for at, value in self.lengths.values()]
+
+    def fits(self, message: bytes) -> bool:
+        """Return whether ``message`` has this layout."""
+        if len(message) < ENCAPSULATION + self.size or message[:2] != _LITTLE_ENDIAN:
+            return False
+        return all(message[at : at + 4] == value for at, value in self._checked)
+
+    def rows(self, messages: Sequence[bytes]) -> NDArray[Any] | None:
+        """Return the messages as an array of :attr:`dtype`, shape (n,); None if their layouts differ."""
+        size = len(messages[0])
+        if any(len(message) != size for message in messages) or not all(map(self.fits, messages)):
+            return None
+        octets = np.frombuffer(b"".join(messages), np.uint8).reshape(-1, size)
+        body = np.ascontiguousarray(octets[:, ENCAPSULATION : ENCAPSULATION + self.size])
+        return body.view(self.dtype)[:, 0]
+
+    def select(self, chosen: Mapping[str, tuple[str, int]]) -> np.dtype[Any]:
+        """Return a structured type of chosen fields, of the same size.
+
+        Args:
+            chosen: By name, the path of a number, a sequence of numbers or a message of numbers, and how many
+                consecutive numbers from there on make one field; :data:`VARYING` for the whole sequence.
+
+        Raises:
+            MessageError: The definition has no such field.
+        """
+        names, formats, offsets = list(self._places), [], []
+        for path, size in chosen.values():
+            first = next((i for i, name in enumerate(names) if name == path or name.startswith(f"{path}.")), None)
+            count = 1 if first is None or self._places[names[first]][0].shape else max(size, 1)
+            run = [self._places[name] for name in names[first : first + count]] if first is not None else []
+            if len(run) < count or {dtype for dtype, _ in run} != {run[0][0]} or run[0][0].kind == "S":
+                raise MessageError(f"{self.type}: recorded with another definition, expected a field {path}")
+            dtype, offset = run[0]
+            formats.append(dtype if count == 1 else np.dtype((dtype, (count,))))
+            offsets.append(offset)
+        return np.dtype({"names": list(chosen), "formats": formats, "offsets": offsets, "itemsize": self.size})
+
+    def _walk(self, store: Typesdict, message_type: str, message: bytes, prefix: str = "") -> None:
+        for field in fields_of(store, message_type):
+            if not self.complete:
+                return
+            path = prefix + field.name
+            if field.count == "one" and field.format:
+                self._place(path, np.dtype(field.format))
+            elif field.count == "one" and field.is_text:
+                self._place(path, np.dtype(f"S{self._length(path, message)}"))
+            elif field.count == "one":
+                self._walk(store, field.type, message, path + ".")
+            else:
+                at = self.size
+                count = field.length if field.count == "array" else self._length(path, message)
+                if field.format:
+                    self._place(path, np.dtype((field.format, (count,))))
+                elif count:
+                    # The sizes of texts and messages in a list differ: the rest has no fixed place.
+                    self.complete, self.size = False, at
+                    self.lengths.pop(path, None)
+
+    def _place(self, path: str, dtype: np.dtype[Any]) -> None:
+        if dtype.itemsize and dtype.kind != "S":
+            self.size += -self.size % dtype.base.itemsize
+        self._places[path] = dtype, self.size
+        self.size += dtype.itemsize
+
+    def _length(self, path: str, message: bytes) -> int:
+        offset = self.size + -self.size % 4
+        at = ENCAPSULATION + offset
+        length = int.from_bytes(message[at : at + 4], "little")
+        if length > len(message):
+            raise MessageError(f"{self.type}: {path}: length {length} in a message of {len(message)} bytes")
+        self.lengths[path] = offset, length
+        self.size = offset + 4
+        return length
+
+
+_NEEDED = {signal for block in LOOP for signal in (*block.inputs, *block.delayed, *block.state)} | {types.STATUS}
+"""The signals that are unpacked: those that a block needs, and the status, which is passed on."""
+
+_SIZES: dict[SignalType, tuple[Callable[[int], bool], str]] = {
+    types.FILTER_STATE: (lambda size: size % 2 == 0, "two for each section of the notch filter"),
+    types.GAIN: (lambda size: size in (0, N_INPUTS * N_STATES), f"{N_INPUTS * N_STATES}, or none"),
+    types.ESTIMATE: (lambda size: size in (0, N_STATES), f"{N_STATES}, or none"),
+}
+"""Signals in sequences: the admitted sizes, and their description for an error message."""
+
+_VALUES: dict[SignalType, Callable[[Signals], Any]] = {
+    types.ESTIMATE: lambda signals: () if signals.estimate is signals.measurement else signals.estimate,
+    types.GAIN: lambda signals: signals.gain.ravel(),
+}
+"""The numbers of those signals that are not sent as they are."""
+
+_TUBE = {
+    "level": 1,
+    "u_nominal": N_INPUTS,
+    "u_feedback": N_INPUTS,
+    "u_unsaturated": N_INPUTS,
+    "inside": 1,
+    "status": 1,
+    "error": VARYING,
+    "tube_centre": VARYING,
+    "tube_half_width": VARYING,
+    "tau": VARYING,
+}
+"""Attributes of the controller's diagnostics in the fields of the tube status, and their sizes."""
+
+
+class StepMessages:
+    """Packs the signals of a step into messages of one topic, and unpacks them."""
+
+    def __init__(self, topic: str, store: Typestore | None = None) -> None:
+        """Prepare for a topic.
+
+        Args:
+            topic: A topic of :data:`hsv.bags.description.TOPICS`.
+            store: Definitions of the messages; None for the installed ones.
+        """
+        self.type = TOPICS[topic]
+        self._store = store or installed_types(self.type)
+        carried = CARRIED.get(topic, {})
+        self._has_faults = types.ACTIVE_FAULTS in carried
+        numbers = {signal: field for signal, field in carried.items() if signal is not types.ACTIVE_FAULTS}
+        self._sequences = {signal: field for signal, field in numbers.items() if signal in _SIZES}
+        self._needed = {signal.name: (field, _size(signal)) for signal, field in numbers.items() if signal in _NEEDED}
+        if topic == TUBE_STATUS:
+            sent = {name: (size, attrgetter(f"diagnostics.{name}")) for name, size in _TUBE.items()}
+            sent["u_reference"] = N_INPUTS, attrgetter("reference_input")
+        else:
+            sent = {field: (_size(s), _VALUES.get(s, attrgetter(s.name))) for s, field in numbers.items()}
+        self._sent = sent
+        stamp = "clock" if topic == CLOCK else "header.stamp"
+        self._front = {path: (path, 1) for path in (f"{stamp}.sec", f"{stamp}.nanosec", "step")[: 2 + bool(carried)]}
+        """What every message of a step begins with; that of the clock has no step."""
+        self._received: Structure | None = None
+        self._list = b""
+        self._faults: tuple[ActiveFault, ...] = ()
+        self._lengths: tuple[object, ...] | None = None
+
+    def step(self, message: bytes) -> int:
+        """Return the step of a message.
+
+        Raises:
+            MessageError, SignalError: See :meth:`unpack`.
+        """
+        return int(self._numbers(message)[2])
+
+    def unpack(self, message: bytes, signals: Signals) -> None:
+        """Set stamp, step and the signals that a block needs; all of them, or none where an error is raised.
+
+        Raises:
+            MessageError: It is not a message of the type.
+            SignalError: No block can take a signal in it.
+        """
+        seconds, nanoseconds, step, *values = self._numbers(message)
+        found = dict(zip(self._needed, values, strict=True))
+        if self._has_faults:
+            found["active_faults"] = self._active_faults(message)
+        if "estimate" in found and not len(found["estimate"]):
+            found["estimate"] = found["measurement"]
+        signals.stamp, signals.step = (seconds, nanoseconds), step
+        vars(signals).update(found)
+
+    def pack(self, signals: Signals) -> bytes:
+        """Return the message that holds the signals, padded as DDS sends it."""
+        values = [value(signals) for _, value in self._sent.values()]
+        lengths = [len(value) for value, (size, _) in zip(values, self._sent.values(), strict=True) if size == VARYING]
+        faults = signals.active_faults if self._has_faults else ()
+        if self._lengths != (*lengths, faults):
+            self._allocate(lengths, faults)
+            self._lengths = *lengths, faults
+        front = (*signals.stamp, signals.step)[: len(self._front)]
+        self._rows[0] = (*front, *values)
+        return bytes(self._buffer)
+
+    def _numbers(self, message: bytes) -> tuple[Any, ...]:
+        """Return seconds, nanoseconds, step, and the needed signals of a message."""
+        if self._received is None or not self._received.fits(message):
+            structure = Structure(self._store.fielddefs, self.type, message)
+            for signal, field in self._sequences.items():
+                admitted, words = _SIZES[signal]
+                if field in structure.lengths and not admitted(size := structure.lengths[field][1]):
+                    raise SignalError(signal.name, f"{field}: {size} numbers, expected {words}")
+            self._dtype = structure.select(self._front | self._needed)
+            self._received = structure
+        # A copy without the encapsulation, in which the numbers are aligned.
+        numbers: tuple[Any, ...] = np.frombuffer(message[ENCAPSULATION:], self._dtype, 1).item()
+        return numbers
+
+    def _active_faults(self, message: bytes) -> tuple[ActiveFault, ...]:
+        assert self._received is not None
+        if self._received.complete and self._received.lengths["since"][1] == 0:
+            return ()
+        found = message[ENCAPSULATION + self._received.size :]
+        if found != self._list or not found:
+            try:
+                decoded = self._store.deserialize_cdr(message, self.type)
+            except SerdeError as error:
+                raise MessageError(f"{self.type}: {error}") from None
+            self._faults, self._list = active_faults(decoded), found
+        return self._faults
+
+    def _allocate(self, lengths: Sequence[int], faults: tuple[ActiveFault, ...]) -> None:
+        """Make a message with sequences of these lengths, and a view of its numbers."""
+        message = blank(self._store, self.type)
+        if hasattr(message, "header"):
+            message.header.frame_id = FRAME
+        sequences = (field for field, (size, _) in self._sent.items() if size == VARYING)
+        for field, length in zip(sequences, lengths, strict=True):
+            setattr(message, field, np.zeros(length))
+        if faults:
+            fault_type = self._store.types["hsv_msgs/msg/Fault"]
+            message.active = [fault_type(*fault_fields(active.fault)) for active in faults]
+            message.since = np.array([active.since for active in faults], np.uint64)
+        data = bytes(self._store.serialize_cdr(message, self.type))
+        self._buffer = bytearray(data + bytes(-len(data) % WIRE_ALIGNMENT))
+        structure = Structure(self._store.fielddefs, self.type, data)
+        dtype = structure.select(self._front | {field: (field, size) for field, (size, _) in self._sent.items()})
+        self._rows = np.frombuffer(self._buffer, dtype, 1, ENCAPSULATION)
+
+
+def _size(signal: SignalType) -> int:
+    return VARYING if signal in _SIZES else signal.size
+
+
+@cache
+def installed_types(message_type: str) -> Typestore:
+    """Return the definition of an installed type and of those it depends on.
+
+    Raises:
+        RecordingError: It is not installed.
+    """
+    return message_types([(message_type, definition(message_type))], message_type)
+
+
+def fault_fields(fault: Fault) -> tuple[str, str, list[str], NDArray[np.float64]]:
+    """Return the fields of a message Fault, in their order."""
+    return fault.channel, fault.type, list(fault.parameters), np.array(list(fault.parameters.values()), np.float64)
+
+
+def fault_in(message: Any) -> Fault:
+    """Return the fault in a message Fault.
+
+    Raises:
+        ParameterError: An unknown channel, type or parameter, or a value that is not admitted.
+    """
+    from hsv.model.faults.table import Fault  # most nodes need no fault
+
+    names, values = message.parameter_names, message.parameter_values
+    if len(names) != len(values):
+        raise ParameterError(f"fault.parameter_values: {len(values)} values, expected {len(names)}, one for each name")
+    return Fault.of(message.channel, message.type, dict(zip(names, map(float, values), strict=True)))
+
+
+def active_faults(message: Any) -> tuple[ActiveFault, ...]:
+    """Return the faults in a message Actuator, with their first steps.
+
+    Raises:
+        SignalError: See :func:`fault_in`; or the first steps are not as many, or impossible.
+    """
+    from hsv.model.faults.schedule import ActiveFault
+
+    active, since = message.active, message.since
+    if len(active) != len(since):
+        raise SignalError(
+            "active_faults", f"since: {len(since)} steps, expected {len(active)}, one for each fault in active"
+        )
+    found = []
+    for i, (fault, first) in enumerate(zip(active, map(int, since), strict=True)):
+        try:
+            found.append(ActiveFault(fault_in(fault), first))
+        except ParameterError as error:
+            raise SignalError("active_faults", f"active[{i}]: {error}") from error
+        if first > NEVER:
+            raise SignalError("active_faults", f"since[{i}] = {first}: expected a step, at most {NEVER}")
+    return tuple(found)
