@@ -35,10 +35,9 @@ from hsv.bags.description import (
     TUBE_STATUS,
 )
 from hsv.base.errors import ParameterError, SignalError
-from hsv.base.timing import NEVER
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
-from hsv.model.dynamics import INPUT_NAMES, N_INPUTS, N_STATES
+from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_STATES, NEVER
 
 if TYPE_CHECKING:
     from hsv.flight.blocks import Signals
