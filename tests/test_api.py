@@ -8,7 +8,7 @@ import pytest
 
 import hsv
 from hsv.base.errors import ScenarioError
-from hsv.control.design_parameters import digest
+from hsv.control.design import digest
 from hsv.flight.assembly import design_parameters
 from hsv.flight.fingerprint import as_published
 

@@ -12,7 +12,7 @@ import sys
 import numpy as np
 from scipy.signal import lfilter
 
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Region, incomplete_share, record
 from hsv.design.sets.counter_example import responses
@@ -22,7 +22,7 @@ from hsv.design.verification.checks import Subject
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject
 from hsv.flight.flight import Flight
-from hsv.model.dynamics import N_RIGID, STATE_NAMES
+from hsv.model.signals import N_RIGID, STATE_NAMES
 
 DESIGNS = ("baseline", "tight", "derived")
 SPLIT = ("angle_of_attack_rate", "pitch_acceleration")

@@ -10,7 +10,7 @@ from hsv.bags.info import describe, parameters_in_words
 from hsv.base.units import UnitSystem
 from hsv.cli.look import info
 from hsv.core import lib
-from hsv.core.noise import uniforms
+from hsv.core.arithmetic import uniforms
 from hsv.pages.report.events import flight_events
 from hsv.pages.report.page import render
 from hsv.pages.report.payload import all_panels

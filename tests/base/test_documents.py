@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from hsv.base.documents import MOST_BYTES, MOST_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
 from hsv.base.errors import DocumentError
+from hsv.base.files import MOST_BYTES, MOST_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
 
 
 def test_a_text_is_read_whole(tmp_path):

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import pytest
 
 from hsv.bags.description import TUBE_MPC
-from hsv.base.interruption import take_interrupts, uninterrupted
+from hsv.base.processes import take_interrupts, uninterrupted
 from hsv.graph.launcher import Launcher
 
 NUMBERS = signal.SIGINT, signal.SIGTERM, signal.SIGALRM
@@ -32,7 +32,7 @@ ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))()
 
 @pytest.mark.parametrize("program", SWALLOWED.values(), ids=SWALLOWED)
 def test_ctrl_c_is_not_lost_where_no_exception_gets_through(program) -> None:
-    begin = "import ctypes, signal\nfrom hsv.base.interruption import take_interrupts\ntake_interrupts()"
+    begin = "import ctypes, signal\nfrom hsv.base.processes import take_interrupts\ntake_interrupts()"
     # Lost for good, it would be waited for in vain: ten seconds of processor time end that.
     end = "signal.setitimer(signal.ITIMER_PROF, 10.0)\nwhile True: pass"
     ran = subprocess.run([sys.executable, "-c", f"{begin}{program}{end}"], capture_output=True, text=True)
@@ -46,7 +46,7 @@ def test_the_exit_code_stands_when_ctrl_c_comes_at_the_very_end(code, number) ->
     # SIGALRM: an interruption that was to come later.
     program = f"""
 import os, signal, sys
-from hsv.base.interruption import take_interrupts
+from hsv.base.processes import take_interrupts
 take_interrupts()
 class Last:
     def __del__(self, kill=os.kill, process=os.getpid(), number=signal.{number}): kill(process, number)

@@ -6,7 +6,7 @@ import pytest
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.design import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.control.notch_filter import NOTCH_PARAMETERS
 from hsv.control.robust_mpc import ROBUST_MPC_PARAMETERS

@@ -1,4 +1,4 @@
-from hsv.base.threads import over_threads
+from hsv.base.processes import over_threads
 
 
 def test_results_are_in_the_order_of_the_items_and_counted():

@@ -20,7 +20,7 @@ from hsv.base.units import (
 )
 from hsv.cli.output import unit_key
 from hsv.flight.metrics import METRICS
-from hsv.model.dynamics import INPUT_UNITS, STATE_UNITS
+from hsv.model.signals import INPUT_UNITS, STATE_UNITS
 from hsv.model.vehicle import load_vehicle
 
 

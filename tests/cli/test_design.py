@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from hsv.control.design_file import read_parameters
+from hsv.control.design import read_parameters
 from hsv.design.inputs import find_inputs
 from hsv.design.verification.verifier import load_subject, verify
 

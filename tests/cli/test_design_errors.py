@@ -2,7 +2,7 @@
 
 import pytest
 
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.flight.scenario import scenario_text
 
 

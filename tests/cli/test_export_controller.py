@@ -2,7 +2,7 @@ import dataclasses
 
 import pytest
 
-from hsv.control.design_file import find_design, read_design, write_design
+from hsv.control.design import find_design, read_design, write_design
 from hsv.control.export import NUMBERS, controller_files, step_bounds
 
 BASELINE = read_design(find_design("baseline"))

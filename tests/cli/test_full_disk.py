@@ -12,7 +12,7 @@ from recorded_flight import record_flight
 
 from hsv.base.errors import ParameterError
 from hsv.cli.output import writing
-from hsv.control.certificate import write_certificate
+from hsv.control.design import write_certificate
 
 FULL = Path("/dev/full")
 

@@ -4,7 +4,7 @@ import pytest
 from node_processes import short_scenario
 
 from hsv.base.parameters import Parameter, check_all
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 
 
 @pytest.fixture

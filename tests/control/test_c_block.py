@@ -6,8 +6,8 @@ import pytest
 from c_libraries import build_probe
 
 from hsv.base.errors import ParameterError
-from hsv.control.c_block import load_block
 from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
+from hsv.control.library import load_block
 from hsv.model.signals import FILTER_STATE
 
 

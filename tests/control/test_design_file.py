@@ -9,9 +9,7 @@ import yaml
 from numpy.testing import assert_array_equal
 
 from hsv.base.errors import DesignError
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, find_file, read_design, read_parameters, write_design
-from hsv.control.design_parameters import digest
+from hsv.control.design import ControlDesign, digest, find_design, find_file, read_design, read_parameters, write_design
 
 SHIPPED = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
 VALUES = read_parameters(find_design("baseline"))

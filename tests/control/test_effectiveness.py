@@ -18,8 +18,9 @@ from hsv.flight.closed_loop import fly
 from hsv.flight.corners import corners
 from hsv.flight.scenario import load_scenario
 from hsv.flight.side_by_side import fly_perturbed
-from hsv.model.dynamics import PITCH_RATE, advance
+from hsv.model.dynamics import advance
 from hsv.model.plant import FlightStatus
+from hsv.model.signals import PITCH_RATE
 from hsv.model.vehicle import load_vehicle
 
 FAULT = 5000

@@ -7,11 +7,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.linalg import expm, solve_discrete_are
 
 from hsv.base.errors import ParameterError
-from hsv.control.estimator import Estimator, EstimatorData, estimator_data
-from hsv.control.estimator_parameters import PROCESS_PARAMETERS
+from hsv.control.estimator import PROCESS_PARAMETERS, Estimator, EstimatorData, estimator_data
 from hsv.core import doubles, lib
 from hsv.model.dynamics import advance, jacobian
-from hsv.model.faults.laws import fault_rows
+from hsv.model.faults.schedule import fault_rows
 from hsv.model.faults.table import SENSOR
 from hsv.model.sensors import sensor_data, sensor_state
 from hsv.model.trim import trim

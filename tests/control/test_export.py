@@ -22,10 +22,10 @@ from numpy.testing import assert_array_equal
 
 import hsv.core
 from hsv.base.errors import DesignError
-from hsv.control.c_block import load_block
 from hsv.control.controller import ControllerInput
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.control.export import CORE_HEADERS, NUMBERS, controller_files, design_header, step_bounds
+from hsv.control.library import load_block
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.control.notch_filter import NotchFilter
 from hsv.control.reference_trajectory import ReferenceTrajectory

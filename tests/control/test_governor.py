@@ -10,7 +10,7 @@ from hsv.base.errors import GovernorError
 from hsv.cli.design import govern as govern_command
 from hsv.cli.in_flight import command
 from hsv.control import governor
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.control.governor import (
     AT_REST,
     KEPT_FREE,

@@ -2,7 +2,7 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.control.controller import ControllerInput
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design import find_design, read_design, read_parameters
 from hsv.control.tube_law import TubeLaw
 
 PATH = find_design("baseline")

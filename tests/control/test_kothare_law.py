@@ -3,11 +3,9 @@ import time
 import numpy as np
 import pytest
 
-from hsv.control.design_file import find_design, read_design
-from hsv.control.kothare_law import SOLVE_STEPS, KothareLaw
-from hsv.control.nominal_gain import nominal_gain
-from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalStatus
-from hsv.control.nominal_problem import NominalProblem
+from hsv.control.design import find_design, read_design
+from hsv.control.nominal_gain import NominalProblem, nominal_gain
+from hsv.control.nominal_law import NOT_IN_FAMILY, SOLVE_STEPS, FamilyLaw, KothareLaw, NominalStatus
 from hsv.control.nominal_trajectory import NominalTrajectory, nominal_data
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.model.trim import trim

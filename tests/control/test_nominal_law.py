@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.control.nominal_law import MEMBERSHIP_TOLERANCE, FamilyLaw, NominalStatus
 from hsv.control.nominal_trajectory import nominal_data
 

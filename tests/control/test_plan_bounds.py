@@ -2,8 +2,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design import ControlDesign, find_design, read_design, read_parameters
 
 VALUES = read_parameters(find_design("baseline"))
 

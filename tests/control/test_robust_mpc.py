@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from hsv.base.errors import ParameterError
 from hsv.control.controller import ControllerInput
 from hsv.control.controllers import build_controller
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design import find_design, read_design, read_parameters
 from hsv.control.robust_mpc import RobustMpc
 from hsv.control.tube_law import TubeStatusCode
 

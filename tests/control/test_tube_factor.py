@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import ParameterError
-from hsv.control.tube_factor import certified, compact, scheduled_changes
+from hsv.control.design import certified, compact, scheduled_changes
 
 SCALAR, DIAGONAL = np.full(5, 0.8), np.array([0.8, 0.6, 1.0, 1.0, 1.0])
 

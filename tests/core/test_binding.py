@@ -10,17 +10,16 @@ import pytest
 from flights import components
 
 from hsv.base.errors import ParameterError
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.control.nominal_law import level
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.core import Data, Struct, dtype, ffi, fly, instruction_set, lanes, lib, loop_memory
-from hsv.core.elimination import solve
+from hsv.core.arithmetic import solve
 from hsv.flight.closed_loop import flight_struct
 from hsv.flight.history import History
-from hsv.model.dynamics import derivative, jacobian
+from hsv.model.dynamics import VehicleParameters, derivative, jacobian
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 NOTCH = discretise([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(20.0, 0.05, 21.0, 0.6)], 0.02)
 

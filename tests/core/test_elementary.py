@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from hsv.core.elementary import arcsine, arctangent2, exponential, logarithm, of_each, sine_cosine, tangent
+from hsv.core.arithmetic import arcsine, arctangent2, exponential, logarithm, of_each, sine_cosine, tangent
 
 ANGLE_RANGE, EXPONENT_RANGE, RATIO_RANGE = 1e5, 700.0, 1e140
 

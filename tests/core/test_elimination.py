@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hsv.core.elimination import solve
+from hsv.core.arithmetic import solve
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 9, 40])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from hsv.core import lib
-from hsv.core.noise import normals, philox, uniforms
+from hsv.core.arithmetic import normals, philox, uniforms
 
 WORD = 2**64 - 1
 

@@ -28,31 +28,40 @@ from core_calls import (
     written,
 )
 
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.control.effectiveness import EffectivenessData, effectiveness_along, effectiveness_data
 from hsv.control.estimator import EstimatorData, steady_gain
 from hsv.control.nominal_law import NominalData, level
 from hsv.control.notch_filter import NotchSection, discretise
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.core import doubles, ffi, lib, vector
-from hsv.core.elementary import arcsine, arctangent2, exponential, logarithm, of_each, sine_cosine, tangent
-from hsv.core.elimination import solve
-from hsv.core.noise import normals, philox, uniforms
+from hsv.core.arithmetic import (
+    arcsine,
+    arctangent2,
+    exponential,
+    logarithm,
+    normals,
+    of_each,
+    philox,
+    sine_cosine,
+    solve,
+    tangent,
+    uniforms,
+)
 from hsv.design.disturbance import Record, decompose
 from hsv.design.error_system import along_filter, lag_response, tube_errors
 from hsv.flight.scenario import load_scenario
 from hsv.model.actuators import actuator_data, actuator_map, actuators_at_rest
 from hsv.model.atmosphere import atmosphere_data, atmosphere_state
-from hsv.model.dynamics import advance, air_relative, derivative, forces, jacobian, vehicle_struct
-from hsv.model.extended import Filter, extended_derivative, extended_jacobian
-from hsv.model.faults.laws import FaultRows, fault_memory, fault_rows
+from hsv.model.dynamics import VehicleParameters, advance, air_relative, derivative, forces, jacobian, vehicle_struct
+from hsv.model.faults.schedule import FaultRows, fault_memory, fault_rows
 from hsv.model.links import LinkData, link_state
 from hsv.model.lpv.actuated import SampledActuators, respond
+from hsv.model.lpv.linearisation import Filter, extended_derivative, extended_jacobian
 from hsv.model.lpv.polytope import Polytope, axis_weights
 from hsv.model.sensors import sensor_data, sensor_state
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 PERIOD = 0.02
 with np.load(Path(__file__).parents[1] / "golden" / "vectors.npz") as file:

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
 from hsv.control.nominal_gain import nominal_gain
-from hsv.control.optimisation.centring import GAP, Unknown, minimise
+from hsv.control.optimisation import GAP, Unknown, minimise
 from hsv.design.baseline import initial_deviation, nominal_problem
 
 

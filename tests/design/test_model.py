@@ -7,8 +7,8 @@ from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import read_inputs
 from hsv.design.model import design_model, polytopic_model
-from hsv.model.extended import Filter, from_true_rate
-from hsv.model.lpv.hull import smallest_weight
+from hsv.model.lpv.linearisation import Filter, from_true_rate
+from hsv.model.lpv.tensor_product import smallest_weight
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"

@@ -5,9 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.control.design_file import find_design, read_design
-from hsv.control.nominal_gain import nested_gains
-from hsv.control.nominal_problem import NominalProblem, certified_cost, decrease_between
+from hsv.control.design import find_design, read_design
+from hsv.control.nominal_gain import NominalProblem, certified_cost, decrease_between, nested_gains
 from hsv.design.baseline import initial_deviation
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from hsv.control.optimisation.rounding import BOUND_DIGITS, outward, rounded, rounded_matrix
+from hsv.control.optimisation import BOUND_DIGITS, outward, rounded, rounded_matrix
 
 
 def test_digits_are_counted_from_the_size_not_the_value():

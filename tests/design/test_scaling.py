@@ -4,7 +4,7 @@ from numpy.testing import assert_allclose
 from scipy.linalg import solve_discrete_are
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.scaling import lqr_whitening
+from hsv.control.optimisation import lqr_whitening
 
 
 def test_riccati_solution_becomes_the_identity(design):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.design.baseline import _literal
 from hsv.design.tightening import check_plan, tighten
 from hsv.model.vehicle import load_vehicle

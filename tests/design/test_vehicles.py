@@ -5,7 +5,7 @@ import json
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design_file import read_design
+from hsv.control.design import read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.design.verification.verifier import load_subject, verify

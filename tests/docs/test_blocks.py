@@ -53,15 +53,17 @@ NEGATIVE = ("hsv run case1_derived_no_notch", "hsv certify")
 """Commands that end with exit code 1, as their page says: the flight diverges, the design is not certified with all."""
 
 SCENARIOS = {
-    ("README.md", 'extends = "case1"'),
-    ("README.md", "[[command]]"),
-    ("README.md", "[sensors]"),
+    ("docs/scenarios.md", 'extends = "case1"'),
+    ("docs/scenarios.md", "[[command]]"),
+    ("docs/scenarios.md", "[sensors]"),
     ("docs/montecarlo.md", 'extends = "case1"'),
 }
 """Blocks that are scenarios, or what of one may be added to Case 1."""
 
 ELSEWHERE = {
     ("README.md", "v1:0669d52ede9cf309349ec3729d9c4c7160e4c8f9d681081827ea43f18398a596"): "tests/docs/test_tutorial.py",
+    ("README.md", "# mine.py"): "tests/docs/test_code_blocks.py",
+    ("README.md", "# mine.toml"): "tests/docs/test_code_blocks.py",
     ("CONTRIBUTING.md", "python3 tools/release.py 1.2.0"): "tests/tools/test_release.py",
     ("docs/airframe.md", "vehicle_carried                  moves with the centre of gravity, stays level"): (
         "tests/graph/test_airframe.py"
@@ -93,8 +95,7 @@ NPM = "npm install --prefix tests/viewers/npm --save-exact plotly.js-basic-dist-
 
 NOT_RUN = {
     ("CONTRIBUTING.md", "make setup"): "sets up what the tests run in",
-    ("CONTRIBUTING.md", "make test"): "runs this test",
-    ("CONTRIBUTING.md", "python3 -m pytest tests/test_noise.py -q"): "make test runs that file",
+    ("CONTRIBUTING.md", "python3 -m pytest tests/core -q"): "make test runs that folder",
     ("README.md", "flowchart LR"): "a diagram",
     ("docs/benchmarks.md", "python3 tools/step_times.py"): "takes minutes; see tests/graph/test_active_law.py",
     ("docs/installation.md", "$ docker build --tag hsv-bench ."): "needs Docker",
@@ -108,7 +109,7 @@ NOT_RUN = {
 }
 """Blocks that no test can run here, and why."""
 
-COMMANDS = ("README.md", "docs/installation.md")
+COMMANDS = ("README.md", "docs/graph.md", "docs/installation.md", "docs/reference/commands.md")
 """Pages of which tests/docs/test_printed_commands.py accounts for every command."""
 
 

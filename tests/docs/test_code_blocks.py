@@ -1,5 +1,7 @@
 """The Python code on pages of the documentation runs, block after block, as a reader would type it."""
 
+import json
+import os
 import re
 import shlex
 import subprocess
@@ -51,6 +53,17 @@ def test_code_of_the_page_runs(page, tmp_path, monkeypatch):
         sys.modules.pop(module, None)
     assert {path.name for path in tmp_path.glob("*.png")} == set(re.findall(r'savefig\("(.*?)"\)', "".join(code)))
     assert names["flight"].status.name == "FINISHED"
+
+
+def test_the_controller_of_the_readme_flies(tmp_path):
+    for block in page_blocks.blocks("README.md"):
+        if block.file:
+            (tmp_path / block.file).write_text(block.text, encoding="utf-8")
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([".", os.environ.get("PYTHONPATH", "")])}
+    command = ["hsv", "simulate", "mine.toml", "--json"]
+    ran = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    assert json.loads(ran.stdout)["metrics"]["altitude_settling_time_s"] < 60.0
 
 
 def test_code_of_the_page_on_the_core_runs_and_its_lines_of_c_are_those_of_the_core(capsys):

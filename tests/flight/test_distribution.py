@@ -8,7 +8,7 @@ import pytest
 import tomli_w
 
 from hsv.base.errors import ScenarioError
-from hsv.base.inheritance import follow_extends
+from hsv.base.files import follow_extends
 from hsv.flight.distribution import KINDS, TRUNCATION, Distribution, standard_quantiles
 from hsv.flight.scenario import parse_scenario, scenario_at_means
 

@@ -5,8 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.control.design_file import find_design, read_parameters
-from hsv.control.design_parameters import digest
+from hsv.control.design import digest, find_design, read_parameters
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.fingerprint import _table, as_published, fingerprint, published_in_words

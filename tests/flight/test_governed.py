@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flights import components
 
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.design.region import region_parameters
 from hsv.flight.closed_loop import fly

@@ -13,9 +13,8 @@ from c_libraries import PROBE, build_probe
 
 from hsv.base.errors import ControllerError, ScenarioError
 from hsv.base.parameters import Parameter
-from hsv.control.c_block import include_folder
 from hsv.control.controller import ControllerInput
-from hsv.control.library import library_digest, library_record
+from hsv.control.library import include_folder, library_digest, library_record
 from hsv.control.library_process import SharedMemory
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly

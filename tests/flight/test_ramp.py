@@ -5,9 +5,9 @@ import pytest
 from flights import components, step_by_step
 from numpy.testing import assert_array_equal
 
+from hsv.base.units import FOOT
 from hsv.flight.closed_loop import fly
 from hsv.flight.metrics import flight_metrics
-from hsv.model.envelope import FOOT
 
 LIKE_EQ_48 = {"nominal.filtered": True, "feedback.tau_minimum": [0.5]}
 TAU = {"feedback.tau": [0.8], "tau_change.starts": [10.0, 30.0], "tau_change.values": [0.6, 0.9]}

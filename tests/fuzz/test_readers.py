@@ -25,8 +25,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.recover import recover
 from hsv.base.errors import CampaignError, HsvError
 from hsv.base.units import parse_quantity
-from hsv.control.certificate import certificate_path
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import certificate_path, find_design, read_design
 from hsv.design.verification.preflight import preflight
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import SerialExecutor

@@ -20,7 +20,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import flown_parameters
 from hsv.bags.replay.engine import replay, rerun
 from hsv.bags.replay.processes import processes_of
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.graph.exclusive import is_published
 
 pytestmark = pytest.mark.graph

@@ -15,8 +15,8 @@ def test_parameter_page_is_up_to_date() -> None:
     assert page == reference(), "run: python -m hsv.graph.reference > docs/parameters.md"
 
 
-def test_readme_names_every_topic_with_its_type_and_ends() -> None:
-    page = (ROOT / "README.md").read_text(encoding="utf-8").partition("| topic | type | from | to |")[2]
+def test_page_names_every_topic_with_its_type_and_ends() -> None:
+    page = (ROOT / "docs" / "graph.md").read_text(encoding="utf-8").partition("| topic | type | from | to |")[2]
     rows = page.lstrip("\n").split("\n\n")[0].splitlines()[1:]
     assert len(rows) == len(TOPICS)
     for row, (topic, kind) in zip(rows, TOPICS.items(), strict=True):

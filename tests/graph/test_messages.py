@@ -22,10 +22,10 @@ from hsv.base.errors import SignalError
 from hsv.control.nominal_law import NominalStatus
 from hsv.control.tube_law import TubeResult, TubeStatusCode
 from hsv.flight.blocks import Signals
-from hsv.model.dynamics import STATE_NAMES
 from hsv.model.faults.schedule import ActiveFault
 from hsv.model.faults.table import Fault
 from hsv.model.plant import FlightStatus
+from hsv.model.signals import STATE_NAMES
 
 PERIOD = 0.02
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from hsv.base.errors import RecordingError
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import parse_scenario, with_controller
 from hsv.graph.preparation import prepare

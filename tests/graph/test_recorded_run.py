@@ -19,7 +19,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import flown_parameters
 from hsv.bags.replay.engine import replay, rerun
 from hsv.bags.replay.processes import processes_of
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design import find_design, read_parameters
 
 pytestmark = pytest.mark.graph
 

@@ -17,7 +17,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.attached import complete_steps, flown_parameters
 from hsv.bags.replay.engine import replay, rerun
 from hsv.bags.replay.processes import processes_of
-from hsv.control.design_file import find_design, read_design, write_design
+from hsv.control.design import find_design, read_design, write_design
 
 pytestmark = pytest.mark.graph
 

@@ -2,7 +2,7 @@ from functools import partial
 
 import pytest
 
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv_paper.adjustable_factor import FINE, growth, is_certified
 from hsv_paper.linear_loop import stability_limit

@@ -1,7 +1,6 @@
 import numpy as np
 
-from hsv.control.certificate import certificate_path, read_certificate
-from hsv.control.design_file import find_design
+from hsv.control.design import certificate_path, find_design, read_certificate
 from hsv_paper.disturbances import largest_disturbances
 
 

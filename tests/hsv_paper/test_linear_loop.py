@@ -4,10 +4,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import find_design, read_design
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import STATE_NAMES
 from hsv.model.sensors import SENSOR_SETS
+from hsv.model.signals import STATE_NAMES
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import Hardware, critical_coupling, crossings, sampled_loop, stability_limit, worst_growth
 from hsv_paper.sensitivity.controllers import WITHOUT_NOTCH, growth

@@ -10,10 +10,10 @@ from scipy.integrate import quad
 from scipy.signal import welch
 
 from hsv.base.errors import ParameterError
+from hsv.base.units import FOOT
 from hsv.core import lib
-from hsv.core.noise import normals
+from hsv.core.arithmetic import normals
 from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data, atmosphere_state
-from hsv.model.envelope import FOOT
 
 T = 0.02
 SPEED = 7900.0 * FOOT

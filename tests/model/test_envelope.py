@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from hsv.model.envelope import FOOT, in_model_range
+from hsv.base.units import FOOT
+from hsv.model.dynamics import in_model_range
 
 ANGLE_LIMIT = 0.35
 CRUISE = np.array([85_500.0 * FOOT, 7_900.0 * FOOT, 0.03, 0.03, 0.0, 0.1, 0.0, 0.1, 0.0])

@@ -5,8 +5,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.control.notch_filter import NotchSection, continuous, series
-from hsv.model.dynamics import N_STATES, jacobian
-from hsv.model.extended import Filter, extended_derivative, extended_jacobian, extended_state, from_true_rate
+from hsv.model.dynamics import jacobian
+from hsv.model.lpv.linearisation import Filter, extended_derivative, extended_jacobian, extended_state, from_true_rate
+from hsv.model.signals import N_STATES
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 

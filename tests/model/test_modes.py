@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from hsv.model.modes import modes
+from hsv.model.lpv.linearisation import modes
 
 
 def test_oscillator_has_its_frequency_and_damping():

@@ -8,11 +8,11 @@ from core_calls import measure
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.model.dynamics import STATE_NAMES
-from hsv.model.envelope import FOOT
-from hsv.model.faults.laws import fault_rows
+from hsv.base.units import FOOT
+from hsv.model.faults.schedule import fault_rows
 from hsv.model.faults.table import SENSOR, Fault
 from hsv.model.sensors import SENSOR_PARAMETERS, SENSOR_SETS, sensor_data, sensor_state
+from hsv.model.signals import STATE_NAMES
 
 T = 0.02
 NEVER = 2**62

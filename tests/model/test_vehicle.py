@@ -9,6 +9,7 @@ import tomli_w
 
 from hsv.base.errors import ParameterError, VehicleError
 from hsv.base.units import parse_quantity
+from hsv.model.dynamics import COEFFICIENT_UNITS, VehicleParameters
 from hsv.model.trim import trim
 from hsv.model.vehicle import (
     VEHICLE_PARAMETERS,
@@ -19,7 +20,6 @@ from hsv.model.vehicle import (
     vehicle_tables,
     vehicle_text,
 )
-from hsv.model.vehicle_parameters import COEFFICIENT_UNITS, VehicleParameters
 
 
 @pytest.mark.parametrize("name", vehicle_names())

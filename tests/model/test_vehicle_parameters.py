@@ -5,8 +5,8 @@ import pytest
 from published_model import DERIVED, FOOT, INERTIA, PAPER_LIKE, SLUG
 
 from hsv.base.errors import QuantityError
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 
 def test_table_is_converted_to_si():

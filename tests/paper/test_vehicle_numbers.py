@@ -8,7 +8,7 @@ import pytest
 
 from hsv.base.units import factor
 from hsv.model.dynamics import jacobian
-from hsv.model.modes import modes
+from hsv.model.lpv.linearisation import modes
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsv.core import Struct, doubles, lib, records, vector
-from hsv.model.faults.laws import FaultRows
+from hsv.model.faults.schedule import FaultRows
 
 _STRUCTS: dict[tuple[str, int], Struct] = {}
 """By the object that each was filled from, which it keeps alive."""

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.control.c_block import load_block
 from hsv.control.controller import STEP_FUNCTION, Controller, ControllerInput, ControllerResult, flat_input
 from hsv.control.design import ControlDesign
 from hsv.control.export import SOURCE, controller_files
+from hsv.control.library import load_block
 from hsv.control.nominal_trajectory import NominalResult
 from hsv.control.notch_filter import NotchResult
 from hsv.control.reference_trajectory import ReferenceTrajectory

@@ -15,7 +15,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.replay.engine import fly
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
-from hsv.control.design_file import find_design, find_file
+from hsv.control.design import find_design, find_file
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import parse_scenario, scenario_text
 

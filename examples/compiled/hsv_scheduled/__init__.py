@@ -4,10 +4,10 @@ import numpy as np
 from numba import cfunc
 from scipy.linalg import solve_discrete_are
 
-from hsv.control.controller import StepKernel
-from hsv.model.lpv.discretisation import zero_order_hold
 from hsv.base.parameters import Parameter, check_all
+from hsv.control.controller import StepKernel
 from hsv.model.dynamics import jacobian
+from hsv.model.lpv.linearisation import zero_order_hold
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 

@@ -3,9 +3,10 @@
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from hsv.model.lpv.discretisation import zero_order_hold
 from hsv.base.parameters import Parameter, check_all
-from hsv.model.dynamics import PITCH_RATE, jacobian
+from hsv.model.dynamics import jacobian
+from hsv.model.lpv.linearisation import zero_order_hold
+from hsv.model.signals import PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 

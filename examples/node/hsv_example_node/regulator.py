@@ -46,8 +46,10 @@ class Regulator(Node):
         fuel, elevator = limited.tolist()
         self.command.publish(
             ControlInput(
-                header=self.filtered.header, step=self.filtered.step,
-                fuel_equivalence_ratio=fuel, elevator_deflection=elevator,
+                header=self.filtered.header,
+                step=self.filtered.step,
+                fuel_equivalence_ratio=fuel,
+                elevator_deflection=elevator,
                 saturated=(limited != wanted).tolist(),
             )
         )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
 from hsv.design.common_lyapunov import common_lyapunov
@@ -22,7 +22,7 @@ from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import Corner
 from hsv.flight.metrics import flight_metrics
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.linear_loop import stability_limit, worst_growth

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.campaign.tube_levels import TubeLevels
 from hsv.flight.corners import Corner

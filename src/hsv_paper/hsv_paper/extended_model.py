@@ -7,8 +7,7 @@ import numpy as np
 from hsv.control.notch_filter import NotchSection, continuous, series
 from hsv.design.inputs import DesignInputs
 from hsv.design.model import polytopic_model
-from hsv.model.extended import Filter, extended_jacobian, extended_state
-from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, zero_order_hold
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from hsv.bags.description import COMPOSED
 from hsv.base.errors import RecordingError, RunError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.closed_loop import fly
 from hsv.flight.metrics import FlightData

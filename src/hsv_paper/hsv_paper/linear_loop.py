@@ -13,14 +13,14 @@ import numpy as np
 from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import brentq
 
+from hsv.base.units import FOOT
 from hsv.control.notch_filter import NotchSection, discretise, with_notch
 from hsv.model.actuators import ActuatorSet
-from hsv.model.dynamics import N_STATES, PITCH_RATE, jacobian
-from hsv.model.envelope import FOOT
+from hsv.model.dynamics import VehicleParameters, jacobian
 from hsv.model.lpv.actuated import held_behind
+from hsv.model.signals import N_STATES, PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 START = (85500.0 * FOOT, 7900.0 * FOOT)
 TARGET = (86100.0 * FOOT, 8150.0 * FOOT)

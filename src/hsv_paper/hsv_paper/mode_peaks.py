@@ -10,8 +10,7 @@ from scipy.signal import find_peaks
 
 from hsv.control.notch_filter import NotchSection, notch_response
 from hsv.model.dynamics import jacobian
-from hsv.model.lpv.frequency import bode
-from hsv.model.modes import Mode, modes
+from hsv.model.lpv.linearisation import Mode, bode, modes
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.bode import pitch_rate_response

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.counter_example import counter_examples
@@ -17,7 +17,7 @@ from hsv.design.sets.star_norms import StarNorms, output_rows
 from hsv.design.verification.checks import gathered
 from hsv.design.verification.invariant_set import certified_set, counter_example_checks, set_checks
 from hsv.design.verification.verifier import load_subject
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 
 def problem_of(vertices, columns, lower, upper):

@@ -7,8 +7,8 @@ from hsv.design.verification.plan import Plan
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
-from hsv.model.dynamics import N_RIGID
 from hsv.model.sensors import sensor_data
+from hsv.model.signals import N_RIGID
 
 
 @pytest.mark.long

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.core.noise import LARGEST
+from hsv.core.arithmetic import LARGEST
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import error_system, tube_errors
 from hsv.design.region import record
@@ -12,7 +12,8 @@ from hsv.design.verification.effects import Measured, air, delayed, with_models
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario
-from hsv.model.dynamics import N_RIGID, N_STATES, PITCH_RATE, advance
+from hsv.model.dynamics import advance
+from hsv.model.signals import N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design
+from hsv.control.design import ControlDesign, find_design
 from hsv.design.results import DESIGNS
 from hsv.design.verification.quick import QUICK
 from hsv.design.verification.tolerances import PARAMETERS, TOLERANCES, entry_size

@@ -7,8 +7,8 @@ from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.design.verification.verdict import Verdict
 from hsv.model.actuators import SUBSTEPS
-from hsv.model.dynamics import INPUT_NAMES
 from hsv.model.lpv.actuated import actuator_system
+from hsv.model.signals import INPUT_NAMES
 from hsv.model.trim import trim
 
 

@@ -8,9 +8,15 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.certificate import certificate_path, read_certificate, write_certificate
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design, read_parameters
+from hsv.control.design import (
+    ControlDesign,
+    certificate_path,
+    find_design,
+    read_certificate,
+    read_design,
+    read_parameters,
+    write_certificate,
+)
 from hsv.design.verification.preflight import preflight
 
 

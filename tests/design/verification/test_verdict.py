@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.design.verification import verdict
 from hsv.design.verification.invariant_set import certified_set
 from hsv.design.verification.verifier import load_subject

@@ -5,8 +5,7 @@ import json
 import pytest
 
 from hsv.base.errors import DesignError
-from hsv.control.certificate import read_certificate, write_certificate
-from hsv.control.design import ControlDesign
+from hsv.control.design import ControlDesign, read_certificate, write_certificate
 from hsv.design.verification.checks import require
 from hsv.design.verification.verifier import verify
 

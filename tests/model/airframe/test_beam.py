@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from published_model import DERIVED, FOOT, SLUG
 
-from hsv.model.airframe.beam import EIGENVALUE, Cantilever
-from hsv.model.airframe.geometry import airframe
+from hsv.model.airframe.geometry import EIGENVALUE, Cantilever, airframe
 
 LENGTHS = (55.0 * FOOT, 45.0 * FOOT)
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.model.actuators import SUBSTEPS, actuator_data, actuators_at_rest
 from hsv.model.dynamics import advance
-from hsv.model.faults.laws import fault_rows
+from hsv.model.faults.schedule import fault_rows
 from hsv.model.faults.table import DYNAMICS, EFFECTOR, Fault
 from hsv.model.plant import Plant
 from hsv.model.trim import trim

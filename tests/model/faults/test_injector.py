@@ -6,11 +6,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.base.timing import first_step
 from hsv.model.faults.injector import FAULT_PARAMETERS, FaultInjector
 from hsv.model.faults.schedule import ActiveFault, ScheduledFault
 from hsv.model.faults.table import COMMAND as COMMAND_SIDE
 from hsv.model.faults.table import FAULT_KINDS, Fault
+from hsv.model.signals import first_step
 
 COMMAND = np.array([0.4, 0.2])
 ELEVATOR = "elevator_deflection"

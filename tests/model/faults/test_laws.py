@@ -9,7 +9,7 @@ from core_calls import begin_faults, command_faults, engine_faults
 from numpy.testing import assert_allclose, assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.model.faults.laws import fault_memory, fault_rows
+from hsv.model.faults.schedule import fault_memory, fault_rows
 from hsv.model.faults.table import (
     CHANNELS,
     COMMAND,

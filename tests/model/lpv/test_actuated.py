@@ -8,7 +8,7 @@ from scipy.signal import lsim, lti
 
 from hsv.model.actuators import ACTUATOR_SETS, actuator_map
 from hsv.model.lpv.actuated import actuator_names, actuator_system, held_behind, respond, sampled_actuators
-from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.linearisation import zero_order_hold
 
 PERIOD = 0.02
 BOTH = (ACTUATOR_SETS["fuel_10"], ACTUATOR_SETS["elevator_50"])

@@ -1,7 +1,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.linearisation import zero_order_hold
 
 
 def test_double_integrator_is_exact():

@@ -3,8 +3,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from hsv.base.errors import DesignError
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.frequency import bode, bode_difference, frequency_response
+from hsv.model.lpv.linearisation import bode, bode_difference, frequency_response, zero_order_hold
 
 A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [4.0]])
 

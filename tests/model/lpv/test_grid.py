@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.grid import grid_polytope, linearise
+from hsv.model.lpv.linearisation import grid_polytope, linearise, zero_order_hold
 from hsv.model.vehicle import load_vehicle
 
 ALTITUDES = np.linspace(*load_vehicle().altitude_range, 4)

@@ -4,7 +4,7 @@ from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 
 from hsv.base.errors import DesignError
-from hsv.model.lpv.hull import hull_weights, relaxed, smallest_weight
+from hsv.model.lpv.tensor_product import hull_weights, relaxed, smallest_weight
 
 BREAKPOINTS = np.linspace(-1.0, 3.0, 21)
 POWERS = np.stack([BREAKPOINTS**k for k in range(1, 5)], axis=1)

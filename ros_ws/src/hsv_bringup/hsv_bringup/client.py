@@ -17,7 +17,7 @@ from rclpy.utilities import remove_ros_args
 
 from hsv.bags.description import PLANT, NodeDescription
 from hsv.base.errors import HsvError, RunError
-from hsv.base.json_text import json_text
+from hsv.base.files import json_text
 from hsv.graph.exclusive import is_published
 from hsv.graph.standstill import Standstill
 from hsv_node import roles

@@ -36,7 +36,7 @@ from hsv.bags.roles import naming
 from hsv.bags.topic import Qos, Topic
 from hsv.bags.writer import BagWriter
 from hsv.base.errors import ParameterError
-from hsv.core.noise import SEED_PARAMETER
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.blocks import Signals
 from hsv.graph.snapshot import Snapshot
 from hsv_bringup.flow_executor import BatchExecutor
@@ -143,7 +143,7 @@ class RecorderNode(PeerNode):
             return
         # Not at the top: the components' tables take their time, and a prepared run does without.
         from hsv.bags.parameter_sections import disagreements
-        from hsv.control.design_parameters import digest
+        from hsv.control.design import digest
         from hsv.graph.preparation import provenance, recorded_files
 
         for words in disagreements(values):

@@ -8,9 +8,7 @@ from rclpy.node import Node
 
 from hsv.base.errors import DesignError
 from hsv.base.parameters import Parameter
-from hsv.control.design import ControlDesign, design_of
-from hsv.control.design_file import find_design, read_parameters
-from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.design import DESIGN_PARAMETERS, ControlDesign, design_of, find_design, read_parameters
 from hsv_node.parameters import declare, given
 
 DEFAULT_DESIGN = "baseline"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hsv.bags.description import NOTCH_FILTER
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import NOTCH_PARAMETERS, NotchFilter
 from hsv.flight.blocks import Signals
 from hsv_node.block import BlockNode

@@ -9,11 +9,9 @@ from rclpy.parameter import Parameter
 
 from hsv.bags.description import TUBE_MPC
 from hsv.base.errors import DesignError, ParameterError
-from hsv.control.certificate import CERTIFICATE_PARAMETERS
 from hsv.control.coverage import uncovered_hardware
-from hsv.control.effectiveness import WATCHED_PARAMETERS
-from hsv.control.effectiveness_parameters import EFFECTIVENESS_ENABLED
-from hsv.control.tube_factor import TAU
+from hsv.control.design import CERTIFICATE_PARAMETERS, TAU
+from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
 from hsv.design.verification.preflight import preflight
 from hsv_ctrl.design import declare_design

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from hsv.bags.description import checked_namespace
-from hsv.base.documents import parse_yaml, read_text
 from hsv.base.errors import ParameterError
+from hsv.base.files import parse_yaml, read_text
 
 _PARAMETERS = "ros__parameters"
 

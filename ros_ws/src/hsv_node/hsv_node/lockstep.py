@@ -19,7 +19,7 @@ from hsv.bags.description import NodeDescription
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.errors import RunError
 from hsv.control.controllers import class_place
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.blocks import Signals
 from hsv_node.messages import message_class
 from hsv_node.parameters import declare, refuse_unknown

@@ -17,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.utilities import remove_ros_args
 
 from hsv.base.errors import HsvError, ParameterError
-from hsv.base.interruption import ignore_ctrl_c_at_end
+from hsv.base.processes import ignore_ctrl_c_at_end
 from hsv_node.arguments import check_names, shared_parameters
 from hsv_node.ending import ends_with
 from hsv_node.middleware import prefer_profiles

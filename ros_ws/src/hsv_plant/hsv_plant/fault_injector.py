@@ -10,10 +10,10 @@ from hsv_msgs.srv import ClearFault, InjectFault
 from hsv.bags.description import CLEAR_FAULT, COMMAND, FAULT_INJECTOR, INJECT_FAULT, controller_node
 from hsv.bags.messages import fault_in, stamp_in, stamp_of
 from hsv.base.errors import ParameterError
-from hsv.base.timing import NEVER, first_step
 from hsv.flight.blocks import Signals
 from hsv.model.faults.injector import FAULT_PARAMETERS, LINK_PARAMETERS, FaultInjector
 from hsv.model.links import command_link
+from hsv.model.signals import NEVER, first_step
 from hsv_node.block import BlockNode
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle

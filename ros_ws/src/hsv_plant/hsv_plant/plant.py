@@ -33,8 +33,8 @@ from hsv.bags.messages import StepMessages, stamp_of
 from hsv.base.errors import SignalError
 from hsv.flight.blocks import VEHICLE, Signals
 from hsv.graph.standstill import Standstill
-from hsv.model.dynamics import INPUT_NAMES
 from hsv.model.plant import FlightStatus, Plant
+from hsv.model.signals import INPUT_NAMES
 from hsv_node.lockstep import LINK_LOOK, LockstepNode, run_in_words, short_id, step_in_words
 from hsv_node.main import run_node
 from hsv_node.parameters import declare, declare_vehicle, refuse_sim_time

@@ -10,7 +10,7 @@ from hsv.bags.columns import Columns
 from hsv.bags.description import ACTUATOR, COMMAND, FORCES, MEASUREMENT, STATE
 from hsv.bags.flight import input_columns, state_columns
 from hsv.bags.reader import Bag
-from hsv.model.dynamics import INPUT_NAMES, STATE_NAMES
+from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 CALM_AIR = {"wind_forward": 0.0, "wind_up": 0.0, "density_factor": 1.0}
 """Fields of the air, with their values in calm air."""

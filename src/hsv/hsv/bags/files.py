@@ -11,8 +11,8 @@ import lz4.frame
 import zstandard
 
 from hsv.bags.metadata import file_names, read_metadata
-from hsv.base.documents import read_bytes
 from hsv.base.errors import DocumentError, RecordingError
+from hsv.base.files import read_bytes
 
 COMPRESSIONS = {b"\x28\xb5\x2f\xfd": "zstd", b"\x04\x22\x4d\x18": "lz4"}
 """Beginning of compressed data; neither an MCAP file nor a message in CDR begins like this."""

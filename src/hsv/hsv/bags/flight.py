@@ -12,7 +12,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.metrics import FlightData
-from hsv.model.dynamics import STATE_NAMES
+from hsv.model.signals import STATE_NAMES
 
 
 def labels(bags: Sequence[Bag]) -> list[str]:

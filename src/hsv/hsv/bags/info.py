@@ -15,15 +15,15 @@ from hsv.bags.flight import flight_fingerprint, input_columns
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.bags.reader import Bag
 from hsv.bags.steps import complete_stamps, cut_off, joined
-from hsv.base.documents import parse_json
 from hsv.base.errors import HsvError, ParameterError, RecordingError
+from hsv.base.files import parse_json
 from hsv.control.coverage import uncovered
 from hsv.control.design import design_of
 from hsv.flight.fingerprint import as_published
 from hsv.flight.scenario import Scenario, parse_scenario
-from hsv.model.dynamics import INPUT_NAMES
 from hsv.model.faults.table import FAULT_KINDS, SENSOR
 from hsv.model.faults.table import fault_parameters as parameters_of
+from hsv.model.signals import INPUT_NAMES
 
 
 def describe(bag: Bag) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from hsv.base.parameters import Parameter
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.estimator import ESTIMATOR_ENABLED
 
 LOCKSTEP_PARAMETERS = (
     Parameter("recorder", True, "whether the graph has a recorder"),

@@ -26,12 +26,10 @@ from hsv.bags.description import CARRIED, CLOCK, TOPICS, TUBE_STATUS, WIRE_ALIGN
 from hsv.bags.fields import blank, fields_of
 from hsv.bags.typestore import message_types
 from hsv.base.errors import ParameterError, RunError, SignalError
-from hsv.base.timing import NEVER
 from hsv.flight.blocks import LOOP
 from hsv.model import signals as types
 from hsv.model.airframe.pose import LEVEL
-from hsv.model.dynamics import N_INPUTS, N_STATES
-from hsv.model.signals import VARYING, SignalType
+from hsv.model.signals import N_INPUTS, N_STATES, NEVER, VARYING, SignalType
 
 if TYPE_CHECKING:
     from hsv.flight.blocks import Signals

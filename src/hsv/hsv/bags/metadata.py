@@ -9,8 +9,8 @@ from typing import Any
 
 import yaml
 
-from hsv.base.documents import parse_yaml, read_text
 from hsv.base.errors import DocumentError
+from hsv.base.files import parse_yaml, read_text
 
 CUSTOM_DATA = "custom_data"
 """Name of the MCAP metadata records that hold the custom data; a later record adds to the earlier ones."""

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.model.dynamics import N_RIGID, STATE_NAMES
+from hsv.model.signals import N_RIGID, STATE_NAMES
 
 OVERVIEW_TOPIC = "/hsv/overview"
 OVERVIEW_TYPE = "hsv.Overview"

@@ -8,9 +8,7 @@ from typing import Any, Self
 
 import yaml
 
-from hsv.control.design_file import parse_sections
-from hsv.control.design_parameters import DESIGN_PARAMETERS
-from hsv.control.tube_factor import TAU
+from hsv.control.design import DESIGN_PARAMETERS, TAU, parse_sections
 
 _ALL = "/**"
 

@@ -6,8 +6,8 @@ import json
 from collections.abc import Mapping
 
 from hsv.bags.description import OTHER_TOPICS, ROOT, STATE, TOPICS, resolved
-from hsv.base.documents import parse_json
 from hsv.base.errors import DocumentError, RecordingError
+from hsv.base.files import parse_json
 
 NAMESPACE_KEY, REMAPPED_KEY = "namespace", "remapped"
 """Under which a bag says it in its custom data: the namespace of the graph and, as JSON, by role, the names of topics

@@ -20,7 +20,7 @@ from hsv.bags.steps import joined
 from hsv.base.errors import RecordingError
 from hsv.model.airframe.pose import Sample
 from hsv.model.airframe.scene import RATE, SCENE_TOPIC, TRANSFORMS_TOPIC, frame_transforms, scene
-from hsv.model.dynamics import INPUT_NAMES, STATE_NAMES
+from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 Message = tuple[int, str, bytes]
 """Time in nanoseconds, topic, data."""

@@ -7,8 +7,8 @@ from typing import Any
 
 import yaml
 
-from hsv.base.documents import parse_yaml
 from hsv.base.errors import DocumentError
+from hsv.base.files import parse_yaml
 
 INFINITE = 2**63 - 1
 """An endless duration in nanoseconds; rendered as ROS 2 does: sec 9223372036, nsec 854775807."""

@@ -23,6 +23,9 @@ from hsv.base.errors import QuantityError
 if TYPE_CHECKING:
     import pint
 
+FOOT = 0.3048
+"""Metres in a foot, by definition."""
+
 PAPER_UNITS = {
     "m": "ft",
     "m/s": "ft/s",

@@ -17,10 +17,9 @@ import numpy as np
 
 from hsv.bench.c_build import compiled
 from hsv.bench.figure import Figure, interleaved
-from hsv.control.c_block import load_block
 from hsv.control.controller import ControllerInput, ForeignController, StepKernel
 from hsv.control.export import SOURCE, controller_files
-from hsv.control.library import LibraryController
+from hsv.control.library import LibraryController, load_block
 from hsv.control.tube_law import TubeLaw
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import Components, fly

@@ -9,8 +9,8 @@ from typing import Any
 
 import pydantic
 
-from hsv.base.documents import parse_json, read_text
 from hsv.base.errors import DocumentError, QuantityError
+from hsv.base.files import parse_json, read_text
 from hsv.bench.figure import Figure
 from hsv.bench.machine import hardware, machine
 from hsv.graph.preparation import commit

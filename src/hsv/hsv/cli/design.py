@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from hsv.design.inputs import DesignInputs
     from hsv.design.sets.compare import Row
     from hsv.design.verification.checks import Check
-    from hsv.model.modes import Mode
+    from hsv.model.dynamics import VehicleParameters
+    from hsv.model.lpv.linearisation import Mode
     from hsv.model.trim import Trim
-    from hsv.model.vehicle_parameters import VehicleParameters
 
 ALTITUDE, VELOCITY = "85000 ft", "7702.0808 ft/s"
 """Flight condition at which the literature publishes a trim: the default of trim and linearise."""
@@ -114,7 +114,8 @@ def trim(
 
     Example: hsv trim --altitude "85500 ft" --velocity "7900 ft/s" --units paper
     """
-    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, forces
+    from hsv.model.dynamics import forces
+    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
 
     parameters = load_vehicle(vehicle or DEFAULT_VEHICLE).coupled(coupling)
@@ -153,11 +154,10 @@ def linearise(
     import numpy as np
 
     from hsv.control.notch_filter import continuous, default_sections, series
-    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS, jacobian
-    from hsv.model.extended import Filter, extended_jacobian, extended_state
-    from hsv.model.modes import modes
+    from hsv.model.dynamics import MODELS, jacobian
+    from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, modes
+    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.model.vehicle import DEFAULT_VEHICLE, load_vehicle
-    from hsv.model.vehicle_parameters import MODELS
 
     if model not in (*MODELS, "ECM"):
         raise QuantityError(f"model = {model!r}: expected one of {', '.join((*MODELS, 'ECM'))}")
@@ -258,8 +258,7 @@ def design(
 
     Example: hsv design baseline; hsv design adjustable --tau 0.8 --out softer.yaml; hsv design baseline --check
     """
-    from hsv.control.certificate import certificate_path, write_certificate
-    from hsv.control.design_file import write_design
+    from hsv.control.design import certificate_path, write_certificate, write_design
     from hsv.design.adjustable import design_adjustable
     from hsv.design.baseline import design_baseline
     from hsv.design.inputs import find_inputs, read_inputs, with_tau
@@ -360,8 +359,8 @@ def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
     """Return the seven steps of Algorithm 1 with their results."""
     import numpy as np
 
-    from hsv.control.tube_factor import compact
-    from hsv.model.dynamics import STATE_UNITS
+    from hsv.control.design import compact
+    from hsv.model.signals import STATE_UNITS
 
     feedback, tube, adjustable = report["feedback"], report["tube"], report["adjustable"]
     accuracy, model = report["model"]["accuracy"], report["model"]
@@ -418,7 +417,7 @@ def verify(
 
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
-    from hsv.control.design_file import find_design
+    from hsv.control.design import find_design
     from hsv.design.verification.scenario import bounding_corners, scenario_checks
     from hsv.design.verification.verifier import load_subject
     from hsv.design.verification.verifier import verify as recompute
@@ -499,7 +498,7 @@ def certify(
 
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
-    from hsv.control.design_file import find_design
+    from hsv.control.design import find_design
     from hsv.design.verification.declared import declared, declared_actuators, described
     from hsv.design.verification.verdict import certified_with
     from hsv.design.verification.verifier import load_subject
@@ -554,7 +553,7 @@ def govern(
     """
     from hsv.base.units import parse_quantity
     from hsv.flight.governed import governed
-    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
     if out:
         check_new(out, "out", force)
@@ -605,7 +604,7 @@ def export_controller(
 
     Example: hsv export-controller baseline --out controller
     """
-    from hsv.control.design_file import find_design, read_design
+    from hsv.control.design import find_design, read_design
     from hsv.control.export import controller_files, step_bounds
 
     loaded = read_design(find_design(design))
@@ -636,6 +635,6 @@ def include() -> None:
 
     Example: hsv include
     """
-    from hsv.control.c_block import include_folder
+    from hsv.control.library import include_folder
 
     print(include_folder())

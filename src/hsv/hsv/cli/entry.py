@@ -6,7 +6,7 @@ import os
 import sys
 from typing import Any, NamedTuple
 
-from hsv.base.interruption import take_interrupts
+from hsv.base.processes import take_interrupts
 
 DESCRIPTION = "Fly a flexible air-breathing hypersonic vehicle under Tube-MPC, software in the loop."
 

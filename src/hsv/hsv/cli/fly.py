@@ -150,8 +150,7 @@ def simulate(
     import numpy as np
 
     from hsv.cli.summary import FlightSummary, report_flight
-    from hsv.control.design_file import find_design, read_design
-    from hsv.control.design_parameters import digest
+    from hsv.control.design import digest, find_design, read_design
     from hsv.flight.assembly import assemble_flight, blamed_on
     from hsv.flight.closed_loop import fly
     from hsv.flight.coverage import uncovered_of

@@ -121,8 +121,8 @@ def _list_controllers(name: str, json: bool) -> None:
 
 
 def _list_faults(name: str, units: UnitSystem, json: bool) -> None:
-    from hsv.model.dynamics import STATE_NAMES
     from hsv.model.faults.table import FAULT_KINDS
+    from hsv.model.signals import STATE_NAMES
 
     _known(Kind.faults, name, FAULT_KINDS)
     kinds: dict[str, dict[str, Any]] = {

@@ -243,7 +243,7 @@ def _fault(units: UnitSystem, fault: dict[str, Any]) -> str:
 
 def _equipment(equipment: dict[str, Any] | None, units: UnitSystem) -> dict[str, str]:
     """Return a line for each kind of equipment that is not ideal."""
-    from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+    from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
     from hsv.pages.report.panels import AIR_PANELS
 
     if equipment is None:

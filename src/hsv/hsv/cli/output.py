@@ -20,7 +20,7 @@ from rich.table import Table
 from rich.text import Text
 
 from hsv.base.errors import ParameterError, reason
-from hsv.base.json_text import json_text
+from hsv.base.files import json_text
 from hsv.base.units import UnitSystem, in_system, significant, unit_in
 
 if TYPE_CHECKING:

@@ -253,7 +253,7 @@ def _print_campaign(results: Results, units: UnitSystem) -> None:
 
 def sample_words(sample: Mapping[str, float], units: UnitSystem) -> str:
     """Return a sample (SI; uncertain parameters are relative changes) on one line."""
-    from hsv.model.vehicle_parameters import COEFFICIENT_UNITS
+    from hsv.model.dynamics import COEFFICIENT_UNITS
 
     relative = COEFFICIENT_UNITS if units is UnitSystem.metric else ()
     return ", ".join(

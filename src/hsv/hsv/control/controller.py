@@ -32,8 +32,8 @@ import numpy as np
 from hsv.base.errors import ControllerError, ParameterError, RunError
 from hsv.base.parameters import Parameter
 from hsv.model import signals
-from hsv.model.dynamics import INPUT_NAMES, N_INPUTS
-from hsv.model.vehicle_parameters import VehicleParameters
+from hsv.model.dynamics import VehicleParameters
+from hsv.model.signals import INPUT_NAMES, N_INPUTS
 
 if TYPE_CHECKING:
     from hsv.control.design import ControlDesign

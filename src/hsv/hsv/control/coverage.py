@@ -18,14 +18,14 @@ from hsv.base.parameters import Parameter, check_all
 from hsv.base.units import UnitSystem, to_paper
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.notch_filter import flown_sections
 from hsv.model.actuators import ACTUATOR_PARAMETERS, ACTUATOR_SETS, IDEAL
 from hsv.model.atmosphere import ATMOSPHERE_PARAMETERS, atmosphere_data
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 from hsv.model.faults.table import fault_parameters
 from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, MEASUREMENT_LINK_PARAMETERS
 from hsv.model.sensors import FIELDS, SENSOR_PARAMETERS, sensor_data
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 from hsv.model.vehicle import Vehicle
 
 _LINK_PARAMETERS = (*MEASUREMENT_LINK_PARAMETERS, *COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER)

@@ -1,23 +1,251 @@
-"""A controller design: the numbers that fly, one object from its file to the controller."""
+"""A controller design: its parameters, the numbers that fly, its file and its certificate."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import yaml
 
-from hsv.base.errors import DesignError, ParameterError
-from hsv.base.parameters import check_all
-from hsv.control.design_parameters import DESIGN_PARAMETERS, brings_design, digest, positive, samples, shaped
-from hsv.control.notch_filter import NotchSection, discretise, flown_sections
-from hsv.control.plan_bounds import PlanBounds
-from hsv.control.tube_factor import TAU, TAU_MINIMUM, certified, compact, rigid_factors
-from hsv.control.tube_set import TubeSet
+from hsv.base.errors import DesignError, DocumentError, ParameterError, did_you_mean
+from hsv.base.files import parse_json, parse_yaml, read_text
+from hsv.base.parameters import Parameter, check_all
+from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
-from hsv.model.lpv.polytope import Polytope, axis_weights
+from hsv.model.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, first_step
+
+FACTORS = "one value, or one for each rigid state"
+
+TAU = Parameter("feedback.tau", [1.0], f"adjustable factor of the feedback gain: {FACTORS}", "", 0.0, 1.0)
+TAU_MINIMUM = Parameter("feedback.tau_minimum", [1.0], f"least certified factor, up to 1: {FACTORS}", "", 0.0, 1.0)
+
+_SAME_SHARE = 1e-9
+"""Difference of two shares that is rounding."""
+
+TAU_CHANGE_PARAMETERS = (
+    Parameter("tau_change.starts", [], "simulated times at which feedback.tau changes, in order", "s", 0.0),
+    Parameter("tau_change.values", [], f"factor from then on: {FACTORS}, a change after the other", "", 0.0, 1.0),
+)
+
+
+def rigid_factors(values: Sequence[float], name: str) -> np.ndarray:
+    """Return the factor of each rigid state (5) from one ``values`` for all or five.
+
+    Raises:
+        ParameterError: Another number of them, or one that is not above zero.
+    """
+    tau = np.array(values, float)
+    if tau.shape not in ((1,), (N_RIGID,)):
+        raise ParameterError(f"parameter {name}: {tau.size} values, expected 1 or {N_RIGID}")
+    if not np.all(tau > 0.0):
+        raise ParameterError(f"parameter {name} = {tau.tolist()}: expected values above zero")
+    return np.broadcast_to(tau, N_RIGID).copy()
+
+
+def certified(values: Sequence[float], minimum: np.ndarray, name: str = TAU.name) -> np.ndarray:
+    """Return the factors (5) in ``values`` if they lie on the way from their certified ``minimum`` (5) to 1.
+
+    Between the two closed loops everything is certified, by one Lyapunov function; a factor that is small in one
+    dimension and large in another is not between them.
+
+    Raises:
+        ParameterError: Names the value that does not, and the range.
+    """
+    tau = rigid_factors(values, name)
+    outside = np.flatnonzero(~((tau >= minimum) & (tau <= 1.0)))
+    # One value for a range that differs by dimension: the range of any one of them would mislead.
+    blurred = len(values) == 1 and np.ptp(minimum) > 0.0
+    for index in [] if blurred else outside[:1]:
+        place = f"[{index}]" if len(values) > 1 else ""
+        low = float(minimum[index])
+        expected = f"{low:g} to 1, the certified range" if low < 1.0 else "1: no other factor is certified"
+        raise ParameterError(f"parameter {name}{place} = {tau[index]:g}: expected {expected} (feedback.tau_minimum)")
+    lessened = minimum < 1.0
+    share = (1.0 - tau[lessened]) / (1.0 - minimum[lessened])
+    if outside.size or (share.size and np.ptp(share) > _SAME_SHARE):
+        raise ParameterError(
+            f"parameter {name} = {tau.tolist()}: expected factors that are all the same share of the way from 1 to "
+            f"{compact(minimum).tolist()} (feedback.tau_minimum), no others are certified"
+        )
+    return tau
+
+
+def compact(tau: np.ndarray) -> np.ndarray:
+    """Return the one value of ``tau`` (5) if all are equal, else all five."""
+    return tau[:1].copy() if np.all(tau == tau[0]) else tau.copy()
+
+
+def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: float) -> list[tuple[int, np.ndarray]]:
+    """Return first step and factors (5) of each change in :data:`TAU_CHANGE_PARAMETERS`.
+
+    Raises:
+        ParameterError: Arrays that do not match, times that decrease, or a factor that is not certified.
+    """
+    v = check_all(TAU_CHANGE_PARAMETERS, values)
+    starts, flat = v["tau_change.starts"], v["tau_change.values"]
+    if len(flat) not in (len(starts), N_RIGID * len(starts)):
+        raise ParameterError(
+            f"parameter tau_change.values: {len(flat)} values, expected {len(starts)} or {N_RIGID * len(starts)}"
+        )
+    if starts != sorted(starts):
+        raise ParameterError(f"parameter tau_change.starts = {starts}: expected times that do not decrease")
+    rows = np.reshape(flat, (len(starts), -1)).tolist() if starts else []
+    return [
+        (first_step(start, period), certified(row, minimum, f"tau_change.values[{index}]"))
+        for index, (start, row) in enumerate(zip(starts, rows, strict=True))
+    ]
+
+
+def change_parameters(changes: Sequence[tuple[int, np.ndarray]], period: float) -> dict[str, list[float]]:
+    """Return ``changes`` as :data:`TAU_CHANGE_PARAMETERS`."""
+    return {
+        "tau_change.starts": [start * period for start, _ in changes],
+        "tau_change.values": [float(value) for _, tau in changes for value in tau],
+    }
+
+
+@dataclass(frozen=True)
+class TubeSet:
+    """c + {v: v' P v <= 1} for errors of the rigid states and the notch filter (n), SI.
+
+    ``centre`` c (n), ``shape`` P (n, n), ``half_width`` z (n) of the box around it.
+    """
+
+    centre: np.ndarray
+    shape: np.ndarray
+    half_width: np.ndarray
+
+    def farthest(self, error: np.ndarray) -> str:
+        """Return the name of the component of e - c that is largest for its half-width."""
+        index = int(np.argmax(np.abs(error - self.centre) / self.half_width))
+        return STATE_NAMES[index] if index < N_RIGID else f"filter_{index - N_RIGID + 1}"
+
+
+@dataclass(frozen=True)
+class PlanBounds:
+    """Bounds of the total nominal input u_r + u_n and of the nominal pitch acceleration, SI.
+
+    ``input_minimum`` and ``input_maximum`` (2): U minus F Z, beyond which the feedback may find no room.
+    ``region_minimum`` and ``region_maximum`` (3: both inputs, pitch acceleration): what the certified plans reach. The
+    disturbance set is that of flights along those plans; a plan that moves more disturbs more.
+    """
+
+    input_minimum: np.ndarray
+    input_maximum: np.ndarray
+    region_minimum: np.ndarray
+    region_maximum: np.ndarray
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Least inputs (2) inside both."""
+        return np.maximum(self.input_minimum, self.region_minimum[:2])
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Largest inputs (2) inside both."""
+        return np.minimum(self.input_maximum, self.region_maximum[:2])
+
+    @property
+    def pitch_acceleration(self) -> tuple[float, float]:
+        """Least and largest rate of change of the nominal pitch rate, rad/s^2."""
+        return float(self.region_minimum[2]), float(self.region_maximum[2])
+
+
+DESIGN_PARAMETERS = (
+    Parameter("design.name", "", "name of the design"),
+    Parameter("design.hash", "", "digest of all other parameters of the design, as it was written"),
+    *DESIGN_NOTCH_PARAMETERS,
+    Parameter("model.a", [], "state matrices A_i of all vertices, row by row, altitude-major (SI, discrete time)"),
+    Parameter("model.b", [], "input matrices B_i of all vertices, row by row, altitude-major (SI, discrete time)"),
+    Parameter("scheduling.interpolation", "linear", "weights between breakpoints", choices=INTERPOLATIONS),
+    Parameter("scheduling.altitude.breakpoints", [], "altitudes at which weights are given", "m"),
+    Parameter("scheduling.altitude.weights", [], "weights of the vertices in altitude, a row per breakpoint"),
+    Parameter("scheduling.velocity.breakpoints", [], "velocities at which weights are given", "m/s"),
+    Parameter("scheduling.velocity.weights", [], "weights of the vertices in velocity, a row per breakpoint"),
+    Parameter("feedback.gain", [], "auxiliary feedback gain F, 2 x 9, row by row (SI)"),
+    TAU,
+    TAU_MINIMUM,
+    Parameter("nominal.filtered", False, "feedback on q_f minus the filtered nominal pitch rate (paper eq. 48)"),
+    Parameter("nominal.gains", [], "nominal gains K, each 2 x 9, row by row, outermost ellipsoid first (SI)"),
+    Parameter("nominal.ellipsoids", [], "P of x' P x <= 1 on the rigid states, each 5 x 5, outermost first (SI)"),
+    Parameter("nominal.interpolated", False, "whether the gain is interpolated between two ellipsoids, or switched"),
+    Parameter("design.coupling", "", "set of inertial coupling for which the tube is certified"),
+    Parameter("design.actuators", "", "actuators for which the tube is certified, by name; empty: ideal ones"),
+    Parameter("design.vehicle", "", "digest of the vehicle of the design; empty: the default one"),
+    Parameter("tube.centre", [], "centre c of the invariant set: five rigid states, then the notch filter's (SI)"),
+    Parameter("tube.shape", [], "P of (e - c)' P (e - c) <= 1, row by row (SI); empty: the design has no set"),
+    Parameter("tube.half_width", [], "half-widths z of the invariant set about its centre (SI)"),
+    Parameter("nominal.state_scale", [], "rigid deviations (5) that weigh equally in the nominal cost (SI)"),
+    Parameter("nominal.input_scale", [], "fuel equivalence ratio (-) and elevator deflection (rad) that weigh as much"),
+    Parameter("nominal.input_bound", [], "largest |u_n| of the nominal gains: fuel (-), elevator (rad)"),
+    Parameter("nominal.input_minimum", [], "least u_r + u_n, U minus F Z: fuel (-), elevator (rad)"),
+    Parameter("nominal.input_maximum", [], "largest u_r + u_n, U minus F Z: fuel (-), elevator (rad)"),
+    Parameter("nominal.region_minimum", [], "least fuel (-), elevator (rad), pitch rad/s^2, that W covers"),
+    Parameter("nominal.region_maximum", [], "largest fuel (-), elevator (rad), pitch rad/s^2, that W covers"),
+    Parameter("input.minimum", [], "least fuel equivalence ratio (-) and elevator deflection (rad)"),
+    Parameter("input.maximum", [], "largest fuel equivalence ratio (-) and elevator deflection (rad)"),
+)
+"""Parameters of a design, as declared by the nodes."""
+
+NO_DESIGN = "none"
+"""Name of the design in the parameters of a node that flies without one: nodes have a default."""
+
+
+def brings_design(values: Mapping[str, Any]) -> bool:
+    """Tell whether there is a design in the flat parameters of a flight."""
+    if values.get("design.name") == NO_DESIGN:
+        return False
+    flown_with_any = {parameter.name for parameter in (*DESIGN_NOTCH_PARAMETERS, TAU)}
+    return any(parameter.name in values for parameter in DESIGN_PARAMETERS if parameter.name not in flown_with_any)
+
+
+def digest(values: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a design's flat parameters.
+
+    Left out are ``design.hash``, ``feedback.tau``, which may be anything certified, and what is empty or as if absent.
+    """
+    known = {p.name for p in DESIGN_PARAMETERS} - {"design.hash", TAU.name}
+    absent = {TAU_MINIMUM.name: TAU_MINIMUM.default, "nominal.filtered": False, "nominal.interpolated": False}
+    said = {name: values[name] for name in sorted(known & values.keys()) if values[name] != absent.get(name, "")}
+    text = json.dumps({name: value for name, value in said.items() if value != []})
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def shaped(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the array of a parameter; a size of -1 follows from its length.
+
+    Raises:
+        DesignError: It has another number of values.
+    """
+    array = np.array(values[name], float)
+    unit = int(np.prod([n for n in shape if n > 0]))
+    if array.size == 0 or (array.size % unit if -1 in shape else array.size != unit):
+        expected = f"a multiple of {unit}" if -1 in shape else str(unit)
+        raise DesignError(f"parameter {name}: {array.size} values, expected {expected}")
+    return np.ascontiguousarray(array.reshape(shape))
+
+
+def positive(values: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the same, of values above zero."""
+    array = shaped(values, name, shape)
+    if not np.all(array > 0.0):
+        raise DesignError(f"parameter {name} = {array.tolist()}: expected values above zero")
+    return array
+
+
+def samples(values: Mapping[str, Any], axis: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return breakpoints (n) and weights (n, v) along an axis of scheduling."""
+    breakpoints = np.array(values[f"{axis}.breakpoints"], float)
+    if len(breakpoints) < 2:
+        raise DesignError(f"parameter {axis}.breakpoints: {len(breakpoints)} values, expected at least 2")
+    return breakpoints, shaped(values, f"{axis}.weights", (len(breakpoints), -1))
 
 
 @dataclass(frozen=True)
@@ -243,3 +471,182 @@ def _check_stable(name: str, polytope: Polytope, gain: np.ndarray) -> None:
                 f"parameter {name}: spectral radius {radius:.6f} of the closed loop at vertex {vertex}, "
                 "expected below 1"
             )
+
+
+_SHIPPED = Path(__file__).parents[1] / "designs"
+"""In a checkout a link to ``offline_design``, in an installed package a folder of its own."""
+
+_DESIGN_NAMES = [parameter.name for parameter in DESIGN_PARAMETERS]
+
+
+def write_design(path: Path, design: ControlDesign, comment: str) -> None:
+    """Write ``design`` as ROS 2 parameter YAML for all nodes, with ``comment`` lines on top."""
+    tree: dict[str, Any] = {}
+    for name, value in design.to_parameters().items():
+        *groups, leaf = name.split(".")
+        branch = tree
+        for group in groups:
+            branch = branch.setdefault(group, {})
+        branch[leaf] = value
+    header = "".join(f"# {line}\n" for line in comment.splitlines())
+    body = yaml.dump({"/**": {"ros__parameters": tree}}, sort_keys=False, default_flow_style=None, width=120)
+    path.write_text(header + body, encoding="utf-8")
+
+
+def read_parameters(path: Path, node: str = "") -> dict[str, Any]:
+    """Return the flat parameters for ``node`` in a ROS 2 parameter YAML: its own section over the one for all nodes.
+
+    Raises:
+        DesignError: The file is missing or is not parameter YAML.
+    """
+    try:
+        text = read_text(path)
+    except DocumentError as error:
+        raise DesignError(f"design {str(path)!r}: {error}, expected a parameter file") from error
+    return parse_parameters(text, str(path), node)
+
+
+def parse_parameters(text: str, source: str, node: str = "") -> dict[str, Any]:
+    """Return the flat parameters in the ``text`` of a parameter YAML, as :func:`read_parameters`.
+
+    Raises:
+        DesignError: The text is not parameter YAML; the message names ``source``.
+    """
+    sections = parse_sections(text, source)
+    flat: dict[str, Any] = {}
+    for section in ("/**", node, f"/{node}"):
+        flat |= sections.get(section, {})
+    if not flat:
+        raise _no_parameters(source)
+    return flat
+
+
+def parse_sections(text: str, source: str) -> dict[str, dict[str, Any]]:
+    """Return the flat parameters of every section in the ``text`` of a parameter YAML, ``"/**"`` for all nodes.
+
+    Raises:
+        DesignError: See :func:`parse_parameters`.
+    """
+    try:
+        tree = parse_yaml(text)
+    except DocumentError as error:
+        raise DesignError(f"design {source!r}: {error}, expected ROS 2 parameters in YAML") from error
+    sections: dict[str, dict[str, Any]] = {}
+    for section, branch in tree.items() if isinstance(tree, dict) else ():
+        if isinstance(branch, dict) and isinstance(branch.get("ros__parameters"), dict):
+            flat = sections.setdefault(str(section), {})
+            for name, value in _flattened(branch["ros__parameters"], ""):
+                if name in flat:
+                    raise DesignError(f"design {source!r}: parameter {name} occurs twice, expected once")
+                flat[name] = value
+    if not any(sections.values()):
+        raise _no_parameters(source)
+    return sections
+
+
+def _no_parameters(source: str) -> DesignError:
+    return DesignError(f"design {source!r}: expected ROS 2 parameters ('/**': 'ros__parameters': ...)")
+
+
+def read_design(path: Path) -> ControlDesign:
+    """Return the design in a parameter file; errors name the file and the parameter (see :class:`ControlDesign`)."""
+    values = read_parameters(path)
+    try:
+        for name in values:
+            if name not in _DESIGN_NAMES:
+                raise DesignError(
+                    f"parameter {name}: unknown, expected those of a design{did_you_mean(name, _DESIGN_NAMES)}"
+                )
+        return ControlDesign.from_parameters(values)
+    except DesignError as error:
+        raise DesignError(f"{path}: {error}") from error
+
+
+def find_design(name: str) -> Path:
+    """Return the parameter file of a design given by path, or by name: in ``HSV_DESIGN_PATH``, or a shipped one.
+
+    Raises:
+        DesignError: No such file.
+    """
+    return find_file(name, ".yaml")
+
+
+def find_file(name: str, suffix: str) -> Path:
+    """Return a design's file of the given ``suffix``; see :func:`find_design`."""
+    if "/" in name or name.endswith(suffix):
+        candidates = [Path(name)]
+    else:
+        folders = [Path(folder) for folder in os.environ.get("HSV_DESIGN_PATH", "").split(os.pathsep) if folder]
+        candidates = [folder / f"{name}{suffix}" for folder in (*folders, _SHIPPED.resolve())]
+    for candidate in candidates:
+        if candidate.is_file():
+            return candidate
+    raise DesignError(
+        f"design = {name!r}: no such file, expected the path of a {suffix} file, a name in HSV_DESIGN_PATH or of a "
+        "shipped one"
+    )
+
+
+def _flattened(branch: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    for name, value in branch.items():
+        if isinstance(value, dict):
+            yield from _flattened(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+CERTIFICATE_PARAMETERS = (
+    Parameter("design.certificate", "", "certificate for checking the design; empty: that of the design with its name"),
+)
+"""Parameters of the node that checks the design before a flight."""
+
+
+def certificate_path(design_file: Path) -> Path:
+    """Return where the certificate of a parameter file lies: ``baseline.yaml`` has ``baseline.certificate.json``."""
+    return design_file.with_suffix(".certificate.json")
+
+
+def find_certificate(design: str, named: str = "") -> Path | None:
+    """Return the certificate ``named``, by default the one of the design's own file; None if there is none.
+
+    Args:
+        design: Name of the design, or path of its parameter file.
+        named: Path of a certificate; not looked for.
+    """
+    if named:
+        return Path(named)
+    try:
+        path = certificate_path(find_design(design))
+    except DesignError:
+        return None
+    return path if path.is_file() else None
+
+
+def write_certificate(path: Path, report: dict[str, Any]) -> None:
+    """Write the report of a design; the same report gives the same bytes."""
+    path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_certificate(path: Path) -> dict[str, Any]:
+    """Return the report of a design.
+
+    Raises:
+        DesignError: The file is missing or is not a certificate.
+    """
+    try:
+        report = parse_json(read_text(path))
+    except DocumentError as error:
+        raise DesignError(f"{path}: {error}, expected a design certificate in JSON") from error
+    if not isinstance(report, dict) or not {"inputs", "feedback", "nominal", "tube"} <= report.keys():
+        raise DesignError(f"{path}: expected a design certificate with inputs, feedback, nominal and tube")
+    return report
+
+
+def design_files(design: Path) -> dict[str, str]:
+    """Return the attachments of a bag that belong to its design, by name: parameters and certificate."""
+    return {"design.yaml": read_text(design)} | attached_certificate(certificate_path(design))
+
+
+def attached_certificate(path: Path | None) -> dict[str, str]:
+    """Return the attachment of a bag that is the certificate, by name; none without one."""
+    return {"certificate.json": read_text(path)} if path and path.is_file() else {}

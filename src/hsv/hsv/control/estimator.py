@@ -19,20 +19,38 @@ from typing import Self
 import numpy as np
 
 from hsv.base.errors import DesignError, ParameterError
-from hsv.base.parameters import check_all
-from hsv.control.estimator_parameters import (
-    ESTIMATOR_ENABLED,
-    ESTIMATOR_PARAMETERS,
-    NOISE_PARAMETERS,
-    PROCESS_PARAMETERS,
-)
+from hsv.base.parameters import Parameter, check_all
 from hsv.core import Data, doubles, lib, vector
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, jacobian
-from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
+from hsv.model.dynamics import VehicleParameters, jacobian
 from hsv.model.sensors import SENSOR_PARAMETERS, sensor_data
-from hsv.model.trim import Trim
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_RIGID, N_STATES, STATE_NAMES, STATE_UNITS
+from hsv.model.trim import INITIAL_PARAMETERS, Trim, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS
-from hsv.model.vehicle_parameters import VehicleParameters
+
+ESTIMATOR_ENABLED = Parameter(
+    "estimator.enabled", False, "true: the controller receives an estimate instead of the measurement"
+)
+
+_DRIVING = (7e-3, 7e-2, 2e-5, 7e-7, 7e-5, 7e-3, 7e-2, 7e-3, 7e-2, 7e-4, 1e-2)
+_ESTIMATED = tuple(zip((*STATE_NAMES, *INPUT_NAMES), (*STATE_UNITS, *INPUT_UNITS), strict=True))
+
+NOISE_PARAMETERS = tuple(
+    Parameter(f"estimator.noise.{name}", 0.0, "standard deviation of the measurement; 0: the sensor's", unit, 0.0, 1e6)
+    for name, unit in _ESTIMATED[:N_RIGID]
+)
+PROCESS_PARAMETERS = tuple(
+    Parameter(
+        f"estimator.process.{name}",
+        driving,
+        "noise that drives the state, after one second" if name in STATE_NAMES else "the same, of the input's offset",
+        f"{unit}/s^0.5",
+        1e-12,
+        1e6,
+    )
+    for (name, unit), driving in zip(_ESTIMATED, _DRIVING, strict=True)
+)
+ESTIMATOR_PARAMETERS = (ESTIMATOR_ENABLED, *NOISE_PARAMETERS, *PROCESS_PARAMETERS)
+
 
 N_ESTIMATED = N_STATES + N_INPUTS
 """The states and an offset of each input."""
@@ -60,7 +78,7 @@ class EstimatorData(Data):
 def estimator_data(
     values: Mapping[str, object], noise: np.ndarray, vehicle: VehicleParameters, start: Trim, period: float
 ) -> EstimatorData:
-    """Return the estimator that :data:`hsv.control.estimator_parameters.ESTIMATOR_PARAMETERS` describe.
+    """Return the estimator that :data:`hsv.control.estimator.ESTIMATOR_PARAMETERS` describe.
 
     Args:
         values: Parameters.

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.c_block import include_folder
 from hsv.control.design import ControlDesign
+from hsv.control.library import include_folder
 from hsv.control.nominal_trajectory import nominal_data
 from hsv.control.tube_law import TubeLaw
 from hsv.core import Struct, ffi
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 
 SOURCE = "controller.c"
 NUMBERS = "design.h"

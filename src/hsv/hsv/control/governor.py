@@ -17,16 +17,15 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import GovernorError, TrimError
-from hsv.control.design import ControlDesign
+from hsv.control.design import ControlDesign, PlanBounds
 from hsv.control.nominal_law import NominalData
 from hsv.control.nominal_trajectory import LAWS, NominalTrajectory
-from hsv.control.plan_bounds import PlanBounds
 from hsv.control.reference_trajectory import TRIMS, Corner, ReferenceTrajectory
 from hsv.core import doubles, lib, vector
 from hsv.model.actuators import ActuatorData, actuator_data
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
+from hsv.model.dynamics import VehicleParameters
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
 from hsv.model.vehicle import Vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 LONGEST = 600.0
 """Length of a leg (s) that is given up: a slower one leaves no more room to speak of."""

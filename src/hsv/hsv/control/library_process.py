@@ -19,12 +19,14 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from multiprocessing.connection import Connection, Pipe
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from hsv.base.errors import ProcessError
-from hsv.control.c_block import CBlock
+
+if TYPE_CHECKING:
+    from hsv.control.library import CBlock
 
 NO_PROGRESS = 20.0
 """Time, s, after which a step, or loading, that does not come to its end is given up."""

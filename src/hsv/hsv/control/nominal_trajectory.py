@@ -10,13 +10,13 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
 from hsv.control.design import ControlDesign, design_of
-from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, NominalData, NominalLaw, NominalStatus
+from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, KothareLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
 from hsv.control.reference_trajectory import REFERENCE_PARAMETERS, ReferenceTrajectory
 from hsv.core import doubles, lib
 from hsv.model.actuators import ACTUATOR_PARAMETERS
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.lpv.polytope import AxisWeights, PolytopeData
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 LAWS = ("family", "kothare_online", "qp")
@@ -150,13 +150,10 @@ def nominal_data(design: ControlDesign) -> NominalData:
 
 
 def _law(values: Mapping[str, Any], design: ControlDesign, reference: ReferenceTrajectory) -> NominalLaw | None:
-    # Each law brings a solver that takes time to import and that the others do not need.
     if values["nominal.law"] == "kothare_online":
-        from hsv.control.kothare_law import KothareLaw
-
         return KothareLaw(design, nominal_data(design))
     if values["nominal.law"] == "qp":
-        from hsv.control.qp_law import QpLaw
+        from hsv.control.qp_law import QpLaw  # its solver takes time to import
 
         return QpLaw(design, nominal_data(design), reference)
     return None

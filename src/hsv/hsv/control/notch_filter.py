@@ -11,12 +11,10 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
-from hsv.control.estimator import Estimator
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.estimator import ESTIMATOR_ENABLED, Estimator
 from hsv.core import Data, doubles, lib
-from hsv.core.elementary import tangent
-from hsv.core.elimination import solve
-from hsv.model.dynamics import PITCH_RATE
+from hsv.core.arithmetic import solve, tangent
+from hsv.model.signals import PITCH_RATE
 
 MAX_SECTIONS = 4
 

@@ -15,7 +15,7 @@ from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, LawResult, NominalData, NominalStatus
 from hsv.control.reference_trajectory import ReferenceTrajectory
-from hsv.model.dynamics import N_RIGID, PITCH_RATE
+from hsv.model.signals import N_RIGID, PITCH_RATE
 
 BLOCKS = 30
 """Blocks of the horizon, c constant in each."""

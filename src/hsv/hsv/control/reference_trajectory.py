@@ -30,10 +30,10 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
 from hsv.core import Data, doubles, lib, vector
-from hsv.model.dynamics import N_INPUTS, N_STATES, vehicle_struct
+from hsv.model.dynamics import VehicleParameters, vehicle_struct
+from hsv.model.signals import N_INPUTS, N_STATES
 from hsv.model.trim import CONVERGED, INITIAL_GUESS, check_equilibrium
 from hsv.model.vehicle import Vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 
 TRIMS = ("climbing", "static")
 

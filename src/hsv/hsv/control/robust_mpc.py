@@ -14,7 +14,7 @@ from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.control.tube_law import TubeData, TubeResult, TubeStatusCode, tube_memory, tube_step
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 ROBUST_MPC_PARAMETERS = (
     Parameter("robust_mpc.gain_index", 0, "which of nominal.gains: 0 the outermost, -1 the last", "", -64, 63),

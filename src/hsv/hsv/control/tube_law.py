@@ -20,15 +20,15 @@ from hsv.base.errors import SignalError
 from hsv.base.parameters import Parameter, check_all
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
-from hsv.control.design import ControlDesign
+from hsv.control.design import TAU, TAU_CHANGE_PARAMETERS, ControlDesign, certified, compact, scheduled_changes
 from hsv.control.effectiveness import (
+    EFFECTIVENESS_PARAMETERS,
     WATCHED_PARAMETERS,
     Effectiveness,
     EffectivenessData,
     effectiveness_data,
     effectiveness_in,
 )
-from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
 from hsv.control.nominal_law import level
 from hsv.control.notch_filter import (
     FLOWN_NOTCH_PARAMETERS,
@@ -37,11 +37,10 @@ from hsv.control.notch_filter import (
     discretise,
     flown_sections,
 )
-from hsv.control.tube_factor import TAU, TAU_CHANGE_PARAMETERS, certified, compact, scheduled_changes
 from hsv.core import Data, doubles, dtype, lib, records, vector
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES
+from hsv.model.dynamics import VehicleParameters
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER
-from hsv.model.vehicle_parameters import VehicleParameters
 
 
 class TubeStatusCode(IntEnum):

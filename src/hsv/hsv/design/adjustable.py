@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_gain import nominal_gain
 from hsv.design.baseline import (
@@ -29,7 +29,7 @@ from hsv.design.inputs import AdjustableInputs, DesignInputs
 from hsv.design.region import Region, incomplete_share
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
 from hsv.design.tube_problem import channel_model
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 
 

@@ -9,9 +9,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.centring import Unknown, minimise
-from hsv.control.optimisation.lmi import SolverReport, spectral_radii
-from hsv.control.optimisation.rounding import rounded_matrix
+from hsv.control.optimisation import SolverReport, Unknown, minimise, rounded_matrix, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
 
 _CONDITION = 1e3

@@ -6,9 +6,8 @@ import numpy as np
 
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import continuous, series
-from hsv.model.dynamics import N_RIGID, N_STATES
-from hsv.model.extended import Filter, extended_jacobian, extended_state
-from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.linearisation import Filter, extended_jacobian, extended_state, zero_order_hold
+from hsv.model.signals import N_RIGID, N_STATES
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 

@@ -23,14 +23,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.control.notch_filter import NotchData
-from hsv.control.optimisation.rounding import outward
+from hsv.control.optimisation import outward
 from hsv.core import doubles, lib
 from hsv.design.error_system import along_filter, lag_response, tube_errors
-from hsv.model.dynamics import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.lpv.actuated import SampledActuators, respond
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.grid import linearise
+from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 

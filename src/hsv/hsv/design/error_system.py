@@ -21,9 +21,9 @@ import numpy as np
 from hsv.control.notch_filter import NotchData, with_notch
 from hsv.core import doubles, lib, vector
 from hsv.model.actuators import ActuatorSet
-from hsv.model.dynamics import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
 from hsv.model.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
 from hsv.model.lpv.polytope import Polytope
+from hsv.model.signals import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
 
 
 @dataclass(frozen=True)

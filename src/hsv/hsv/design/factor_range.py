@@ -12,13 +12,13 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.design import ControlDesign
-from hsv.control.optimisation.rounding import BOUND_DIGITS, rounded
+from hsv.control.optimisation import BOUND_DIGITS, rounded
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.error_system import ErrorSystem, error_system
 from hsv.design.sets.ellipsoid_set import from_report
 from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube_problem import bounding_factors, channel_model, tube_problem
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle
 
 

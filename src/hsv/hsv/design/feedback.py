@@ -8,10 +8,17 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.centring import Unknown, minimise
-from hsv.control.optimisation.lmi import SolverReport, spectral_radii
-from hsv.control.optimisation.rounding import GAIN_DIGITS, rounded, rounded_matrix
-from hsv.control.optimisation.scaling import Whitening, lqr_whitening
+from hsv.control.optimisation import (
+    GAIN_DIGITS,
+    SolverReport,
+    Unknown,
+    Whitening,
+    lqr_whitening,
+    minimise,
+    rounded,
+    rounded_matrix,
+    spectral_radii,
+)
 from hsv.design.lyapunov import lyapunov_residuals
 
 METHODS = ("guaranteed_cost", "feasibility")

@@ -17,9 +17,9 @@ from hsv.control.notch_filter import continuous, series
 from hsv.design.coupled_poles import largest_real_parts
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs
-from hsv.model.dynamics import N_RIGID, N_STATES, PITCH_RATE
-from hsv.model.extended import Filter, from_true_rate
+from hsv.model.lpv.linearisation import Filter, from_true_rate
 from hsv.model.lpv.polytope import Polytope
+from hsv.model.signals import N_RIGID, N_STATES, PITCH_RATE
 
 
 def full_state_report(

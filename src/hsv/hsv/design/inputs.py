@@ -18,13 +18,12 @@ from pydantic import (
     model_validator,
 )
 
-from hsv.base.documents import parse_toml, read_text
 from hsv.base.errors import DesignError, DocumentError, QuantityError
-from hsv.base.inheritance import follow_extends, is_path
+from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.units import parse_quantity
-from hsv.control.design_file import find_file
+from hsv.control.design import find_file
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle, load_vehicle
 
 _SI = "SI"

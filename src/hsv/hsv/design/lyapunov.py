@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.lmi import smallest_eigenvalues
+from hsv.control.optimisation import smallest_eigenvalues
 
 
 def lyapunov_residuals(closed_loop: np.ndarray, N: np.ndarray, name: str) -> np.ndarray:

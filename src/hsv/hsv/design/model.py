@@ -11,15 +11,22 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.notch_filter import NotchSection, continuous, series
-from hsv.control.optimisation.rounding import VERTEX_DIGITS, rounded
+from hsv.control.optimisation import VERTEX_DIGITS, rounded
 from hsv.design.inputs import ModelInputs
-from hsv.model.dynamics import N_STATES
-from hsv.model.extended import Filter, from_true_rate
 from hsv.model.lpv.accuracy import model_accuracy, off_grid
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.grid import Linearised, grid_polytope, linearise, linearise_extended, sample
+from hsv.model.lpv.linearisation import (
+    Filter,
+    Linearised,
+    from_true_rate,
+    grid_polytope,
+    linearise,
+    linearise_extended,
+    sample,
+    zero_order_hold,
+)
 from hsv.model.lpv.polytope import Polytope
 from hsv.model.lpv.tensor_product import tensor_product
+from hsv.model.signals import N_STATES
 from hsv.model.vehicle import Vehicle
 
 _POINTS = 46

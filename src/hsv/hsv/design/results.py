@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from hsv.base.units import to_paper
-from hsv.control.certificate import certificate_path, read_certificate
-from hsv.control.design_file import find_design
+from hsv.control.design import certificate_path, find_design, read_certificate
 
 DESIGNS = (
     "baseline",

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.plan_bounds import PlanBounds
+from hsv.control.design import PlanBounds
 from hsv.design.sets.invariant_set import InvariantSet
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 _KEPT_OFF = 0.05
 """Share of the input ranges of the certified plans; without it the acceleration channel reaches 1.02 of its bound."""

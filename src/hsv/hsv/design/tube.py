@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.progress import Progress
-from hsv.control.design import ControlDesign
-from hsv.control.plan_bounds import PlanBounds
-from hsv.control.tube_set import TubeSet
+from hsv.base.processes import Progress
+from hsv.control.design import ControlDesign, PlanBounds, TubeSet
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
@@ -28,7 +26,7 @@ from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tigh
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import flight_metrics
-from hsv.model.dynamics import PITCH_RATE
+from hsv.model.signals import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
 """Size and seed of the sampling evidence."""

@@ -10,8 +10,8 @@ from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_ch
 from hsv.design.error_system import error_system, union
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.model.actuators import ACTUATOR_SETS, ActuatorSet
-from hsv.model.dynamics import N_RIGID
 from hsv.model.lpv.actuated import sampled_actuators
+from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle
 
 

@@ -10,9 +10,7 @@ from typing import Any
 from hsv.base.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
 from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
-from hsv.control.design import ControlDesign, design_of
-from hsv.control.design_file import find_design, read_design, read_parameters
-from hsv.control.tube_factor import TAU
+from hsv.control.design import TAU, ControlDesign, design_of, find_design, read_design, read_parameters
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario

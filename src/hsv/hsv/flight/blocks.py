@@ -18,8 +18,7 @@ from hsv.base.errors import HsvError
 from hsv.control.controller import CONTROLLER_INPUTS, Controller, ControllerInput, ControllerResult
 from hsv.control.controllers import build_controller
 from hsv.model import signals as types
-from hsv.model.dynamics import N_INPUTS, PITCH_RATE
-from hsv.model.signals import SignalType
+from hsv.model.signals import N_INPUTS, PITCH_RATE, SignalType
 
 if TYPE_CHECKING:  # a node imports its own component alone
     from hsv.base.parameters import Parameter

@@ -23,11 +23,10 @@ from hsv.control.tube_law import no_tube
 from hsv.core import Callback, Struct, ffi
 from hsv.flight.flight import Flight, flight_of
 from hsv.flight.history import History
-from hsv.model.dynamics import N_INPUTS, N_STATES
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.table import COMMAND
 from hsv.model.plant import Plant, PlantFaults
-from hsv.model.signals import VARYING
+from hsv.model.signals import N_INPUTS, N_STATES, VARYING
 
 
 @dataclass

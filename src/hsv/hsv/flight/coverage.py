@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hsv.control.certificate import certificate_path, read_certificate
 from hsv.control.coverage import uncovered
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design
+from hsv.control.design import ControlDesign, certificate_path, find_design, read_certificate
 from hsv.flight.scenario import Scenario
 
 

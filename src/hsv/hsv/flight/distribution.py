@@ -15,7 +15,7 @@ import numpy as np
 
 from hsv.base.errors import QuantityError
 from hsv.base.units import parse_quantity, rounded
-from hsv.core.elementary import logarithm, of_each
+from hsv.core.arithmetic import logarithm, of_each
 
 KINDS = {"uniform": "[least, largest]", "normal": "[mean, standard deviation]"}
 """The distributions by the word that a file has for them, with their two values."""

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hsv.base.timing import NEVER
 from hsv.control.reference_trajectory import ReferenceTrajectory
 from hsv.flight.fingerprint import fingerprint
 from hsv.flight.history import History
 from hsv.flight.metrics import FlightData, flight_metrics
-from hsv.model.envelope import in_model_range
+from hsv.model.dynamics import in_model_range
 from hsv.model.plant import FlightStatus
+from hsv.model.signals import NEVER
 
 if TYPE_CHECKING:
     from hsv.flight.closed_loop import Components

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.model.dynamics import N_INPUTS, N_STATES
+from hsv.model.signals import N_INPUTS, N_STATES
 
 X, Q_F, X_N, U_N, U, ACTUATOR, FLOWN = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
 """First columns of x, q_f, x_n, u_n, the command u and what reaches the actuators in the rows of

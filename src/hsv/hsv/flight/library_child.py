@@ -24,9 +24,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hsv.base.errors import HsvError, ProcessError
-from hsv.control.c_block import CBlock, load_block
 from hsv.control.controller import call_step_function
-from hsv.control.library import LibraryController
+from hsv.control.library import CBlock, LibraryController, load_block
 from hsv.control.library_process import SharedMemory, use_in_this_process
 from hsv.flight.closed_loop import Components, fly_into
 from hsv.flight.history import History

@@ -16,14 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsv.base.errors import HsvError, ParameterError, RunError
-from hsv.base.threads import ctrl_c_held_back
+from hsv.base.processes import ctrl_c_held_back
 from hsv.control.controller import Controller, ControllerInput
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import Components, fly
 from hsv.flight.flight import Flight
 from hsv.flight.history import SIGNALS, History
 from hsv.flight.scenario import Scenario, load_scenario, scenario_names
-from hsv.model.dynamics import PITCH_RATE
+from hsv.model.signals import PITCH_RATE
 
 FLOWN_BY_DEFAULT = "case1"
 """The scenario of a controller that is given without one."""

@@ -13,17 +13,16 @@ from typing import Annotated, Any
 import tomli_w
 from pydantic import Field, StrictInt, ValidationError
 
-from hsv.base.documents import parse_toml, read_text
 from hsv.base.errors import DocumentError, HsvError, ParameterError, ScenarioError, did_you_mean
-from hsv.base.inheritance import follow_extends, is_path
+from hsv.base.files import follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import table_values
 from hsv.base.units import parse_quantity
 from hsv.control.controllers import SHIPPED_CONTROLLERS
-from hsv.control.effectiveness_parameters import EFFECTIVENESS_PARAMETERS
-from hsv.control.estimator_parameters import ESTIMATOR_PARAMETERS
+from hsv.control.design import TAU, rigid_factors
+from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
+from hsv.control.estimator import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
-from hsv.control.tube_factor import TAU, rigid_factors
-from hsv.core.noise import SEED_PARAMETER
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.commands import Breakpoints, CommandTable, breakpoints, check_envelope
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.fields import Reading, Table, Time

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hsv import core
-from hsv.base.threads import over_threads
+from hsv.base.processes import over_threads
 from hsv.core import Struct, lanes
 from hsv.flight.closed_loop import Components, flight_struct, fly, is_ideal
 from hsv.flight.flight import Flight, flight_of

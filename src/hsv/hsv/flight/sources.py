@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TypeVar
 
-from hsv.control.design_file import find_design
+from hsv.control.design import find_design
 from hsv.flight.scenario import load_scenario, scenario_text
 
 Result = TypeVar("Result")

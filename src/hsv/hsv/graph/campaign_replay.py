@@ -12,8 +12,8 @@ import numpy as np
 
 from hsv.bags.description import TUBE_STATUS
 from hsv.base.errors import CampaignError, ControllerError
-from hsv.control.design_file import find_design, read_parameters
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.design import find_design, read_parameters
+from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.flight.campaign.flight_reader import FlightReading
 from hsv.flight.campaign.sample_runner import Outcome
 from hsv.flight.campaign.summary import Results

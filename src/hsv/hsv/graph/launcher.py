@@ -29,7 +29,7 @@ from hsv.bags.description import (
     resolved,
 )
 from hsv.base.errors import RunError
-from hsv.base.interruption import end_with_parent, uninterrupted
+from hsv.base.processes import end_with_parent, uninterrupted
 from hsv.graph.exclusive import claim_namespace, is_published, ros_domain
 from hsv.graph.placement import CHAIN, share_processor
 from hsv.graph.snapshot import Snapshot

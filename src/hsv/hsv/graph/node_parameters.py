@@ -5,9 +5,8 @@ from __future__ import annotations
 from hsv.bags.description import LIVE, RECORDER, ROBUST_MPC, TUBE_MPC
 from hsv.bags.infrastructure_parameters import LIVE_PARAMETERS, PACE_PARAMETERS, RECORDER_PARAMETERS
 from hsv.base.parameters import Parameter
-from hsv.control.certificate import CERTIFICATE_PARAMETERS
 from hsv.control.controllers import controller_class
-from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.design import CERTIFICATE_PARAMETERS, DESIGN_PARAMETERS
 from hsv.flight.blocks import FAULT_INJECTOR, NOMINAL_TRAJECTORY, NOTCH_FILTER, VEHICLE
 
 

@@ -15,10 +15,17 @@ from hsv.bags.description import COMPOSED, CONTROLLER, LIVE, NodeDescription, co
 from hsv.bags.infrastructure_parameters import STEP_TIMEOUT
 from hsv.bags.parameter_sections import ParameterSections
 from hsv.base.errors import ParameterError, QuantityError, RecordingError, RunError
-from hsv.control.certificate import attached_certificate, design_files, find_certificate
 from hsv.control.controllers import NODE
-from hsv.control.design_file import find_design, read_design
-from hsv.control.design_parameters import DESIGN_PARAMETERS, NO_DESIGN, digest
+from hsv.control.design import (
+    DESIGN_PARAMETERS,
+    NO_DESIGN,
+    attached_certificate,
+    design_files,
+    digest,
+    find_certificate,
+    find_design,
+    read_design,
+)
 from hsv.control.library import library_digest, library_record
 from hsv.flight.assembly import assemble_flight, blamed_on, own_parameters
 from hsv.flight.scenario import Scenario, parse_scenario, scenario_text, with_controller

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from hsv.bags.description import CARRIED
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.base.parameters import Parameter
-from hsv.control.design_parameters import DESIGN_PARAMETERS
+from hsv.control.design import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
 from hsv.flight.blocks import LOOP
 from hsv.graph.node_parameters import NODE_PARAMETERS

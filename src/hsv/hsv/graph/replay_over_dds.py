@@ -13,7 +13,7 @@ from hsv.bags.replay.attached import estimated
 from hsv.bags.replay.engine import ProcessComparison, compare_process, require
 from hsv.bags.replay.processes import processes_of
 from hsv.base.errors import RecordingError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.graph.launcher import Launcher, parameter_arguments
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
 from hsv.core import ffi, lib
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, N_INPUTS
-from hsv.model.vehicle_parameters import VehicleParameters
+from hsv.model.dynamics import VehicleParameters
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS
 
 SUBSTEPS = 4
 """Substeps of a control period, if an actuator is not ideal."""

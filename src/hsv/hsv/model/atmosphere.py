@@ -12,8 +12,8 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
-from hsv.base.timing import first_step
-from hsv.model.envelope import FOOT
+from hsv.base.units import FOOT
+from hsv.model.signals import first_step
 
 _LENGTH = 1750.0 * FOOT
 """Scale of turbulence above 2000 ft (MIL-F-8785C)."""

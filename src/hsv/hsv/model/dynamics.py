@@ -1,39 +1,153 @@
-"""Equations of motion of the vehicle (paper eq. 1 to eq. 4), see ``core/vehicle.h``.
+"""Equations of motion of the vehicle (paper eq. 1 to eq. 4) and their parameters, see ``core/vehicle.h``.
 
-State x (9): altitude m, velocity m/s, angle of attack rad, pitch angle rad, pitch rate rad/s, elastic coordinate 1
-(kg^0.5 m) and its rate, elastic coordinate 2 and its rate. Input u (2): fuel equivalence ratio, elevator rad.
+The order of the state x (9) and the input u (2) is that of :mod:`hsv.model.signals`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hsv.base.errors import QuantityError
 from hsv.core import Struct, doubles, ffi, lib, vector
-from hsv.model.vehicle_parameters import VehicleParameters
+from hsv.model.signals import N_INPUTS, N_STATES
 
-STATE_NAMES = (
-    "altitude",
-    "velocity",
-    "angle_of_attack",
-    "pitch_angle",
-    "pitch_rate",
-    "elastic_coordinate_1",
-    "elastic_rate_1",
-    "elastic_coordinate_2",
-    "elastic_rate_2",
+MODELS = ("CM", "DM")
+"""Coupled model (paper eq. 1) and decoupled model (paper eq. 4)."""
+
+COEFFICIENTS: dict[str, dict[str, str]] = {
+    "rigid_body": {"mass": "kg", "moment_of_inertia": "kg m^2", "gravity": "m/s^2"},
+    "geometry": {"reference_area": "m^2", "mean_aerodynamic_chord": "m", "thrust_moment_arm": "m"},
+    "atmosphere": {"reference_density": "kg/m^3", "reference_altitude": "m", "density_scale_height": "m"},
+    "lift": dict.fromkeys(("lift_alpha", "lift_elevator", "lift_zero"), "1"),
+    "drag": dict.fromkeys(
+        ("drag_alpha_squared", "drag_alpha", "drag_elevator_squared", "drag_elevator", "drag_zero"), "1"
+    ),
+    "pitching_moment": dict.fromkeys(("moment_alpha_squared", "moment_alpha", "moment_zero", "moment_elevator"), "1"),
+    "thrust": {f"thrust_beta_{i}": "N" for i in range(1, 9)},
+    "elastic_modes": {
+        "elastic_force_1_alpha_squared": "N/kg^0.5",
+        "elastic_force_1_alpha": "N/kg^0.5",
+        "elastic_force_1_zero": "N/kg^0.5",
+        "elastic_force_2_alpha_squared": "N/kg^0.5",
+        "elastic_force_2_alpha": "N/kg^0.5",
+        "elastic_force_2_elevator": "N/kg^0.5",
+        "elastic_force_2_zero": "N/kg^0.5",
+        "damping_ratio_1": "1",
+        "damping_ratio_2": "1",
+        "natural_frequency_1": "rad/s",
+        "natural_frequency_2": "rad/s",
+    },
+}
+"""SI units of the coefficients of the equations of motion, by the tables of a vehicle file."""
+
+COEFFICIENT_UNITS = {name: unit for table in COEFFICIENTS.values() for name, unit in table.items()}
+"""All of them, in the order of :class:`VehicleParameters`, which ends with inertial coupling and limits."""
+
+POSITIVE = frozenset(
+    {
+        "mass",
+        "moment_of_inertia",
+        "gravity",
+        "reference_area",
+        "mean_aerodynamic_chord",
+        "reference_density",
+        "density_scale_height",
+        "natural_frequency_1",
+        "natural_frequency_2",
+    }
 )
-STATE_UNITS = ("m", "m/s", "rad", "rad", "rad/s", "kg^0.5 m", "kg^0.5 m/s", "kg^0.5 m", "kg^0.5 m/s")
-INPUT_NAMES = ("fuel_equivalence_ratio", "elevator_deflection")
-INPUT_UNITS = ("1", "rad")
+"""Coefficients that are above zero in any vehicle."""
 
-N_STATES = len(STATE_NAMES)
-N_INPUTS = len(INPUT_NAMES)
-N_RIGID = 5
-"""The first five states are those of the rigid body."""
-PITCH_RATE = STATE_NAMES.index("pitch_rate")
+
+class VehicleParameters(NamedTuple):
+    """All constants of the equations of motion and the limits of inputs and angles, SI (kg, m, s, N, rad).
+
+    Field names are those of a vehicle file, :mod:`hsv.model.vehicle`; the shipped ones are slices 0.3048 m deep. A
+    named tuple, so that compiled functions take it.
+    """
+
+    mass: float
+    moment_of_inertia: float
+    gravity: float
+    reference_area: float
+    mean_aerodynamic_chord: float
+    thrust_moment_arm: float
+    reference_density: float
+    reference_altitude: float
+    density_scale_height: float
+    lift_alpha: float
+    lift_elevator: float
+    lift_zero: float
+    drag_alpha_squared: float
+    drag_alpha: float
+    drag_elevator_squared: float
+    drag_elevator: float
+    drag_zero: float
+    moment_alpha_squared: float
+    moment_alpha: float
+    moment_zero: float
+    moment_elevator: float
+    thrust_beta_1: float
+    thrust_beta_2: float
+    thrust_beta_3: float
+    thrust_beta_4: float
+    thrust_beta_5: float
+    thrust_beta_6: float
+    thrust_beta_7: float
+    thrust_beta_8: float
+    elastic_force_1_alpha_squared: float
+    elastic_force_1_alpha: float
+    elastic_force_1_zero: float
+    elastic_force_2_alpha_squared: float
+    elastic_force_2_alpha: float
+    elastic_force_2_elevator: float
+    elastic_force_2_zero: float
+    damping_ratio_1: float
+    damping_ratio_2: float
+    natural_frequency_1: float
+    natural_frequency_2: float
+    inertial_coupling_1: float
+    inertial_coupling_2: float
+    fuel_equivalence_ratio_minimum: float
+    fuel_equivalence_ratio_maximum: float
+    elevator_deflection_minimum: float
+    elevator_deflection_maximum: float
+    angle_limit: float
+
+    @property
+    def input_minimum(self) -> np.ndarray:
+        """Least fuel equivalence ratio and elevator deflection (rad): the lower ends of U (paper eq. 29)."""
+        return np.array([self.fuel_equivalence_ratio_minimum, self.elevator_deflection_minimum])
+
+    @property
+    def input_maximum(self) -> np.ndarray:
+        """Largest fuel equivalence ratio and elevator deflection (rad): the upper ends of U (paper eq. 29)."""
+        return np.array([self.fuel_equivalence_ratio_maximum, self.elevator_deflection_maximum])
+
+    def decoupled(self) -> VehicleParameters:
+        """Return the decoupled model (paper eq. 4): the coupled one without inertial coupling."""
+        return self._replace(inertial_coupling_1=0.0, inertial_coupling_2=0.0)
+
+    def perturbed(self, perturbation: Mapping[str, float]) -> VehicleParameters:
+        """Return the vehicle with relative changes applied, e.g. ``{"mass": 0.1}`` for +10 %.
+
+        Raises:
+            QuantityError: An unknown parameter, or a change that is not finite or not above -100 %.
+        """
+        changes = {}
+        for name, change in perturbation.items():
+            if name not in COEFFICIENT_UNITS:
+                expected = ", ".join(COEFFICIENT_UNITS)
+                raise QuantityError(f"perturbation.{name} = {change!r}: no such parameter, expected one of {expected}")
+            if not (math.isfinite(change) and change > -1.0):
+                raise QuantityError(f"perturbation.{name} = {change!r}: expected a finite relative change above -1")
+            changes[name] = getattr(self, name) * (1.0 + change)
+        return self._replace(**changes)
 
 
 @lru_cache(maxsize=64)
@@ -138,3 +252,8 @@ def advance(
 
 def _conditions(conditions: np.ndarray | None) -> Any:
     return ffi.NULL if conditions is None else doubles(vector(conditions), lib.CONDITIONS)
+
+
+def in_model_range(x: np.ndarray, angle_limit: float) -> bool:
+    """Return whether the state ``x`` (9) is finite and its angles (rad) are within the range of the curve fits."""
+    return bool(lib.hsv_in_model_range(doubles(vector(x), 9), angle_limit))

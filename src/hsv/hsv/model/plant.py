@@ -12,7 +12,7 @@ import numpy as np
 
 from hsv.base.parameters import Parameter, check_all
 from hsv.core import Data, Struct, doubles, lib, vector
-from hsv.core.noise import SEED_PARAMETER
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.model.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, ActuatorData, actuator_data, actuators_at_rest
 from hsv.model.atmosphere import (
     ATMOSPHERE_PARAMETERS,
@@ -20,12 +20,9 @@ from hsv.model.atmosphere import (
     atmosphere_data,
     atmosphere_state,
 )
-from hsv.model.dynamics import N_INPUTS, N_STATES, forces
-from hsv.model.envelope import in_model_range
-from hsv.model.faults.laws import FaultRows, fault_rows
-from hsv.model.faults.schedule import ActiveFault, ScheduledFault
+from hsv.model.dynamics import COEFFICIENT_UNITS, VehicleParameters, forces, in_model_range
+from hsv.model.faults.schedule import ActiveFault, FaultRows, ScheduledFault, fault_rows
 from hsv.model.faults.table import COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR
-from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
 from hsv.model.links import (
     COMPUTATION_PARAMETER,
     MEASUREMENT_LINK_PARAMETERS,
@@ -36,9 +33,9 @@ from hsv.model.links import (
     measurement_link,
 )
 from hsv.model.sensors import SENSOR_PARAMETERS, SensorData, sensor_data, sensor_state
-from hsv.model.trim import Trim
+from hsv.model.signals import N_INPUTS, N_STATES
+from hsv.model.trim import INITIAL_PARAMETERS, Trim, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS
-from hsv.model.vehicle_parameters import COEFFICIENT_UNITS, VehicleParameters
 
 
 class FlightStatus(IntEnum):

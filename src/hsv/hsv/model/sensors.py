@@ -16,11 +16,10 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
-from hsv.base.units import readable
+from hsv.base.units import FOOT, readable
 from hsv.core import dtype
-from hsv.core.elementary import exponential
-from hsv.model.dynamics import N_STATES, STATE_NAMES, STATE_UNITS
-from hsv.model.envelope import FOOT
+from hsv.core.arithmetic import exponential
+from hsv.model.signals import N_STATES, STATE_NAMES, STATE_UNITS
 
 LONGEST_LATENCY = 50
 """Steps."""

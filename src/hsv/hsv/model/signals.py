@@ -1,10 +1,33 @@
-"""The signals of the loop: what each is called, its unit and how many numbers it has."""
+"""The signals of the loop: what each is called, its unit and how many numbers it has; and the steps of the loop."""
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
-from hsv.model.dynamics import INPUT_UNITS, N_INPUTS, N_STATES, STATE_UNITS
+STATE_NAMES = (
+    "altitude",
+    "velocity",
+    "angle_of_attack",
+    "pitch_angle",
+    "pitch_rate",
+    "elastic_coordinate_1",
+    "elastic_rate_1",
+    "elastic_coordinate_2",
+    "elastic_rate_2",
+)
+STATE_UNITS = ("m", "m/s", "rad", "rad", "rad/s", "kg^0.5 m", "kg^0.5 m/s", "kg^0.5 m", "kg^0.5 m/s")
+INPUT_NAMES = ("fuel_equivalence_ratio", "elevator_deflection")
+INPUT_UNITS = ("1", "rad")
+
+N_STATES = len(STATE_NAMES)
+N_INPUTS = len(INPUT_NAMES)
+N_RIGID = 5
+"""The first five states are those of the rigid body."""
+PITCH_RATE = STATE_NAMES.index("pitch_rate")
+
+NEVER = 2**62
+"""A step that is not reached."""
 
 VARYING = -1
 """Size of a signal that depends on the flight."""
@@ -53,3 +76,8 @@ SATURATED = SignalType("saturated", "1", N_INPUTS)
 DIAGNOSTICS = SignalType("diagnostics", "", VARYING)
 ACTUATOR = _input("actuator")
 ACTIVE_FAULTS = SignalType("active_faults", "", VARYING)
+
+
+def first_step(time: float, period: float) -> int:
+    """Return the first step k with k * ``period`` >= ``time`` (s), rounding of the division allowed for."""
+    return math.ceil(time / period - 1e-9)

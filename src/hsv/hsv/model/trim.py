@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.base.errors import TrimError
+from hsv.base.errors import ParameterError, QuantityError, TrimError
+from hsv.base.parameters import Parameter, check_all
 from hsv.core import doubles, lib
-from hsv.core.elementary import arcsine
-from hsv.model.dynamics import INPUT_NAMES, N_INPUTS, N_STATES, derivative, vehicle_struct
-from hsv.model.vehicle_parameters import VehicleParameters
+from hsv.core.arithmetic import arcsine
+from hsv.model.dynamics import MODELS, VehicleParameters, derivative, vehicle_struct
+from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_STATES
+from hsv.model.vehicle import COUPLING_PARAMETER, Vehicle
 
 CONVERGED = 1e-9
 """Largest remaining imbalance of an equilibrium, SI per second; what Newton's method reaches is rounding, far below."""
@@ -104,3 +107,29 @@ def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehiclePa
     for name, unit, value, low, high in zip(INPUT_NAMES, ("", " rad"), u, *limits, strict=True):
         if not low <= value <= high:
             raise TrimError(f"{where}: trim needs {name} = {value:.6g}{unit}, expected {low:.6g} to {high:.6g}{unit}")
+
+
+INITIAL_PARAMETERS = (
+    Parameter("vehicle.model", "CM", "coupled model (paper eq. 1) or decoupled model (eq. 4)", choices=MODELS),
+    COUPLING_PARAMETER,
+    Parameter("initial.altitude", 26060.4, "altitude of the initial trim, in the vehicle's range", "m"),
+    Parameter("initial.velocity", 2407.92, "velocity of the initial trim, in the vehicle's range", "m/s"),
+)
+
+
+def initial_trim(values: Mapping[str, object]) -> tuple[VehicleParameters, Trim]:
+    """Return the nominal vehicle of a flight and its trim, from :data:`INITIAL_PARAMETERS` and the vehicle's.
+
+    Raises:
+        ParameterError, TrimError: A wrong value, named.
+    """
+    v = check_all(INITIAL_PARAMETERS, values)
+    vehicle = Vehicle.from_parameters(values)
+    vehicle.check_envelope(INITIAL_PARAMETERS, v)
+    try:
+        nominal = vehicle.coupled(v["vehicle.coupling"])
+    except QuantityError as error:
+        raise ParameterError(f"parameter vehicle.{error}") from error
+    if v["vehicle.model"] == "DM":
+        nominal = nominal.decoupled()
+    return nominal, trim(nominal, v["initial.altitude"], v["initial.velocity"])

@@ -7,7 +7,7 @@ Every quantity carries its unit. A package registers its files as entry points o
     glider = "my_vehicles:glider.toml"
 
 Scenarios and design inputs then say ``vehicle = "glider"``; where nothing is registered, ``vehicle = "glider.toml"``, a
-path from the folder of the file that says so. A file may extend another one (:mod:`hsv.base.inheritance`). The package
+path from the folder of the file that says so. A file may extend another one (:mod:`hsv.base.files`). The package
 of a registered vehicle is looked up, not imported: reading data runs no code.
 """
 
@@ -25,13 +25,12 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.base.documents import parse_toml, read_text
 from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
-from hsv.base.inheritance import EXTENDS, Tables, follow_extends, is_path
+from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
 from hsv.base.parameters import Parameter, check_all
 from hsv.base.units import parse_quantity
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
-from hsv.model.vehicle_parameters import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
+from hsv.model.dynamics import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 
 GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from hsv.base.units import FOOT
 from hsv.control.design import ControlDesign
-from hsv.control.optimisation.lmi import spectral_radii
+from hsv.control.optimisation import spectral_radii
 from hsv.design.disturbance import DisturbanceSet
 from hsv.design.inputs import DesignInputs, inputs_from_report
 from hsv.design.tube import invariant_set
 from hsv.design.tube_problem import tube_problem
-from hsv.model.dynamics import N_RIGID, PITCH_RATE
-from hsv.model.envelope import FOOT
-from hsv.model.lpv.frequency import bode_difference, frequency_response
+from hsv.model.lpv.linearisation import bode_difference, frequency_response
+from hsv.model.signals import N_RIGID, PITCH_RATE
 from hsv_paper.claims import modelling
 from hsv_paper.claims.evidence import Evidence
 from hsv_paper.extended_model import codesigned_model, extended_model

@@ -9,8 +9,8 @@ from scipy.linalg import eigh
 
 from hsv.base.units import to_paper
 from hsv.control.nominal_trajectory import FamilyLaw, nominal_data
-from hsv.control.optimisation.lmi import spectral_radii
-from hsv.model.dynamics import N_RIGID
+from hsv.control.optimisation import spectral_radii
+from hsv.model.signals import N_RIGID
 from hsv_paper.claims.evidence import Evidence
 
 

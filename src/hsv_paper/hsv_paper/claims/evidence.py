@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.progress import Progress
-from hsv.control.design_file import find_design, read_parameters
+from hsv.base.processes import Progress
+from hsv.control.design import find_design, read_parameters
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.corners import Corner, corners, screening_corners

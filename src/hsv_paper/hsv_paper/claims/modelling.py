@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from hsv.model.dynamics import jacobian
-from hsv.model.lpv.frequency import bode
-from hsv.model.modes import Mode, modes
+from hsv.model.lpv.linearisation import Mode, bode, modes
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.claims.evidence import Evidence

@@ -11,8 +11,8 @@ from hsv.control.notch_filter import NotchSection
 from hsv.flight.assembly import assemble, flight_parameters
 from hsv.flight.corners import fraction
 from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.claims.evidence import Evidence, nominal, worst
 from hsv_paper.disturbances import largest_disturbances
 from hsv_paper.linear_loop import TARGET, Margin, critical_coupling, phase_margins, sampled_loop, worst_growth

@@ -11,11 +11,11 @@ import numpy as np
 from hsv.control.notch_filter import NotchSection, discretise, flown_sections, notch_response
 from hsv.flight.assembly import flight_parameters
 from hsv.flight.scenario import load_scenario
-from hsv.model.dynamics import N_RIGID, PITCH_RATE, jacobian
-from hsv.model.lpv.frequency import bode, frequency_response
+from hsv.model.dynamics import VehicleParameters, jacobian
+from hsv.model.lpv.linearisation import bode, frequency_response
+from hsv.model.signals import N_RIGID, PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.claims.evidence import Evidence
 from hsv_paper.claims.notch_loop import margins
 from hsv_paper.figures.figure_03 import POLE_DAMPINGS, POLE_FREQUENCIES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.model.envelope import FOOT
+from hsv.base.units import FOOT
 from hsv_paper.claims.finding import shown
 
 HALF_DEGREE = float(np.radians(0.5))

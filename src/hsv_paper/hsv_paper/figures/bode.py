@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
-from hsv.model.dynamics import PITCH_RATE, jacobian
-from hsv.model.lpv.frequency import bode, frequency_response
+from hsv.model.dynamics import VehicleParameters, jacobian
+from hsv.model.lpv.linearisation import bode, frequency_response
+from hsv.model.signals import PITCH_RATE
 from hsv.model.trim import trim
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.linear_loop import ELEVATOR, START
 
 

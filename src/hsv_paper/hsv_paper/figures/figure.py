@@ -9,9 +9,7 @@ from typing import Any, Protocol
 
 from matplotlib.figure import Figure
 
-from hsv.control.certificate import certificate_path, read_certificate
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design
+from hsv.control.design import ControlDesign, certificate_path, find_design, read_certificate, read_design
 from hsv.flight.metrics import FlightData
 
 

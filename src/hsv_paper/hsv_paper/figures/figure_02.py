@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.model.dynamics import PITCH_RATE
-from hsv.model.envelope import FOOT
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.frequency import frequency_response
-from hsv.model.lpv.grid import linearise
+from hsv.base.units import FOOT
+from hsv.model.lpv.linearisation import frequency_response, linearise, zero_order_hold
+from hsv.model.signals import PITCH_RATE
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.bode import bode_lines, label_bode
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure

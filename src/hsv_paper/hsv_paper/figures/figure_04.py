@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsv.model.dynamics import jacobian
-from hsv.model.modes import modes
+from hsv.model.dynamics import VehicleParameters, jacobian
+from hsv.model.lpv.linearisation import modes
 from hsv.model.trim import trim
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure
 from hsv_paper.figures.style import BLUE, GREY, RED, letter, new_figure
 from hsv_paper.linear_loop import START

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hsv.control.notch_filter import notch_response
-from hsv.model.lpv.frequency import bode
+from hsv.model.lpv.linearisation import bode
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.bode import bode_lines, label_bode, pitch_rate_response
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure

@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
 
 from hsv.base.units import to_paper
-from hsv.control.tube_set import TubeSet
+from hsv.control.design import TubeSet
 from hsv.flight.metrics import FlightData
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv_paper.figures import case1
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure
 from hsv_paper.figures.style import BLUE, GREEN, GREY, letter, new_figure

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from hsv.base.units import FOOT
 from hsv.design.inputs import inputs_from_report
-from hsv.model.dynamics import PITCH_RATE
-from hsv.model.envelope import FOOT
-from hsv.model.lpv.frequency import bode_difference, frequency_response
+from hsv.model.lpv.linearisation import bode_difference, frequency_response
+from hsv.model.signals import PITCH_RATE
 from hsv_paper.extended_model import codesigned_model, extended_model
 from hsv_paper.figures.bode import bode_lines, label_bode
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hsv.model.envelope import FOOT
+from hsv.base.units import FOOT
 from hsv_paper.figures import case1
 from hsv_paper.figures.figure import Drawing, Material, PaperFigure
 from hsv_paper.figures.readings import measured

@@ -17,8 +17,8 @@ from scipy import sparse
 
 from hsv.base.errors import DesignError
 from hsv.core import doubles, ffi, lib, vector
-from hsv.model.dynamics import N_INPUTS, N_STATES, derivative, jacobian, vehicle_struct
-from hsv.model.vehicle_parameters import VehicleParameters
+from hsv.model.dynamics import VehicleParameters, derivative, jacobian, vehicle_struct
+from hsv.model.signals import N_INPUTS, N_STATES
 
 STATE_SCALE = np.array([100.0, 50.0, 0.03, 0.03, 0.05, 1.0, 10.0, 1.0, 10.0])
 """Typical changes of the states, SI."""

@@ -9,11 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from hsv.base.errors import TrimError
-from hsv.model.dynamics import advance
-from hsv.model.envelope import in_model_range
+from hsv.model.dynamics import VehicleParameters, advance, in_model_range
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.limits.optimum import Bounds, Point, Problem, guess
 from hsv_paper.limits.transfer import free_states
 from hsv_paper.linear_loop import TARGET

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hsv.base.timing import NEVER
-from hsv.model.dynamics import N_INPUTS, N_STATES, advance
+from hsv.model.dynamics import VehicleParameters, advance
 from hsv.model.faults.injector import FaultInjector
 from hsv.model.faults.schedule import ScheduledFault
 from hsv.model.faults.table import Fault
 from hsv.model.plant import FlightStatus, Plant
+from hsv.model.signals import N_INPUTS, N_STATES, NEVER
 from hsv.model.trim import Trim, trim
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.limits.optimum import INPUT_SCALE, STATE_SCALE, Point, Problem, transitions
 
 _LAST_WEIGHT = 100.0

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.closed_loop import fly
@@ -20,9 +20,9 @@ from hsv.flight.corners import Corner, corners
 from hsv.flight.governed import governed
 from hsv.flight.metrics import FlightData
 from hsv.flight.scenario import load_scenario, parse_scenario
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.plant import FlightStatus
 from hsv.model.vehicle import Vehicle, load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv_paper.limits.optimum import finer, solve
 from hsv_paper.limits.recovery import (

@@ -14,9 +14,9 @@ from scipy.optimize import minimize
 
 from hsv.core import ffi, lib
 from hsv.flight.metrics import SETTLING_BAND
-from hsv.model.dynamics import N_STATES, vehicle_struct
+from hsv.model.dynamics import VehicleParameters, vehicle_struct
+from hsv.model.signals import N_STATES
 from hsv.model.trim import trim
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.limits.optimum import Bounds, Point, Problem, guess
 from hsv_paper.linear_loop import START, TARGET
 

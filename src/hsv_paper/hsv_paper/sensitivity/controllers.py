@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design import ControlDesign, find_design, read_parameters
 from hsv.control.notch_filter import NotchSection, flown_sections
 from hsv.flight.assembly import assemble_flight, scenario_parameters
 from hsv.flight.corners import Corner, screening_corners
 from hsv.flight.scenario import load_scenario
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv_paper.linear_loop import COUPLING_SCALES, critical_coupling, worst_growth
 

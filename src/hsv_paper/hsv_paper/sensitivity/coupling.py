@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.flight.corners import Corner
 from hsv.model.vehicle import load_vehicle
 from hsv_paper.figures.style import GREY, letter, new_figure, plain_log

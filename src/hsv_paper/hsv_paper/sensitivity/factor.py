@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.flight.corners import Corner, fraction

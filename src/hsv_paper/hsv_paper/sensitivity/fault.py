@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hsv.base.errors import ScenarioError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv_paper.figures.style import GREY, new_figure
 from hsv_paper.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, of_scenarios, said_corners
 from hsv_paper.sensitivity.study import Outcome, Study, grid

@@ -13,14 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsv.base.units import to_paper
+from hsv.base.units import FOOT, to_paper
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
 from hsv.flight.commands import breakpoints
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import STATE_NAMES
-from hsv.model.envelope import FOOT
 from hsv.model.plant import FlightStatus
+from hsv.model.signals import STATE_NAMES
 from hsv_paper.linear_loop import ELEVATOR, TARGET, stability_limit
 from hsv_paper.sensitivity.controllers import Controller
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.flight.corners import Corner
 from hsv.model.actuators import ACTUATOR_SETS
-from hsv.model.dynamics import STATE_NAMES
+from hsv.model.dynamics import VehicleParameters
 from hsv.model.sensors import SENSOR_SETS
+from hsv.model.signals import STATE_NAMES
 from hsv.model.vehicle import load_vehicle
-from hsv.model.vehicle_parameters import VehicleParameters
 from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, RED, letter, new_figure
 from hsv_paper.linear_loop import START, TARGET, Hardware, crossings, sampled_loop, stability_limit, worst_growth
 from hsv_paper.sensitivity.controllers import (

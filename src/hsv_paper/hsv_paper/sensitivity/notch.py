@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.contour import ContourSet
 
-from hsv.base.progress import Progress
-from hsv.control.design_file import find_design, read_design
+from hsv.base.processes import Progress
+from hsv.control.design import find_design, read_design
 from hsv.control.notch_filter import NotchSection
 from hsv.flight.corners import Corner
 from hsv.flight.scenario import load_scenario

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv_paper.figures.style import GREY, new_figure
 from hsv_paper.sensitivity.controllers import ALL, RMPC_DECOUPLED, SAID_RMPC, corners_of, said_corners
 from hsv_paper.sensitivity.study import Outcome, Study, grid

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
-from hsv.control.design_file import find_design, read_parameters
+from hsv.control.design import find_design, read_parameters
 from hsv.flight.commands import CommandTable
 from hsv.flight.scenario import load_scenario
 from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, letter, new_figure

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design, write_design
+from hsv.control.design import ControlDesign, find_design, read_design, write_design
 from hsv.design.baseline import design_gains
 from hsv.design.inputs import find_inputs, read_inputs
 from hsv.flight.scenario import load_scenario

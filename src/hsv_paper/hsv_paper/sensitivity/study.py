@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 
 
 @dataclass(frozen=True)

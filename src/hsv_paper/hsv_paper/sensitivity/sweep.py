@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.flight.corners import Corner
 from hsv.flight.sources import DIGITS, code_digest, digest_of, kept, measuring_code
 from hsv_paper.corner_flights import fly_over

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.progress import Progress
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design
+from hsv.base.processes import Progress
+from hsv.control.design import ControlDesign, find_design, read_design
 from hsv.design.baseline import disturbance_columns, nominal_family, nominal_problem, with_family
 from hsv.design.feedback import feedback_gain
 from hsv.design.inputs import DesignInputs, InputSize, RigidScale, find_inputs, read_inputs
-from hsv.model.dynamics import N_RIGID, N_STATES
+from hsv.model.signals import N_RIGID, N_STATES
 from hsv_paper.figures.style import BLUE, GREEN, ORANGE, RED
 from hsv_paper.sensitivity.controllers import PURPLE
 

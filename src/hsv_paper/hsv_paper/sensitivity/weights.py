@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.flight.corners import Corner
 from hsv.flight.scenario import load_scenario

@@ -32,13 +32,21 @@ from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.bags.track import expecting_fields
 from hsv.base.errors import DesignError, ParameterError, RecordingError
 from hsv.base.parameters import check_all
-from hsv.control.certificate import CERTIFICATE_PARAMETERS, design_files
 from hsv.control.controllers import CONTROLLER_PARAMETERS
-from hsv.control.design import ControlDesign
-from hsv.control.design_file import find_design, read_design, read_parameters
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
+from hsv.control.design import (
+    CERTIFICATE_PARAMETERS,
+    TAU,
+    ControlDesign,
+    change_parameters,
+    design_files,
+    find_design,
+    read_design,
+    read_parameters,
+    rigid_factors,
+    scheduled_changes,
+)
+from hsv.control.estimator import ESTIMATOR_ENABLED
 from hsv.control.reference_trajectory import COLUMNS
-from hsv.control.tube_factor import TAU, change_parameters, rigid_factors, scheduled_changes
 from hsv.flight.assembly import blamed_on
 from hsv.flight.blocks import Signals
 from hsv.flight.scenario import parse_scenario, scenario_text

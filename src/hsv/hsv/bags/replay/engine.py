@@ -16,7 +16,7 @@ from hsv.bags.replay.attached import broken_off, complete_steps, estimated
 from hsv.bags.replay.processes import Process, processes_of
 from hsv.bags.track import Track, expecting_fields
 from hsv.base.errors import RecordingError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.flight.blocks import Signals
 
 PROGRESS_INTERVAL = 200

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import linprog
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.lmi import spectral_radii
+from hsv.control.optimisation import spectral_radii
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 
 

@@ -23,7 +23,7 @@ from hsv.design.sets.modal import modal_box
 from hsv.design.sets.star_norm_search import star_norms
 from hsv.design.sets.zonotope import zonotope
 from hsv.design.tightening import tighten
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 
 @dataclass(frozen=True)

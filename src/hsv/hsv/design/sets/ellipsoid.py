@@ -6,8 +6,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.centring import Unknown, minimise
-from hsv.control.optimisation.rounding import MATRIX_DIGITS, rounded, rounded_matrix
+from hsv.control.optimisation import MATRIX_DIGITS, Unknown, minimise, rounded, rounded_matrix
 from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape
 from hsv.design.sets.invariant_set import TubeProblem
 

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.lmi import SolverReport, smallest_eigenvalues
-from hsv.control.tube_set import TubeSet
+from hsv.control.design import TubeSet
+from hsv.control.optimisation import SolverReport, smallest_eigenvalues
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 from hsv.design.sets.star_norms import StarNorms
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.lmi import spectral_radii
+from hsv.control.optimisation import spectral_radii
 from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.base.threads import over_threads
+from hsv.base.processes import over_threads
 from hsv.core import doubles, lib
 from hsv.design.sets.ellipsoid_set import EllipsoidSet
 

@@ -8,9 +8,7 @@ import numpy as np
 from scipy.linalg import cholesky
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.centring import Unknown, minimise
-from hsv.control.optimisation.lmi import spectral_radii
-from hsv.control.optimisation.rounding import rounded_matrix
+from hsv.control.optimisation import Unknown, minimise, rounded_matrix, spectral_radii
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.sets.star_norms import StarNorms, output_rows
 

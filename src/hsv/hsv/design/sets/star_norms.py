@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation.lmi import smallest_eigenvalues
+from hsv.control.optimisation import smallest_eigenvalues
 from hsv.design.sets.invariant_set import TubeProblem
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 
 def output_rows(problem: TubeProblem) -> np.ndarray:

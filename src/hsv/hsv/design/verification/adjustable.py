@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design import ControlDesign
-from hsv.control.nominal_problem import certified_cost
+from hsv.control.nominal_gain import certified_cost
 from hsv.design.baseline import nominal_problem
 from hsv.design.coupled_poles import largest_real_parts
 from hsv.design.factor_range import relaxed_bound
@@ -17,7 +17,7 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet, vertex_residuals
 from hsv.design.tightening import tighten
 from hsv.design.verification.checks import Check, Subject, above, at_most, same, same_parameter
 from hsv.design.verification.invariant_set import stored_set
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 
 

@@ -1,7 +1,8 @@
 """Models of hardware and air that a scenario declares or that options of the command line describe.
 
-Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.core.noise` pass one
-time in 370: their own bound is :data:`hsv.core.noise.LARGEST`. What has no bound is named, and certifies nothing.
+Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.core.arithmetic` pass
+one time in 370: their own bound is :data:`hsv.core.arithmetic.LARGEST`. What has no bound is named, and certifies
+nothing.
 """
 
 from __future__ import annotations
@@ -13,22 +14,17 @@ import numpy as np
 
 from hsv.base.errors import DesignError, QuantityError
 from hsv.base.units import parse_quantity
-from hsv.control.estimator_parameters import ESTIMATOR_ENABLED
-from hsv.core.noise import LARGEST
+from hsv.control.estimator import ESTIMATOR_ENABLED
+from hsv.core.arithmetic import LARGEST
 from hsv.design.verification.checks import Subject
 from hsv.design.verification.effects import Measured, Model, air, unexplained
 from hsv.design.verification.plan import Plan
 from hsv.flight.scenario import Scenario
 from hsv.model.actuators import ACTUATOR_PARAMETERS, IDEAL
 from hsv.model.atmosphere import atmosphere_data
-from hsv.model.dynamics import (
-    INPUT_NAMES,
-    N_RIGID,
-    STATE_NAMES,
-    STATE_UNITS,
-)
 from hsv.model.links import command_link, computation, measurement_link
 from hsv.model.sensors import SENSOR_SETS, SensorData, sensor_data
+from hsv.model.signals import INPUT_NAMES, N_RIGID, STATE_NAMES, STATE_UNITS
 
 REACH = 3.0
 """Standard deviations of noise and turbulence that count as their bound: one sample in 370 is beyond."""

@@ -19,10 +19,10 @@ from hsv.design.disturbance import CHANNELS, DisturbanceSet
 from hsv.design.error_system import ErrorSystem
 from hsv.design.sets.invariant_set import TubeProblem
 from hsv.design.verification.plan import Plan
-from hsv.model.dynamics import N_RIGID, N_STATES, PITCH_RATE, derivative
-from hsv.model.lpv.discretisation import zero_order_hold
-from hsv.model.lpv.grid import linearise
+from hsv.model.dynamics import derivative
+from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.sensors import ALPHA, PITCH
+from hsv.model.signals import N_RIGID, N_STATES, PITCH_RATE
 from hsv.model.trim import trim
 from hsv.model.vehicle import Vehicle
 

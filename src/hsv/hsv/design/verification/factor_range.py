@@ -9,7 +9,7 @@ import numpy as np
 from hsv.design.factor_range import certified_loops, room_at_one
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.verification.checks import Check, Subject, above, required, same, same_parameter
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 
 
 def factor_checks(subject: Subject) -> Iterable[Check]:

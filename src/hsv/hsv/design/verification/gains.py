@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from hsv.control.design import ControlDesign
+from hsv.control.nominal_gain import NominalProblem, certified_cost, decrease_between, step_deviation
 from hsv.control.nominal_law import MEMBERSHIP_TOLERANCE, FamilyLaw
-from hsv.control.nominal_problem import NominalProblem, certified_cost, decrease_between, step_deviation
 from hsv.control.nominal_trajectory import nominal_data
-from hsv.control.optimisation.lmi import smallest_eigenvalues, spectral_radii
+from hsv.control.optimisation import smallest_eigenvalues, spectral_radii
 from hsv.design.lyapunov import lyapunov_residuals
 from hsv.design.verification.checks import Check, Subject, above, at_most, inverse, required, same, same_parameter
 from hsv.design.verification.tolerances import ROUNDING
-from hsv.model.dynamics import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
+from hsv.model.signals import INPUT_NAMES, N_RIGID, N_STATES, STATE_NAMES
 
 _POINTS, _SEED = 100, 11
 """Points of the boundary of an ellipsoid where an interpolated input is compared on both sides, and their seed."""

@@ -14,7 +14,7 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_report, vertex_resi
 from hsv.design.tightening import plan_bounds, tighten
 from hsv.design.tube_problem import tube_problem
 from hsv.design.verification.checks import Check, Subject, above, at_most, required, same, same_parameter
-from hsv.model.dynamics import N_RIGID
+from hsv.model.signals import N_RIGID
 from hsv.model.vehicle import Vehicle
 
 

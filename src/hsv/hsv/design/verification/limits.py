@@ -17,7 +17,7 @@ from hsv.design.sets.ellipsoid_set import EllipsoidSet
 from hsv.design.tube_problem import known_actuators
 from hsv.design.verification.plan import Plan
 from hsv.model.actuators import SUBSTEPS, ActuatorSet, actuator_map
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
 from hsv.model.trim import trim
 
 

@@ -15,8 +15,8 @@ from hsv.design.error_system import tube_errors
 from hsv.design.region import Region, incomplete_share, measure, record
 from hsv.design.tube_problem import channel_model, known_actuators
 from hsv.design.verification.checks import Subject
-from hsv.model.dynamics import N_RIGID
 from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
 
 _ACCELERATED, _REMAINING = [1, 2, 4], [0, 3]

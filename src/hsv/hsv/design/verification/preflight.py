@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from hsv.base.errors import DesignError
-from hsv.control.certificate import find_certificate, read_certificate
-from hsv.control.design import ControlDesign
+from hsv.control.design import ControlDesign, find_certificate, read_certificate
 from hsv.design.verification.checks import Subject, gathered, require
 from hsv.design.verification.quick import QUICK
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsv.model.dynamics import INPUT_NAMES, STATE_NAMES
+from hsv.model.signals import INPUT_NAMES, STATE_NAMES
 
 
 @dataclass(frozen=True)

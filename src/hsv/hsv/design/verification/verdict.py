@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.progress import Progress
+from hsv.base.processes import Progress
 from hsv.base.units import UnitSystem, in_words
 from hsv.control.design import ControlDesign
 from hsv.design.disturbance import DisturbanceSet, widened
@@ -31,11 +31,7 @@ from hsv.design.verification.invariant_set import lag_feedback
 from hsv.design.verification.limits import Reach, reaches
 from hsv.design.verification.plan import Plan
 from hsv.model.actuators import ACTUATOR_SETS, IDEAL
-from hsv.model.dynamics import (
-    INPUT_NAMES,
-    INPUT_UNITS,
-    N_RIGID,
-)
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
 
 Lag = tuple[np.ndarray, np.ndarray] | None
 """Least and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from hsv.base.progress import Progress
-from hsv.control.certificate import certificate_path, read_certificate
-from hsv.control.design_file import read_design
+from hsv.base.processes import Progress
+from hsv.control.design import certificate_path, read_certificate, read_design
 from hsv.design.verification.adjustable import adjustable_checks
 from hsv.design.verification.checks import Check, Subject, gathered
 from hsv.design.verification.flights import flight_checks, sequence_checks

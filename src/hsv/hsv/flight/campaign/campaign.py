@@ -12,10 +12,10 @@ from typing import Any, Self
 
 import tomli_w
 
-from hsv.base.documents import parse_json
 from hsv.base.errors import CampaignError
+from hsv.base.files import parse_json
 from hsv.control.library import library_digest
-from hsv.core.noise import SEED_PARAMETER
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, blamed_on, design_parameters, scenario_parameters
 from hsv.flight.campaign.factors import Factor, check_factors, factors_of, flown_table, with_factors
 from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text

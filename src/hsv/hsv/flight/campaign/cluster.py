@@ -19,9 +19,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from hsv.base.documents import read_text
 from hsv.base.errors import CampaignError, DocumentError, RunError
-from hsv.base.interruption import uninterrupted
+from hsv.base.files import read_text
+from hsv.base.processes import uninterrupted
 
 AGAIN_AFTER = 5.0
 """Seconds after which the workers of a host are started again."""

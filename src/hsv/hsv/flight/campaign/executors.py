@@ -13,8 +13,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any, Protocol, cast
 
 from hsv.base.errors import CampaignError, RunError, reason
-from hsv.base.interruption import end_with_parent
-from hsv.base.threads import ctrl_c_held_back
+from hsv.base.processes import ctrl_c_held_back, end_with_parent
 from hsv.flight.campaign.program import check_workers
 from hsv.flight.campaign.scheduler import connected
 

@@ -11,7 +11,7 @@ from hsv.base.errors import CampaignError
 from hsv.base.units import percent, rounded, written
 from hsv.flight.distribution import KINDS, Distribution
 from hsv.flight.scenario import scenario_at_means, set_field
-from hsv.model.vehicle_parameters import COEFFICIENT_UNITS
+from hsv.model.dynamics import COEFFICIENT_UNITS
 
 _PERTURBATION = "vehicle.perturbation."
 

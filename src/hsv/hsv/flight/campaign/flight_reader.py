@@ -15,7 +15,7 @@ from hsv.flight.flight import fault_start, times
 from hsv.flight.history import Q_F, X
 from hsv.flight.metrics import CURVES, FlightCurves, FlightData, read_curves
 from hsv.flight.side_by_side import FlightGroup
-from hsv.model.dynamics import N_STATES
+from hsv.model.signals import N_STATES
 
 PIECE = 500
 """Rows of a piece: those of 8 flights fit into a second-level cache of a megabyte."""

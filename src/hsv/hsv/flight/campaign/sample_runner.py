@@ -22,7 +22,7 @@ from hsv.flight.closed_loop import Components, fly
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightData, flight_metrics
 from hsv.flight.side_by_side import FlightGroup
-from hsv.model.envelope import in_model_range
+from hsv.model.dynamics import in_model_range
 
 Outcome = dict[str, float | bool | str | None]
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from hsv.base.documents import open_regular, read_text
 from hsv.base.errors import CampaignError, DocumentError, reason
+from hsv.base.files import open_regular, read_text
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
 from hsv.flight.campaign.lock import locked

@@ -9,13 +9,13 @@ from typing import Any
 from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
 from hsv.control.nominal_trajectory import NominalTrajectory
-from hsv.core.noise import SEED_PARAMETER
+from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, assemble_flight, scenario_parameters
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
 from hsv.model.faults.injector import FaultInjector
-from hsv.model.initial import initial_trim
 from hsv.model.plant import PLANT_PARAMETERS, Plant
+from hsv.model.trim import initial_trim
 
 _NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
 """Beginnings of parameters on which the bench's own controllers do not depend."""

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from hsv.base.documents import parse_json, read_text
 from hsv.base.errors import CampaignError, reason
+from hsv.base.files import parse_json, read_text
 from hsv.flight.campaign.capacity import Capacity, evenly, timed
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.lock import locked

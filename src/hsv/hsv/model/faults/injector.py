@@ -10,15 +10,13 @@ import numpy as np
 
 from hsv.base.errors import ParameterError
 from hsv.base.parameters import Parameter, check_all
-from hsv.base.timing import NEVER, first_step
 from hsv.core import Struct, doubles, lib
-from hsv.core.noise import SEED_PARAMETER
-from hsv.model.dynamics import N_INPUTS
-from hsv.model.faults.laws import FaultRows, fault_rows
-from hsv.model.faults.schedule import ActiveFault, ScheduledFault
+from hsv.core.arithmetic import SEED_PARAMETER
+from hsv.model.faults.schedule import ActiveFault, FaultRows, ScheduledFault, fault_rows
 from hsv.model.faults.table import CHANNELS, COMMAND, FAULT_KINDS, SENSOR, Fault
-from hsv.model.initial import INITIAL_PARAMETERS, initial_trim
 from hsv.model.links import COMMAND_LINK_PARAMETERS, COMPUTATION_PARAMETER, LinkData, command_link, link_state
+from hsv.model.signals import N_INPUTS, NEVER, first_step
+from hsv.model.trim import INITIAL_PARAMETERS, initial_trim
 from hsv.model.vehicle import VEHICLE_PARAMETERS
 
 FAULT_PARAMETERS = (

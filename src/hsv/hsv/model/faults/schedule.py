@@ -1,11 +1,17 @@
-"""When faults act: from a step on, to another."""
+"""Scheduled faults, and the rows and memory by which the core applies them, see ``core/faults.h``."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
 
-from hsv.base.timing import NEVER
-from hsv.model.faults.table import Fault
+import numpy as np
+
+from hsv.core import dtype, lib
+from hsv.model.faults.table import REPLACING, Fault
+from hsv.model.signals import INPUT_NAMES, NEVER, STATE_NAMES
 
 
 class ScheduledFault(NamedTuple):
@@ -21,3 +27,89 @@ class ActiveFault(NamedTuple):
 
     fault: Fault
     since: int
+
+
+_NOT_YET = -2.0
+
+
+class FaultRows(NamedTuple):
+    """Faults of a side: ``rows`` and ``memory`` (n) of structs of the core, and T, ``period`` (s)."""
+
+    rows: np.ndarray
+    memory: np.ndarray
+    period: float
+
+
+def fault_rows(
+    sides: Sequence[str],
+    scheduled: Sequence[tuple[Fault, int, int]],
+    period: float,
+    earlier: FaultRows | None = None,
+) -> FaultRows:
+    """Return the faults of some ``sides`` among those that are scheduled, in the order of their composition.
+
+    Args:
+        sides: Of those in :mod:`hsv.model.faults.table`.
+        scheduled: Faults with the first step and the first step without, in any order.
+        period: T (s).
+        earlier: Those that were known before a change in flight; the same faults keep their memory.
+    """
+    rows = _sorted_rows(tuple(sides), tuple(scheduled), period).copy()
+    memory = fault_memory(len(rows))
+    kept: dict[Any, list[np.void]] = {}
+    for row, before in zip(*earlier[:2], strict=True) if earlier else ():
+        kept.setdefault(_identity(row), []).append(before)
+    for i, row in enumerate(rows) if kept else ():
+        # Each of several identical faults keeps its own.
+        if same := kept.get(_identity(row)):
+            memory[i] = same.pop(0)
+    return FaultRows(rows, memory, period)
+
+
+@lru_cache(maxsize=64)
+def _sorted_rows(sides: tuple[str, ...], scheduled: tuple[tuple[Fault, int, int], ...], period: float) -> np.ndarray:
+    chosen = sorted((row for row in scheduled if row[0].kind.side in sides), key=_order)
+    rows = np.zeros(len(chosen), dtype("hsv_fault"))
+    for row, (fault, start, stop) in zip(rows, chosen, strict=True):
+        own = len(fault.kind.parameters)
+        row["start"], row["stop"], row["channel"], row["code"] = start, stop, _place(fault.channel), fault.kind.code
+        row["occurrence"], row["cycle"] = _occurrence(fault.values[own:], period)
+        row["parameter"][:own] = fault.values[:own]
+    return rows
+
+
+def fault_memory(count: int) -> np.ndarray:
+    """Return the memory of so many faults before they act."""
+    memory = np.zeros(count, dtype("hsv_fault_memory"))
+    memory["last"] = memory["onset"] = _NOT_YET
+    return memory
+
+
+def _identity(row: np.void) -> bytes:
+    """Return what tells a fault from others: all but its stop, which a clearance in flight moves."""
+    same = row.copy()
+    same["stop"] = 0.0
+    return bytes(same.tobytes())
+
+
+def _place(channel: str) -> int:
+    """Return the index of a channel among the inputs or the states; 0 for the engine."""
+    return next((names.index(channel) for names in (INPUT_NAMES, STATE_NAMES) if channel in names), 0)
+
+
+def _order(row: tuple[Fault, int, int]) -> tuple[Any, ...]:
+    fault, start, stop = row
+    code = fault.kind.code
+    # The faults that replace the position are one stage, in which the newest is last.
+    stage = (REPLACING[0], start, code) if code in REPLACING else (code, start, 0)
+    return *stage, fault.channel, fault.values, stop
+
+
+def _occurrence(values: Sequence[float], period: float) -> tuple[int, tuple[float, float]]:
+    cycle, duty, on, off = values
+    if cycle > 0.0:
+        steps = max(1, round(cycle / period))
+        return lib.PERIODIC, (float(steps), float(math.ceil(duty * steps - 1e-9)))
+    if on > 0.0:
+        return lib.RANDOM, (min(1.0, period / on), min(1.0, period / off))
+    return lib.ALWAYS, (0.0, 0.0)

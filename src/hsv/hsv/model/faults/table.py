@@ -17,7 +17,7 @@ from hsv.base.errors import ParameterError, did_you_mean
 from hsv.base.parameters import Parameter, read_number
 from hsv.base.units import UnitSystem, parse_quantity, readable
 from hsv.core import lib
-from hsv.model.dynamics import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, STATE_NAMES, STATE_UNITS
 
 ENGINE = "engine"
 """The channel of faults of the engine itself."""

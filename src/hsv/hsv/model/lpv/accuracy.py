@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from hsv.model.lpv.frequency import bode_difference, frequency_response
+from hsv.model.lpv.linearisation import bode_difference, frequency_response
 from hsv.model.lpv.polytope import Polytope, evaluate
 
 Model = Callable[[float, float], tuple[np.ndarray, np.ndarray]]

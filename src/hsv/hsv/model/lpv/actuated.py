@@ -9,8 +9,8 @@ import numpy as np
 
 from hsv.core import Data, doubles, lib, vector
 from hsv.model.actuators import ActuatorSet
-from hsv.model.dynamics import INPUT_NAMES, N_INPUTS
-from hsv.model.lpv.discretisation import zero_order_hold
+from hsv.model.lpv.linearisation import zero_order_hold
+from hsv.model.signals import INPUT_NAMES, N_INPUTS
 
 
 def actuator_names(actuators: Sequence[ActuatorSet]) -> tuple[str, ...]:
@@ -101,7 +101,7 @@ def held_behind(
     Returns:
         A (n + a + d, n + a + d) and B (n + a + d, 2), of a states of actuators and d commands under way.
     """
-    from scipy.linalg import expm  # see hsv.model.lpv.discretisation
+    from scipy.linalg import expm  # see hsv.model.lpv.linearisation
 
     n = len(A)
     A_a, B_a, C, D = actuator_system(actuators)

@@ -9,7 +9,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.core import Data, lib
-from hsv.core.elimination import solve
+from hsv.core.arithmetic import solve
 
 INTERPOLATIONS = ("linear", "cubic")
 

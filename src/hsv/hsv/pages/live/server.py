@@ -18,7 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from hsv.base.errors import HsvError, ParameterError, reason
-from hsv.base.json_text import json_text
+from hsv.base.files import json_text
 from hsv.graph.addresses import HOST, origins
 from hsv.pages.live.commands import Command, read_command
 from hsv.pages.live.hub import Hub

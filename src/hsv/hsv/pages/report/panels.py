@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from hsv.bags.description import ACTUATOR, COMMAND, FILTERED_STATE, NOMINAL, STATE, TUBE_STATUS
-from hsv.model.dynamics import STATE_NAMES, STATE_UNITS
+from hsv.model.signals import STATE_NAMES, STATE_UNITS
 
 
 class Kind(StrEnum):

@@ -12,9 +12,9 @@ from hsv.bags.flight import flight_data, labels
 from hsv.bags.info import describe
 from hsv.bags.infrastructure_parameters import LOCKSTEP_PARAMETERS
 from hsv.bags.reader import Bag
-from hsv.base.documents import parse_json
 from hsv.base.errors import DocumentError, HsvError, RecordingError
-from hsv.control.design_file import parse_parameters
+from hsv.base.files import parse_json
+from hsv.control.design import parse_parameters
 from hsv.flight.limits import Verdict, verdicts
 from hsv.flight.metrics import flight_metrics
 from hsv.flight.scenario import Scenario, parse_scenario

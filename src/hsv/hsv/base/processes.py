@@ -1,4 +1,4 @@
-"""Ctrl-C, and being asked to end: an exception, but not in the middle of an import or of what has to be whole."""
+"""Interruption by Ctrl-C, threads and progress of long computations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import ctypes
 import os
 import signal
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from types import CodeType, FrameType
 from typing import Any, ParamSpec, TypeVar
 
@@ -28,7 +31,7 @@ def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
 
     A process that is started is then known to who is to end it, whenever Ctrl-C comes. It takes effect where
     :func:`take_interrupts` was called. What takes longer, or starts processes that are never to receive Ctrl-C, is done
-    within :func:`hsv.base.threads.ctrl_c_held_back`.
+    within :func:`hsv.base.processes.ctrl_c_held_back`.
     """
     _WHOLE.add(function.__code__)
     return function
@@ -85,3 +88,40 @@ def _interrupt_again(unraisable: Any) -> None:
         signal.setitimer(signal.ITIMER_REAL, _LATER)
     else:
         sys.__unraisablehook__(unraisable)
+
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+def over_threads(
+    job: Callable[[Item], Result], items: Iterable[Item], progress: Callable[[int], None] = lambda done: None
+) -> list[Result]:
+    """Return ``job`` of every item, in order, from as many threads as there are processors.
+
+    ``progress`` is called with the number of items done.
+    """
+    results = []
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        for result in pool.map(job, items):
+            results.append(result)
+            progress(len(results))
+    return results
+
+
+@contextmanager
+def ctrl_c_held_back() -> Iterator[None]:
+    """Let Ctrl-C take effect at the end only; threads and processes that begin meanwhile never receive it.
+
+    A cluster that is interrupted half started does not close. Such processes are ended by the command.
+    """
+    resource_tracker.ensure_running()  # where it is started, it lets Ctrl-C in
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+Progress = Callable[[str, int, int], None]
+"""Function of the stage, the number of finished items, and their total number."""

@@ -1,18 +1,19 @@
-"""Files that people or programs wrote, and the TOML, YAML and JSON in them: read with a bound on every kind of work.
+"""Read TOML, YAML and JSON files with limits on size and nesting, and TOML files that extend another one.
 
-Whatever a file holds, reading it ends, and ends with values or with one line: a pipe or a device, and what is too large
-or nested too deep, is refused before anything else is done with it.
+Reading any file ends, with values or with one line of error: a pipe, a device, a text that is too large or nested too
+deep is refused before anything else is done with it.
 """
 
 from __future__ import annotations
 
 import errno
 import json
+import math
 import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from functools import partial
 from io import BufferedReader
 from pathlib import Path
@@ -23,7 +24,7 @@ from yaml.composer import Composer
 from yaml.constructor import SafeConstructor
 from yaml.resolver import Resolver
 
-from hsv.base.errors import DocumentError, reason
+from hsv.base.errors import DocumentError, HsvError, reason
 
 if yaml.__with_libyaml__:
     from yaml.cyaml import CParser as _Parser  # type: ignore[attr-defined]
@@ -231,3 +232,77 @@ def _check(value: object) -> None:
 
 def _too_deep() -> DocumentError:
     return DocumentError(f"nested more than {MOST_LEVELS} levels deep")
+
+
+EXTENDS = "extends"
+"""The key that names the file before it, by name or by path; a path is relative to the folder of the file it is in."""
+
+Tables = dict[str, Any]
+
+
+def follow_extends(
+    name: str,
+    read: Callable[[str], Tables],
+    refuse: Callable[[str, str], HsvError],
+    replaced: Collection[str] = (),
+    values: Collection[str] = (),
+) -> Tables:
+    """Return the contents of a file with those of the files that it extends, one by one, under it.
+
+    Tables are merged key by key; everything else, lists of tables too, is replaced.
+
+    Args:
+        name: Name or path of the file.
+        read: Returns the contents of a file by name or path.
+        refuse: Returns the error for a file, by name or path, and what is wrong with it.
+        replaced: Tables at the top that are replaced whole.
+        values: Keys of tables that stand for one value, and are replaced whole wherever they are.
+
+    Raises:
+        HsvError: Error of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.
+    """
+    chain, layers = [name], [dict(read(name))]
+    while EXTENDS in layers[-1]:
+        base = layers[-1].pop(EXTENDS)
+        if not isinstance(base, str) or not base:
+            raise refuse(chain[-1], f"{EXTENDS} = {base!r}: expected a name or the path of a file")
+        path = is_path(base)
+        chain.append(str(Path(chain[-1]).parent / base) if path and is_path(chain[-1]) else base)
+        if chain[-1] in chain[:-1]:
+            raise refuse(name, f"{EXTENDS}: {' extends '.join(chain)}, expected files that do not extend each other")
+        layers.append(dict(read(chain[-1])))
+    merged: Tables = {}
+    for layer in reversed(layers):
+        merged = _merged(
+            {key: value for key, value in merged.items() if key not in {*replaced} & layer.keys()}, layer, {*values}
+        )
+    return merged
+
+
+def is_path(name: str) -> bool:
+    """Tell whether a scenario or design is named by its path."""
+    return "/" in name or name.endswith(".toml")
+
+
+def _merged(base: Tables, own: Tables, values: set[str]) -> Tables:
+    merged = dict(base)
+    for key, value in own.items():
+        both = isinstance(value, dict) and isinstance(base.get(key), dict) and not values & value.keys()
+        merged[key] = _merged(base[key], value, values) if both else value
+    return merged
+
+
+def json_text(values: Mapping[str, Any], indent: int | None = None) -> str:
+    """Return ``values`` as JSON, on one line without ``indent``.
+
+    JSON lacks numbers that are not finite: they are null.
+    """
+    return json.dumps(_finite(values), indent=indent, allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _finite(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(entry) for entry in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,1 +1,0 @@
-"""Linear matrix inequalities: centring, solver, scaling and rounding."""

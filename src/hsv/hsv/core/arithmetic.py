@@ -1,0 +1,81 @@
+"""Arithmetic with the same bits on every processor: elementary functions, linear equations and random numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hsv.base.parameters import Parameter
+from hsv.core import doubles, ffi, lib
+
+
+def sine_cosine(x: float) -> tuple[float, float]:
+    """Return the sine and the cosine of ``x`` (rad), up to 1e5 in magnitude."""
+    pair = ffi.new("double[2]")
+    lib.hsv_sine_cosine(x, pair, pair + 1)
+    return pair[0], pair[1]
+
+
+tangent: Callable[[float], float] = lib.hsv_tangent
+"""Of an angle (rad) up to 1e5 in magnitude."""
+
+arcsine: Callable[[float], float] = lib.hsv_arcsine
+"""Angle (rad) from -pi / 2 to pi / 2 whose sine is given, from -1 to 1."""
+
+arctangent2: Callable[[float, float], float] = lib.hsv_arctangent2
+"""Angle (rad) from -pi to pi of the point (x, y), given y first; each zero or of magnitude 1e-140 to 1e140."""
+
+exponential: Callable[[float], float] = lib.hsv_exponential
+"""Of a number up to 700 in magnitude."""
+
+logarithm: Callable[[float], float] = lib.hsv_logarithm
+"""The natural one of a normal positive number."""
+
+
+def of_each(function: Callable[[float], float], values: Any) -> np.ndarray:
+    """Return a ``function`` of one number of each of ``values`` (n)."""
+    return np.array([function(value) for value in np.asarray(values, float).tolist()])
+
+
+def solve(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return X (n, m) with A X = b for ``A`` (n, n) and ``b`` (n, m), by elimination with partial pivoting.
+
+    Where ``A`` is singular, the result is not finite.
+
+    Raises:
+        ValueError: Other shapes.
+    """
+    left, right = np.array(A, float, order="C"), np.array(b, float, order="C")
+    n, m = right.shape
+    lib.hsv_solve(n, m, doubles(left, n, n), doubles(right))
+    return right
+
+
+SEED_PARAMETER = Parameter("seed", 0, "key of all random numbers of the flight", "", 0, 2**53)
+"""Up to 2^53, which every file format that a flight goes through keeps."""
+
+LARGEST = float(np.sqrt(106.0 * 0.6931471805599453))
+"""The greatest normal number, 8.57: Box and Muller take the logarithm of 2^-53 at least."""
+
+
+def philox(counter: tuple[int, int, int, int], key: tuple[int, int]) -> tuple[int, int, int, int]:
+    """Return the four words of the ``counter`` under the ``key``."""
+    words = ffi.new("uint64_t[4]")
+    lib.hsv_philox(counter, key, words)
+    return tuple(words)
+
+
+def uniforms(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
+    """Return two independent numbers, each uniform on the multiples of 2^-53 in [0, 1)."""
+    pair = ffi.new("double[2]")
+    lib.hsv_uniforms(seed, step, stream, draw, pair)
+    return pair[0], pair[1]
+
+
+def normals(seed: int, step: int, stream: int, draw: int = 0) -> tuple[float, float]:
+    """Return two independent standard normal numbers (Box and Muller 1958)."""
+    pair = ffi.new("double[2]")
+    lib.hsv_normals(seed, step, stream, draw, pair)
+    return pair[0], pair[1]

@@ -1,0 +1,221 @@
+"""Linear models of the vehicle at trim: discretisation, extended states, modes and frequency responses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.model.dynamics import VehicleParameters, derivative, jacobian
+from hsv.model.lpv.polytope import Polytope, axis_weights
+from hsv.model.signals import N_INPUTS, N_STATES, PITCH_RATE
+from hsv.model.trim import trim
+
+
+def zero_order_hold(A: np.ndarray, B: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the discrete (A, B) of dx/dt = A x + B u with u held over ``period`` (s) (paper eq. 12).
+
+    Args:
+        A: (n, n) continuous-time state matrix, SI per second.
+        B: (n, m) continuous-time input matrix; the columns may be any inputs, disturbances too.
+        period: Sampling period (s).
+    """
+    # Here, because tube_mpc imports this module without using it, and scipy.linalg takes longer than all else.
+    from scipy.linalg import expm
+
+    n, m = B.shape
+    block = np.zeros((n + m, n + m))
+    block[:n, :n] = A
+    block[:n, n:] = B
+    transition = expm(block * period)
+    return transition[:n, :n], transition[:n, n:]
+
+
+class Filter(NamedTuple):
+    """A continuous-time filter of the pitch rate (paper eq. 39): A (k, k), B (k), C (k), D not zero."""
+
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: float
+
+
+def extended_derivative(x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool) -> np.ndarray:
+    """Return dx'/dt (9 + k) (paper eq. 40), complex where ``x`` (9 + k) or ``u`` (2) is."""
+    filtered, s = x[PITCH_RATE], x[N_STATES:]
+    passed = 0.0 * filtered
+    for c, value in zip(notch.C, s, strict=True):
+        passed += c * value
+    # Python divides both parts of a complex number; numpy multiplies them by the inverse, with other last bits.
+    rate = (filtered - passed).item() / float(notch.D)
+    vehicle = x[:N_STATES].copy()
+    vehicle[PITCH_RATE] = rate
+    out = derivative(vehicle, u, p)
+    if printed:
+        out[2] += filtered - rate
+        out[3] = filtered
+    out[PITCH_RATE] *= notch.D
+    change = notch.B * rate
+    for column, value in zip(notch.A.T, s, strict=True):
+        change = change + column * value
+    for c, value in zip(notch.C, change, strict=True):
+        out[PITCH_RATE] += c * value
+    return np.concatenate((out, change))
+
+
+def extended_jacobian(
+    x: np.ndarray, u: np.ndarray, p: VehicleParameters, notch: Filter, printed: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return A' (9 + k, 9 + k) and B' (9 + k, 2) (paper eq. 42, eq. 43), by the complex step."""
+    step = 1e-40
+    n = len(x)
+    columns = []
+    for change in 1j * step * np.eye(n + N_INPUTS):
+        rates = extended_derivative(x + change[:n], u + change[n:], p, notch, printed)
+        columns.append(rates.imag / step)
+    both = np.array(columns).T
+    return both[:, :n].copy(), both[:, n:].copy()
+
+
+def extended_state(x: np.ndarray, notch: Filter) -> np.ndarray:
+    """Return x' (9 + k) of a vehicle state ``x`` (9), the filter at rest: an equilibrium if x is one (eq. 41)."""
+    rest = np.linalg.solve(-notch.A, notch.B * x[PITCH_RATE])
+    extended = np.concatenate((x, rest))
+    extended[PITCH_RATE] = notch.C @ rest + notch.D * x[PITCH_RATE]
+    return extended
+
+
+def from_true_rate(notch: Filter) -> np.ndarray:
+    """Return T (9 + k, 9 + k) with x' = T x, where x has the true pitch rate in place of the filtered one."""
+    T = np.eye(N_STATES + len(notch.B))
+    T[PITCH_RATE, PITCH_RATE] = notch.D
+    T[PITCH_RATE, N_STATES:] = notch.C
+    return T
+
+
+Linearised = Callable[[float, float], tuple[np.ndarray, np.ndarray]]
+"""Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s)."""
+
+
+def linearise(vehicle: VehicleParameters, altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return continuous-time A (9, 9) and B (9, 2) of the decoupled model at trim (paper eq. 6 to eq. 9), SI.
+
+    Args:
+        vehicle: Parameters; their inertial coupling is left out.
+        altitude: m.
+        velocity: m/s.
+
+    Raises:
+        TrimError: No equilibrium there.
+    """
+    rigid = vehicle.decoupled()
+    equilibrium = trim(rigid, altitude, velocity)
+    return jacobian(equilibrium.state, equilibrium.input, rigid)
+
+
+def linearise_extended(
+    vehicle: VehicleParameters, notch: Filter, altitude: float, velocity: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return continuous-time A' (9 + k, 9 + k) and B' (9 + k, 2) of the decoupled ECM at trim (paper eq. 44), SI.
+
+    Arguments and errors as for :func:`linearise`; ``notch``: the filter, with k states. The pitch rate that moves the
+    vehicle is the true one.
+    """
+    rigid = vehicle.decoupled()
+    equilibrium = trim(rigid, altitude, velocity)
+    return extended_jacobian(extended_state(equilibrium.state, notch), equilibrium.input, rigid, notch, False)
+
+
+def sample(
+    model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return zero-order-hold A (n_h, n_v, n, n) and B (n_h, n_v, n, m) of ``model`` on a grid (paper eq. 10).
+
+    Args:
+        model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
+        altitudes: (n_h) m.
+        velocities: (n_v) m/s.
+        period: Sampling period (s).
+    """
+    rows = [
+        [zero_order_hold(*model(altitude, velocity), period) for velocity in velocities.tolist()]
+        for altitude in altitudes.tolist()
+    ]
+    return np.array([[A for A, _ in row] for row in rows]), np.array([[B for _, B in row] for row in rows])
+
+
+def grid_polytope(model: Linearised, altitudes: np.ndarray, velocities: np.ndarray, period: float) -> Polytope:
+    """Return the polytopic model whose vertices are the discretised linearisations on a grid, weights bilinear.
+
+    Args:
+        model: Continuous-time A (n, n) and B (n, m) at an altitude (m) and a velocity (m/s).
+        altitudes: (n_h) m, increasing.
+        velocities: (n_v) m/s, increasing.
+        period: Sampling period (s).
+    """
+    A, B = sample(model, altitudes, velocities, period)
+    n, m = B.shape[2:]
+    return Polytope(
+        A.reshape(-1, n, n),
+        B.reshape(-1, n, m),
+        axis_weights(altitudes, np.eye(len(altitudes)), "linear"),
+        axis_weights(velocities, np.eye(len(velocities)), "linear"),
+    )
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A real pole, or the upper one of a pair (rad/s), its natural frequency (rad/s) and damping ratio."""
+
+    pole: complex
+    natural_frequency: float
+    damping_ratio: float
+
+
+def modes(A: np.ndarray) -> list[Mode]:
+    """Return the modes of ``A`` (n, n), fastest first; a damping ratio of -1 marks an unstable real pole."""
+    found = []
+    for pole in np.linalg.eigvals(A).tolist():
+        if pole.imag >= 0.0:
+            frequency = abs(pole)
+            found.append(Mode(complex(pole), frequency, -complex(pole).real / frequency if frequency else 0.0))
+    return sorted(found, key=lambda mode: -mode.natural_frequency)
+
+
+def frequency_response(
+    A: np.ndarray, B: np.ndarray, frequencies: np.ndarray, period: float | None = None
+) -> np.ndarray:
+    """Return the response (f, n, m) of all states to all inputs, complex.
+
+    Args:
+        A: (n, n) state matrix.
+        B: (n, m) input matrix.
+        frequencies: (f) rad/s.
+        period: Sampling period (s) of a discrete-time model, ``None`` for a continuous one.
+
+    Raises:
+        DesignError: A frequency at or above the Nyquist frequency of a discrete-time model.
+    """
+    if period is not None and np.max(frequencies) >= math.pi / period:
+        nyquist = math.pi / period
+        raise DesignError(
+            f"frequency {np.max(frequencies):.6g} rad/s: expected less than the Nyquist frequency {nyquist:.6g} rad/s"
+        )
+    s = 1j * np.asarray(frequencies, float)
+    z = s if period is None else np.exp(s * period)
+    return np.linalg.solve(z[:, None, None] * np.eye(len(A)) - A, B.astype(complex))
+
+
+def bode(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return magnitude (dB) and phase (deg, unwrapped along the first axis) of a complex response."""
+    return 20.0 * np.log10(np.abs(response)), np.degrees(np.unwrap(np.angle(response), axis=0))
+
+
+def bode_difference(response: np.ndarray, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return |difference| of magnitude (dB) and phase (deg, at most 180) of two complex responses."""
+    ratio = response / expected
+    return np.abs(20.0 * np.log10(np.abs(ratio))), np.abs(np.degrees(np.angle(ratio)))
