@@ -13,14 +13,11 @@ import numpy as np
 from scipy.signal import lfilter
 
 from hsv.control.design import find_design
+from hsv.design.certified import CertifiedDesign, load_certified
 from hsv.design.disturbance import CHANNELS
 from hsv.design.region import Region, incomplete_share, record
 from hsv.design.sets.counter_example import responses
-from hsv.design.sets.star_norms import output_rows
 from hsv.design.tube_problem import channel_model
-from hsv.design.verification.checks import Subject
-from hsv.design.verification.invariant_set import certified_set
-from hsv.design.verification.verifier import load_subject
 from hsv.flight.flight import Flight
 from hsv.model.signals import N_RIGID, STATE_NAMES
 
@@ -31,7 +28,7 @@ SLOW = 2.0
 """Time constant, s, of the filter that divides what is slow from what is fast."""
 
 
-def slow_and_fast(subject: Subject, channels: list[int]) -> tuple[np.ndarray, np.ndarray]:
+def slow_and_fast(subject: CertifiedDesign, channels: list[int]) -> tuple[np.ndarray, np.ndarray]:
     """Return the half-widths of both over flights of the nominal vehicle and 32 corners, inflated as W is."""
     inputs, decay = subject.inputs, np.exp(-subject.design.period / SLOW)
     region = Region(subject.design, inputs, incomplete_share(inputs))
@@ -48,7 +45,7 @@ def slow_and_fast(subject: Subject, channels: list[int]) -> tuple[np.ndarray, np
     return half[0], half[1]
 
 
-def lost_by_the_plan(subject: Subject) -> float:
+def lost_by_the_plan(subject: CertifiedDesign) -> float:
     """Return the elevator, rad, that the nominal plan loses to the fault at most, inflated as W is.
 
     It is what remains of this disturbance if the effectiveness belongs to the vertices, and what the feedback adds to
@@ -64,8 +61,8 @@ def main() -> None:
     names = [channel.name for channel in CHANNELS]
     fault, split = names.index("lost_elevator"), [names.index(name) for name in SPLIT]
     for name in sys.argv[1:] or DESIGNS:
-        subject = load_subject(find_design(name))
-        found = certified_set(subject)
+        subject = load_certified(find_design(name))
+        found = subject.invariant_set()
         problem, half = found.problem, found.problem.disturbance.half_width
         slow, fast = slow_and_fast(subject, split)
         shares = ", ".join(f"{w:.0%}" for w in fast / half[split])
@@ -74,8 +71,8 @@ def main() -> None:
         print(f"  the plan alone loses {of_plan:.0%} of the bound of the lost elevator")
         decay = np.exp(-subject.design.period / SLOW)
         for title, row, certified in (
-            ("pitch angle", output_rows(problem)[PITCH_ANGLE], found.half_width[PITCH_ANGLE]),
-            ("elevator feedback", output_rows(problem)[N_RIGID + 1], found.feedback[1]),
+            ("pitch angle", problem.output_rows()[PITCH_ANGLE], found.half_width[PITCH_ANGLE]),
+            ("elevator feedback", problem.output_rows()[N_RIGID + 1], found.feedback[1]),
         ):
             h = np.swapaxes(responses(problem, row), 0, 1)
             free = np.abs(h).sum(axis=1) * half

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from hsv.design.verification.verifier import load_subject
+from hsv.control.checks import load_subject
 
 BASELINE = Path(__file__).parents[2] / "offline_design" / "baseline.yaml"
 

@@ -7,9 +7,10 @@ import sys
 
 import pytest
 
+from hsv.control.checks import load_subject
 from hsv.control.design import read_parameters
 from hsv.design.inputs import find_inputs
-from hsv.design.verification.verifier import load_subject, verify
+from hsv.flight.verification import verify
 
 
 @pytest.fixture

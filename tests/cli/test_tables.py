@@ -12,7 +12,7 @@ from hsv.bench.figure import Figure
 from hsv.cli.design import HALF_WIDTHS, _steps
 from hsv.cli.know import _print_figures
 from hsv.cli.output import console, quantity_table
-from hsv.design.verification.verifier import load_subject
+from hsv.control.checks import load_subject
 
 DESIGNS = Path(__file__).parents[2] / "offline_design"
 

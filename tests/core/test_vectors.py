@@ -49,7 +49,8 @@ from hsv.core.arithmetic import (
     uniforms,
 )
 from hsv.design.disturbance import Record, decompose
-from hsv.design.error_system import along_filter, lag_response, tube_errors
+from hsv.design.error_system import tube_errors
+from hsv.flight.responses import along_filter, lag_response
 from hsv.flight.scenario import load_scenario
 from hsv.model.actuators import actuator_data, actuator_map, actuators_at_rest
 from hsv.model.atmosphere import atmosphere_data, atmosphere_state

@@ -3,10 +3,9 @@ from pathlib import Path
 import pytest
 
 from hsv.design.baseline import design_gains
+from hsv.design.certified import load_certified
 from hsv.design.inputs import read_inputs
 from hsv.design.model import polytopic_model
-from hsv.design.verification.invariant_set import certified_set
-from hsv.design.verification.verifier import load_subject
 from hsv.model.vehicle import load_vehicle
 
 OFFLINE_DESIGN = Path(__file__).parents[2] / "offline_design"
@@ -34,9 +33,9 @@ def design(result):
 
 @pytest.fixture(scope="session")
 def subject():
-    return load_subject(OFFLINE_DESIGN / "baseline.yaml")
+    return load_certified(OFFLINE_DESIGN / "baseline.yaml")
 
 
 @pytest.fixture(scope="session")
 def found(subject):
-    return certified_set(subject)
+    return subject.invariant_set()

@@ -37,7 +37,7 @@ def test_a_plan_that_does_not_fit_is_refused_with_the_amount(bounds):
 def test_a_tube_too_wide_for_the_inputs_is_refused(found):
     with pytest.raises(DesignError, match="more of fuel_equivalence_ratio than there is"):
         tighten(
-            dataclasses.replace(found, feedback=np.array([1.0, 0.1])),
+            dataclasses.replace(found, Q=25.0 * found.Q),
             LIMITS.input_minimum,
             LIMITS.input_maximum,
         )

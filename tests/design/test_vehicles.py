@@ -5,15 +5,16 @@ import json
 import pytest
 
 from hsv.base.errors import DesignError
+from hsv.control.checks import load_subject
 from hsv.control.design import read_design
 from hsv.control.tube_law import TubeStatusCode
 from hsv.design.inputs import find_inputs, read_inputs
-from hsv.design.verification.verifier import load_subject, verify
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.blocks import steps
 from hsv.flight.closed_loop import fly
 from hsv.flight.corners import corners, fraction
 from hsv.flight.scenario import load_scenario
+from hsv.flight.verification import verify
 from hsv.model.plant import FlightStatus
 from hsv.model.vehicle import load_vehicle
 
@@ -73,10 +74,9 @@ def designed(hsv, monkeypatch, source, target):
 
 @pytest.fixture
 def hsv():
-    from hsv.cli.entry import COMMANDS
-    from hsv.cli.main import run
+    from hsv.cli.entry import main
 
-    return lambda: run("hsv", COMMANDS, "")
+    return main
 
 
 def test_a_design_is_for_the_vehicle_beside_its_inputs_and_its_certificate_is_enough(hsv, folder, monkeypatch):

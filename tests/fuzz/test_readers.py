@@ -26,7 +26,7 @@ from hsv.bags.recover import recover
 from hsv.base.errors import CampaignError, HsvError
 from hsv.base.units import parse_quantity
 from hsv.control.design import certificate_path, find_design, read_design
-from hsv.design.verification.preflight import preflight
+from hsv.control.verification import preflight
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import SerialExecutor
 from hsv.flight.campaign.run import run_campaign

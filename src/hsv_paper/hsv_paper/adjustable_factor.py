@@ -12,10 +12,10 @@ import numpy as np
 from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
+from hsv.design.adjustable import certified_loops, relaxed_bound
 from hsv.design.baseline import design_gains, nominal_family, nominal_problem, with_family
-from hsv.design.common_lyapunov import common_lyapunov
-from hsv.design.factor_range import certified_loops, relaxed_bound
 from hsv.design.inputs import DesignInputs, with_tau
+from hsv.design.lyapunov import common_lyapunov
 from hsv.design.region import Region, region_parameters
 from hsv.design.tube import MeasuredSet, measured_set
 from hsv.flight.assembly import assemble

@@ -13,7 +13,7 @@ from hsv.control.coverage import uncovered_hardware
 from hsv.control.design import CERTIFICATE_PARAMETERS, TAU
 from hsv.control.effectiveness import EFFECTIVENESS_ENABLED, WATCHED_PARAMETERS
 from hsv.control.tube_law import TUBE_PARAMETERS, TubeLaw
-from hsv.design.verification.preflight import preflight
+from hsv.control.verification import preflight
 from hsv_ctrl.design import declare_design
 from hsv_ctrl.tube import TubeNode
 from hsv_node.main import run_node

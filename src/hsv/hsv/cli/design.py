@@ -37,10 +37,10 @@ if TYPE_CHECKING:
     import numpy as np
     from rich.table import Table
 
+    from hsv.control.checks import Check
     from hsv.control.design import ControlDesign
+    from hsv.design.compare import Row
     from hsv.design.inputs import DesignInputs
-    from hsv.design.sets.compare import Row
-    from hsv.design.verification.checks import Check
     from hsv.model.dynamics import VehicleParameters
     from hsv.model.lpv.linearisation import Mode
     from hsv.model.trim import Trim
@@ -239,7 +239,7 @@ def design(
     ] = None,
     force: ForceOption = False,
     compare_sets: Annotated[
-        bool, typer.Option("--compare-sets", help="Also compute the set by the other methods, and print a table.")
+        bool, typer.Option("--compare-sets", help="Also print ellipsoid, star norms and counter-examples in a table.")
     ] = False,
     tau: Annotated[
         str, typer.Option(help="Adjustable factor in place of the input's: one number, or five with commas between.")
@@ -313,19 +313,17 @@ def _half_widths(half_width: np.ndarray | None, feedback: np.ndarray | None, *si
 
 
 def _compared(design: ControlDesign, report: dict[str, Any], inputs: DesignInputs) -> list[Row]:
+    from hsv.design.compare import compare_sets
     from hsv.design.disturbance import DisturbanceSet
-    from hsv.design.sets.compare import compare_sets
     from hsv.design.tube_problem import tube_problem
 
-    disturbance = report["tube"]["disturbance"]
-    problem = tube_problem(design, inputs.flown_vehicle, DisturbanceSet.from_report(disturbance["channels"]))
-    delta = disturbance["boxes"]["delta"]
-    return compare_sets(design, problem, delta, inputs.disturbance.inflation, inputs.invariant_set)
+    disturbance = DisturbanceSet.from_report(report["tube"]["disturbance"]["channels"])
+    return compare_sets(design, tube_problem(design, inputs.flown_vehicle, disturbance), inputs.invariant_set)
 
 
 def _check(source: Path, found: ControlDesign, json: bool) -> None:
-    from hsv.design.verification.agreement import deviations
-    from hsv.design.verification.verifier import load_subject
+    from hsv.control.checks import load_subject
+    from hsv.design.agreement import deviations
 
     deviating = deviations(found, load_subject(source.with_suffix(".yaml")))
     worst = max(deviating, key=lambda deviation: deviation.scaled)
@@ -411,17 +409,18 @@ def verify(
     ] = False,
     json: JsonOption = False,
 ) -> None:
-    """Recompute everything that a design and its certificate state, and name the first item that fails.
+    """Recompute what a design and its certificate state, and name the first item that fails.
 
-    No hash is relied on.
+    The checks share no code with the design. Fields of the certificate that no check recomputes are listed as "stated,
+    not checked".
 
     Example: hsv verify offline_design/baseline.yaml --scenario case1_qp
     """
+    from hsv.control.checks import load_subject, unchecked
     from hsv.control.design import find_design
-    from hsv.design.verification.scenario import bounding_corners, scenario_checks
-    from hsv.design.verification.verifier import load_subject
-    from hsv.design.verification.verifier import verify as recompute
     from hsv.flight.scenario import load_scenario
+    from hsv.flight.verification import bounding_corners, scenario_checks
+    from hsv.flight.verification import verify as recompute
 
     if corners and not scenario:
         raise QuantityError("corners: expected with --scenario only")
@@ -429,14 +428,14 @@ def verify(
     with stages() as progress:
         checks = recompute(subject, quick or bool(scenario), progress)
         if scenario:
-            loaded = load_scenario(scenario)
             over = bounding_corners(subject) if corners else [{}]
-            flights = scenario_checks(subject, loaded, over, lambda done: progress("flights", done, len(over)))
-            checks["scenario"] = list(flights)
+            checks["scenario"] = list(scenario_checks(subject, load_scenario(scenario), over, progress))
     rows = [(part, check) for part, made in checks.items() for check in made]
     failing = [(part, check) for part, check in rows if not check.ok]
+    stated = unchecked(subject, [check for _, check in rows])
     if json:
-        print_json({"claims": [{"part": part, **vars(check)} for part, check in rows], "ok": not failing})
+        claims = [{"part": part, **vars(check)} for part, check in rows]
+        print_json({"claims": claims, "stated": stated, "ok": not failing})
     else:
         table = new_table("", "check", "found", "expected")
         for part, made in checks.items():
@@ -447,6 +446,7 @@ def verify(
                 table.add_row(*cells, style=None if check.ok else "bold red")
         table.add_row("", Text(f"{len(rows) - len(failing)} of {len(rows)} checks pass", "bold"), "", "")
         console.print(table)
+        console.print(folded(f"stated, not checked: {', '.join(stated)}"), soft_wrap=True)
     if failing:
         part, check = failing[0]
         report_error(f"{part}: check fails: {check}")
@@ -499,13 +499,13 @@ def certify(
     Example: hsv certify offline_design/realistic.yaml --sensors fine --turbulence "2 ft/s"
     """
     from hsv.control.design import find_design
-    from hsv.design.verification.declared import declared, declared_actuators, described
-    from hsv.design.verification.verdict import certified_with
-    from hsv.design.verification.verifier import load_subject
+    from hsv.design.certified import load_certified
+    from hsv.design.hardware.declared import declared, declared_actuators, described
+    from hsv.design.hardware.verdict import certified_with
     from hsv.flight.coverage import uncovered_of
     from hsv.flight.scenario import load_scenario
 
-    subject = load_subject(find_design(file))
+    subject = load_certified(find_design(file))
     models, unbounded = described(
         subject, sensor_set=sensors, bias=bias, gust=gust, turbulence=turbulence, density=density, reach=reach
     )

@@ -56,6 +56,34 @@ def spectral_radii(matrices: np.ndarray) -> np.ndarray:
     return np.asarray(np.abs(np.linalg.eigvals(matrices)).max(axis=-1))
 
 
+def image(Q: np.ndarray, name: str, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+    """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
+
+    At most 1: M takes the ellipsoid x' Q^-1 x <= 1 into itself. The smallest eigenvalue of [Q, (M Q)'; M Q, Q], scaled
+    to a unit diagonal, is 1 less this value.
+
+    Args:
+        Q: (n, n) the matrix of the ellipsoid.
+        name: Its name, for the error message.
+        M: (..., n, n) matrices.
+        columns: (..., n, d) further columns.
+
+    Raises:
+        DesignError: Q is not positive definite.
+    """
+    try:
+        L = np.linalg.cholesky(Q)
+    except np.linalg.LinAlgError as error:
+        raise DesignError(f"{name} is not positive definite") from error
+    return np.asarray(np.linalg.norm(np.linalg.solve(L, np.concatenate((M @ L, *columns), axis=-1)), 2, axis=(-2, -1)))
+
+
+def inverse(Q: np.ndarray) -> np.ndarray:
+    """Return Q^-1, symmetric."""
+    P = np.linalg.inv(Q)
+    return np.asarray(0.5 * (P + P.T))
+
+
 VERTEX_DIGITS = 12
 """Digits kept of vertices, below the scales of the model: two processors agree on ten, but the slow modes in the Bode
 plot need twelve. Entries that are zero in the physical model are below 1e-14 and become zero."""

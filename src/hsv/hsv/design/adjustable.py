@@ -11,6 +11,7 @@ from hsv.base.errors import DesignError
 from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_gain import nominal_gain
+from hsv.control.optimisation import BOUND_DIGITS, rounded
 from hsv.design.baseline import (
     DesignResult,
     design_gains,
@@ -22,15 +23,19 @@ from hsv.design.baseline import (
     versions,
     with_family,
 )
-from hsv.design.common_lyapunov import CommonLyapunov, common_lyapunov
-from hsv.design.factor_range import certified_loops, relaxed_bound, room_at_one
+from hsv.design.disturbance import DisturbanceSet
+from hsv.design.error_system import error_system
 from hsv.design.full_state import full_state_report
 from hsv.design.inputs import AdjustableInputs, DesignInputs
+from hsv.design.lyapunov import CommonLyapunov, common_lyapunov
 from hsv.design.region import Region, incomplete_share
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.tightening import TightenedInputs, tighten
 from hsv.design.tube import MeasuredSet, Tube, design_tube, flights_in_tube, flights_report, measured_set
-from hsv.design.tube_problem import channel_model
+from hsv.design.tube_problem import bounding_factors, channel_model, tube_problem
 from hsv.model.signals import N_RIGID
 from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
 
 
 @dataclass(frozen=True)
@@ -79,7 +84,7 @@ def design_adjustable(inputs: DesignInputs, progress: Progress | None = None) ->
         raise DesignError(
             f"nominal plan at tau = 1: {room.tolist()} of room to U minus F' Z', expected none below zero"
         )
-    flown = replace(design, coupling=inputs.disturbance.coupling, tube=tube.flown(), plan_bounds=tube.plan)
+    flown = replace(design, coupling=inputs.disturbance.coupling, tube=tube.found.seen(), plan_bounds=tube.plan)
     report = {
         **gains.report,
         "nominal": nominal_report(inputs, design, family),
@@ -143,3 +148,49 @@ def _report(
         "scaled_half_width": (tau * np.array(complete["invariant_set"]["half_width"])).tolist(),
         "complete_fault": beyond,
     }
+
+
+def certified_loops(design: ControlDesign, vehicle: Vehicle, effectiveness: float) -> np.ndarray:
+    """Return the closed loops (r, n, n) of error and filter that must share a Lyapunov function.
+
+    Vertices x adjustable factors (the least, 1) x elevator effectiveness (1, ``effectiveness``).
+    """
+    polytope, model = design.polytope, channel_model(design, vehicle)
+
+    def loop(factor: np.ndarray, share: float) -> np.ndarray:
+        gain = design.feedback_gain[:, :N_RIGID] * factor
+        return error_system(polytope.A, polytope.B * np.array([1.0, share]), gain, model.notch, model.columns).A
+
+    return np.concatenate([loop(f, share) for f in bounding_factors(design) for share in (1.0, effectiveness)])
+
+
+def relaxed_bound(
+    bound: np.ndarray, trim_input: np.ndarray, complete: TightenedInputs, incomplete: TightenedInputs
+) -> np.ndarray:
+    """Return the bounds (2) of |u_n| in (52): ``bound``, grown as U minus F' Z' is wider than U minus F Z.
+
+    Both are compared about the target's ``trim_input`` (2), on the side with less room (paper eq. 53), and rounded.
+
+    Raises:
+        DesignError: No room at all, at tau = 1 or at the factor.
+    """
+    before, after = complete.symmetric(trim_input), incomplete.symmetric(trim_input)
+    for name, room in (("U minus F Z at tau = 1", before), ("U minus F' Z'", after)):
+        if not room.min() > 0.0:
+            raise DesignError(f"{name}: {room.tolist()} about the trim, expected room above zero")
+    return rounded(bound * after / before, 1.0, BOUND_DIGITS)
+
+
+def room_at_one(design: ControlDesign, vehicle: Vehicle, tube: dict[str, Any]) -> np.ndarray:
+    """Return the least room (2) that the plan of the certificate ``tube`` leaves where the factor is set to 1.
+
+    Raises:
+        DesignError: The feedback leaves nothing of an input there.
+    """
+    one = replace(design, tau_minimum=np.ones(N_RIGID))
+    problem = tube_problem(one, vehicle, DisturbanceSet.from_report(tube["disturbance"]["channels"]))
+    bounds = tighten(
+        InvariantSet.from_report(problem, tube["invariant_set"]), design.input_minimum, design.input_maximum
+    )
+    plan = tube["tightening"]["plan"]
+    return np.asarray(bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"])).min(axis=1))

@@ -14,7 +14,7 @@ from hsv.base.processes import Progress
 from hsv.control.design import ControlDesign
 from hsv.control.nominal_gain import NominalGain, NominalProblem, nested_gains, step_deviation
 from hsv.control.notch_filter import NotchSection
-from hsv.control.optimisation import spectral_radii
+from hsv.control.optimisation import inverse, spectral_radii
 from hsv.design.feedback import FeedbackGain, feedback_gain
 from hsv.design.inputs import DesignInputs
 from hsv.design.model import DesignModel, design_model
@@ -60,7 +60,7 @@ def design_baseline(inputs: DesignInputs, progress: Progress | None = None) -> D
         except DesignError as error:
             bound = literal.nominal.input_bound.array().tolist()
             raise DesignError(f"literal chain (30) to (35), |u_n| at most {bound}: {error}") from error
-    design = replace(gains.design, coupling=inputs.disturbance.coupling, tube=tube.flown(), plan_bounds=tube.plan)
+    design = replace(gains.design, coupling=inputs.disturbance.coupling, tube=tube.found.seen(), plan_bounds=tube.plan)
     report = {
         **gains.report,
         "versions": versions(),
@@ -114,7 +114,7 @@ def design_gains(inputs: DesignInputs, progress: Progress | None = None) -> Desi
         velocity_samples=model.velocity_samples,
         feedback_gain=_all_states(feedback.F),
         nominal_gains=np.stack([_all_states(gain.K) for gain in nominal]),
-        nominal_ellipsoids=np.stack([_inverse(gain.Q) for gain in nominal]),
+        nominal_ellipsoids=np.stack([inverse(gain.Q) for gain in nominal]),
         nominal_state_scale=problem.state_scale,
         nominal_input_scale=problem.input_scale,
         nominal_input_bound=problem.input_bound,
@@ -157,7 +157,7 @@ def with_family(design: ControlDesign, problem: NominalProblem, gains: list[Nomi
     return replace(
         design,
         nominal_gains=np.stack([_all_states(gain.K) for gain in gains]),
-        nominal_ellipsoids=np.stack([_inverse(gain.Q) for gain in gains]),
+        nominal_ellipsoids=np.stack([inverse(gain.Q) for gain in gains]),
         nominal_input_bound=problem.input_bound,
     )
 
@@ -198,11 +198,6 @@ def _all_states(gain: np.ndarray) -> np.ndarray:
     full = np.zeros((N_INPUTS, N_STATES))
     full[:, :N_RIGID] = gain
     return full
-
-
-def _inverse(Q: np.ndarray) -> np.ndarray:
-    P = np.linalg.inv(Q)
-    return np.asarray(0.5 * (P + P.T))
 
 
 def _report(

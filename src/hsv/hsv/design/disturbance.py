@@ -25,7 +25,8 @@ import numpy as np
 from hsv.control.notch_filter import NotchData
 from hsv.control.optimisation import outward
 from hsv.core import doubles, lib
-from hsv.design.error_system import along_filter, lag_response, tube_errors
+from hsv.design.error_system import tube_errors
+from hsv.flight.responses import along_filter, lag_response
 from hsv.model.lpv.actuated import SampledActuators, respond
 from hsv.model.lpv.linearisation import linearise, zero_order_hold
 from hsv.model.lpv.polytope import Polytope

@@ -8,7 +8,8 @@ signal of the plan alone. The pitch rate in e is the true one.
 Actuators that a design knows belong to it, too: e_a = a - a_n, where a_n are the same actuators driven by the plan
 u_n + u_r from the same start. Then e_a(k+1) = A_a e_a + B_a (F e + lost elevator), and their position acts on e. The
 nominal model takes the plan itself, so what the plan and a_n differ by, its lag, moves e as well. That is a signal of
-the plan alone, and so is its effect in the closed loop, :func:`lag_response`: e less that is the error in the tube.
+the plan alone, and so is its effect in the closed loop, :func:`hsv.flight.responses.lag_response`:
+e less that is the error in the tube.
 """
 
 from __future__ import annotations
@@ -19,11 +20,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hsv.control.notch_filter import NotchData, with_notch
-from hsv.core import doubles, lib, vector
+from hsv.flight.responses import along_filter
 from hsv.model.actuators import ActuatorSet
 from hsv.model.lpv.actuated import SampledActuators, actuator_names, respond, sampled_actuators
-from hsv.model.lpv.polytope import Polytope
-from hsv.model.signals import N_INPUTS, N_RIGID, PITCH_RATE, STATE_NAMES
+from hsv.model.signals import N_RIGID, PITCH_RATE, STATE_NAMES
 
 
 @dataclass(frozen=True)
@@ -111,13 +111,6 @@ def union(first: ErrorSystem, *others: ErrorSystem) -> ErrorSystem:
     return replace(first, A=A, B=B, G=G)
 
 
-def paper_system(A: np.ndarray, B: np.ndarray, F: np.ndarray) -> ErrorSystem:
-    """Return the error system as the paper has it (eq. 22): all states, no filter, a disturbance on every state."""
-    r, n, _ = A.shape
-    identity = np.broadcast_to(np.eye(n), (r, n, n))
-    return ErrorSystem(A + B @ F, B, identity, F, np.zeros((len(F), n)), STATE_NAMES)
-
-
 def tube_errors(
     state: np.ndarray,
     deviation: np.ndarray,
@@ -141,41 +134,3 @@ def tube_errors(
     if actuators is not None and beyond_plan is not None:
         errors.append(respond(actuators, beyond_plan)[0])
     return np.hstack(errors)
-
-
-def along_filter(notch: NotchData, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return ``rate`` (k) filtered, from rest for its first value, and the filter's states (k, s) before each step."""
-    filtered, states = np.empty(len(rate)), np.empty((len(rate), 2 * len(notch.D)))
-    lib.hsv_notch_along(notch.pointer, len(rate), *map(doubles, (vector(rate), filtered, states)))
-    return filtered, states
-
-
-def lag_response(
-    polytope: Polytope,
-    gain: np.ndarray,
-    notch: NotchData,
-    actuators: SampledActuators,
-    scheduled: np.ndarray,
-    lag: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the effect of the plan's lag on e (k, n) and on the feedback (k, 2), in closed loop, from zero.
-
-    Args:
-        polytope: The design's model.
-        gain: (2, 5) F, with its factor.
-        notch: The discrete filter.
-        actuators: Actuators of the design.
-        scheduled: (k, 2) altitude and velocity of the flight.
-        lag: (k, 2) mean position of actuators driven by the plan, less the plan.
-    """
-    a, s, data = len(actuators.A), 2 * len(notch.D), polytope.data()
-    errors, feedback = np.empty((len(lag), N_RIGID + s + a)), np.empty((len(lag), N_INPUTS))
-    lib.hsv_lag_response(
-        data.pointer,
-        doubles(vector(gain)),
-        notch.pointer,
-        actuators.pointer,
-        len(lag),
-        *(doubles(vector(each)) for each in (scheduled, lag, errors, feedback)),
-    )
-    return errors, feedback

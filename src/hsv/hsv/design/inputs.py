@@ -237,7 +237,7 @@ class DisturbanceInputs(_Table):
 class InvariantSetInputs(_Table):
     """Inputs of the invariant set (paper eq. 25 to eq. 28): the weights of its size."""
 
-    method: Literal["ellipsoid", "star_norms", "zonotope", "modal", "box"]
+    method: Literal["ellipsoid", "star_norms"]
     """"star_norms": the ellipsoid, and for half-widths and feedback an ellipsoid for each output and disturbance."""
     contraction: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1, max_length=20)
     """Multipliers of the S-procedure to try."""

@@ -9,23 +9,20 @@ from typing import Any
 import numpy as np
 
 from hsv.base.processes import Progress
-from hsv.control.design import ControlDesign, PlanBounds, TubeSet
+from hsv.control.design import ControlDesign, PlanBounds
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, Membership, widened
 from hsv.design.inputs import DesignInputs, InvariantSetInputs
 from hsv.design.region import Region, RegionResult, incomplete_share, measure, record
-from hsv.design.sets.box import box
 from hsv.design.sets.counter_example import counter_examples
 from hsv.design.sets.ellipsoid import ellipsoid
-from hsv.design.sets.ellipsoid_set import EllipsoidSet
-from hsv.design.sets.invariant_set import InvariantSet, TubeProblem
-from hsv.design.sets.modal import modal_box
-from hsv.design.sets.sampling import sample
-from hsv.design.sets.star_norm_search import star_norms
-from hsv.design.sets.zonotope import zonotope
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.sets.problem import TubeProblem
+from hsv.design.sets.star_norms import star_norms
 from hsv.design.tightening import TightenedInputs, check_plan, plan_bounds, tighten
 from hsv.design.tube_problem import channel_model, tube_problem
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import flight_metrics
+from hsv.flight.random_sequences import random_sequences
 from hsv.model.signals import PITCH_RATE
 
 SEQUENCES, STEPS, SEED = 100_000, 600, 1
@@ -50,28 +47,11 @@ class Tube:
     plan: PlanBounds
     report: dict[str, Any]
 
-    def flown(self) -> TubeSet | None:
-        """Return the set as a controller carries it; only the ellipsoid can be watched in flight."""
-        return self.found.seen() if isinstance(self.found, EllipsoidSet) else None
-
 
 def invariant_set(
     problem: TubeProblem, inputs: InvariantSetInputs, progress: Progress = lambda *_: None
 ) -> InvariantSet:
-    """Return the set by the method asked for.
-
-    Raises:
-        DesignError: The method finds none.
-    """
-    if inputs.method in ("ellipsoid", "star_norms"):
-        return ellipsoid_set(problem, inputs, progress)
-    return {"zonotope": zonotope, "modal": modal_box, "box": box}[inputs.method](problem)
-
-
-def ellipsoid_set(
-    problem: TubeProblem, inputs: InvariantSetInputs, progress: Progress = lambda *_: None
-) -> EllipsoidSet:
-    """Return the ellipsoid, narrowed by star norms where the method is that.
+    """Return the ellipsoid, narrowed by star norms where the inputs ask for them.
 
     Raises:
         DesignError: There is none.
@@ -79,7 +59,7 @@ def ellipsoid_set(
     progress("invariant set", 0, 1)
     found = ellipsoid(problem, inputs.state_scale.array(), inputs.input_scale.array(), inputs.contraction)
     progress("invariant set", 1, 1)
-    if inputs.method != "star_norms":
+    if inputs.method == "ellipsoid":
         return found
     return found.narrowed(star_norms(problem, found.centre, partial(progress, "star norms")))
 
@@ -141,11 +121,10 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     tube = measured_set(design, region, inputs, progress)
     found, bounds = tube.found, tube.bounds
 
-    sampling = None
-    if isinstance(found, EllipsoidSet):
-        progress("random sequences", 0, 1)
-        sampling = sample(found, SEQUENCES, STEPS, SEED)
-        progress("random sequences", 1, 1)
+    progress("random sequences", 0, 1)
+    columns = found.problem.columns(found.centre)
+    sampling = random_sequences(found.problem.system.A, columns, found.centre, found.Q, SEQUENCES, STEPS, SEED)
+    progress("random sequences", 1, 1)
 
     flown = flights_in_tube(channel_model(design, inputs.flown_vehicle), region, found, progress)
     lowest, highest = np.min([f.lowest for f in flown], axis=0), np.max([f.highest for f in flown], axis=0)
@@ -179,7 +158,7 @@ class FlightEvidence:
     least and largest feedback to the lag of the plan.
     """
 
-    level: float | None
+    level: float
     ratios: np.ndarray
     membership: Membership
     lowest: np.ndarray
@@ -198,7 +177,7 @@ def flight_evidence(
     pitch_acceleration = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
     return FlightEvidence(
-        level=float(found.level(errors).max()) if isinstance(found, EllipsoidSet) else None,
+        level=float(found.level(errors).max()),
         ratios=np.max(np.abs(errors - found.centre), axis=0) / found.half_width,
         membership=disturbance.membership(model.signals(recorded).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
@@ -225,33 +204,16 @@ def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> 
 
 
 def _set_report(found: InvariantSet) -> dict[str, Any]:
-    report: dict[str, Any] = {
-        "kind": found.kind,
-        "states": list(found.problem.system.names),
-        "centre": found.centre.tolist(),
-        "half_width": found.half_width.tolist(),
-        "feedback_half_range": found.feedback.tolist(),
-    }
-    if isinstance(found, EllipsoidSet):
-        report |= {
-            "Q": found.Q.tolist(),
-            "contraction": found.contraction,
-            "multipliers": found.multipliers.tolist(),
-            "solver": found.solver.as_dict(),
-        }
-        if found.star_norms:
-            report["star_norms"] = found.star_norms.as_dict()
-            report["counter_examples"] = counter_examples(found.problem).as_dict()
-    return report
+    driven = {"counter_examples": counter_examples(found.problem).as_dict()} if found.star_norms else {}
+    return found.report() | driven
 
 
 def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:
     """Return the worst of all flights, for JSON."""
     worst = max((f.membership for f in flown), key=lambda membership: membership.ratio)
-    levels = [f.level for f in flown if f.level is not None]
     return {
         "flights": len(flown),
-        "worst_level": max(levels) if levels else None,
+        "worst_level": max(f.level for f in flown),
         "worst_ratio_to_half_width": np.max([f.ratios for f in flown], axis=0).tolist(),
         "disturbance_membership": {
             "outside": sum(not f.membership.inside for f in flown),

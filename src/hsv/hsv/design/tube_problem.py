@@ -8,7 +8,7 @@ from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
 from hsv.design.disturbance import ChannelModel, DisturbanceSet, acceleration_channels
 from hsv.design.error_system import error_system, union
-from hsv.design.sets.invariant_set import TubeProblem
+from hsv.design.sets.problem import TubeProblem
 from hsv.model.actuators import ACTUATOR_SETS, ActuatorSet
 from hsv.model.lpv.actuated import sampled_actuators
 from hsv.model.signals import N_RIGID

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.linalg import eigh
 
 from hsv.base.units import to_paper
-from hsv.control.nominal_trajectory import FamilyLaw, nominal_data
-from hsv.control.optimisation import spectral_radii
+from hsv.control.nominal_law import FamilyLaw
+from hsv.control.nominal_trajectory import nominal_data
 from hsv.model.signals import N_RIGID
+from hsv_paper.box import infeasibility
 from hsv_paper.claims.evidence import Evidence
 
 
@@ -32,8 +33,9 @@ def kept_of_level(A: np.ndarray, B: np.ndarray, gain: np.ndarray, shape: np.ndar
 def box(evidence: Evidence) -> dict[str, Any]:
     """Return the spectral radius that must be below 1 for the paper's box to exist."""
     flown = evidence.design("baseline").flown
-    closed = np.abs(flown.polytope.A + flown.polytope.B @ flown.feedback_gain)
-    return {"radius": float(spectral_radii(closed.max(axis=0)[None]).max())}
+    delta = evidence.design("baseline").certificate["tube"]["disturbance"]["boxes"]["delta"]
+    half_width = 0.5 * np.subtract(delta["upper"], delta["lower"])
+    return {"radius": infeasibility(flown.polytope.A + flown.polytope.B @ flown.feedback_gain, half_width).radius}
 
 
 def certified_attitude(evidence: Evidence) -> dict[str, Any]:

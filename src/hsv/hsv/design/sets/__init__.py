@@ -1,1 +1,1 @@
-"""Robust invariant sets of the error system (paper eq. 25 to eq. 28): one interface, four ways to compute them."""
+"""Robust invariant sets of the error system (paper eq. 25 to eq. 28): an ellipsoid, which star norms may narrow."""

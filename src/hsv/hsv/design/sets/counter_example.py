@@ -1,4 +1,4 @@
-"""What no certificate can be below: sequences of disturbances that drive the error far, by which sets are measured."""
+"""Sequences of disturbances that drive the error far: no certificate can be below what they attain."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import numpy as np
 
 from hsv.base.errors import DesignError
 from hsv.control.optimisation import spectral_radii
-from hsv.design.sets.invariant_set import TubeProblem
-from hsv.design.sets.star_norms import output_rows
+from hsv.design.sets.problem import TubeProblem
 
 _NEGLIGIBLE = 1e-6
 """Share of a row's sum below which the rest of its response, of steps far back, is left out."""
@@ -24,7 +23,7 @@ class CounterExamples:
     """For each output row the vertex and the disturbances that drive it farthest of all at a constant vertex.
 
     ``half_range`` (7): half the distance between what the sequence and its opposite make of zero error, SI; ``vertex``
-    (7); ``steps`` (7) lengths of the sequences. Rows are those of :func:`hsv.design.sets.star_norms.output_rows`.
+    (7); ``steps`` (7) lengths of the sequences. Rows are those of :meth:`TubeProblem.output_rows`.
     """
 
     half_range: np.ndarray
@@ -48,7 +47,7 @@ def counter_examples(problem: TubeProblem) -> CounterExamples:
     radius = spectral_radii(problem.system.A).max()
     if not radius < 1.0:
         raise DesignError(f"counter-examples: spectral radius of a vertex = {radius:.6g}, expected below 1")
-    rows = output_rows(problem)
+    rows = problem.output_rows()
     found = [_driven(problem, row) for row in rows]
     half_range, vertex, steps = (np.array(column) for column in zip(*found, strict=True))
     return CounterExamples(half_range, vertex, steps)

@@ -1,4 +1,4 @@
-"""Finding the recentred ellipsoid of :mod:`hsv.design.sets.ellipsoid_set`, small in half-widths and feedback."""
+"""The search for the ellipsoid of :mod:`hsv.design.sets.invariant_set` with small half-widths and feedback."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from scipy.linalg import cholesky, solve_discrete_lyapunov, solve_triangular
 
 from hsv.base.errors import DesignError
 from hsv.control.optimisation import MATRIX_DIGITS, Unknown, minimise, rounded, rounded_matrix
-from hsv.design.sets.ellipsoid_set import EllipsoidSet, from_shape
-from hsv.design.sets.invariant_set import TubeProblem
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.sets.problem import TubeProblem
 
 _INFLATION = 1.002
 """Factor on Q, so that the set is invariant for gains, too, that are tuned in their sixth digit."""
@@ -16,7 +16,7 @@ _INFLATION = 1.002
 
 def ellipsoid(
     problem: TubeProblem, state_scale: np.ndarray, input_scale: np.ndarray, contractions: list[float]
-) -> EllipsoidSet:
+) -> InvariantSet:
     """Return the ellipsoid with the least sum of squares of scaled half-widths and feedback (for paper eq. 26).
 
     Args:
@@ -31,7 +31,7 @@ def ellipsoid(
     weight = np.zeros((len(problem.system.A[0]), len(state_scale) + len(input_scale)))
     weight[: len(state_scale), : len(state_scale)] = np.diag(1.0 / state_scale)
     weight[:, len(state_scale) :] = (problem.system.F / input_scale[:, None]).T
-    best: EllipsoidSet | None = None
+    best: InvariantSet | None = None
     failure: DesignError | None = None
     for contraction in contractions:
         try:
@@ -47,7 +47,7 @@ def ellipsoid(
     return best
 
 
-def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> EllipsoidSet:
+def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> InvariantSet:
     A0 = problem.system.A.mean(axis=0)
     guess = problem.centre()
     G0 = problem.columns(guess)
@@ -82,4 +82,4 @@ def _solve(problem: TubeProblem, weight: np.ndarray, contraction: float) -> Elli
     Q_si = rounded_matrix(_INFLATION * T @ Q @ T.T)
     centre = rounded(guess + T @ shift[:, 0], np.sqrt(np.diag(Q_si)), MATRIX_DIGITS)
     multipliers = rounded(multipliers, 1.0 - contraction, MATRIX_DIGITS)
-    return from_shape(problem, centre, Q_si, contraction, multipliers, solver)
+    return InvariantSet(problem, centre, Q_si, contraction, multipliers, solver)

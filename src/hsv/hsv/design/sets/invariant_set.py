@@ -1,74 +1,131 @@
-"""Interface of the invariant sets of the tube, however they were computed."""
+"""The invariant set of the tube: an ellipsoid {c + v: v' Q^-1 v <= 1}, which star norms may narrow (for paper eq. 26).
+
+At vertex i, v+ = A_i v + G_i d with |d_j| <= 1 (and one more constant d, the drift of the centre) stays inside if there
+are lam and l_j >= 0, sum l_j <= 1 - lam, with (S-procedure)
+
+    [lam Q, 0, Q A_i'; 0, diag(l), G_i'; A_i Q, G_i, Q] >= 0.
+
+Convex combinations of vertices follow, because the set is convex. For fixed lam this is linear in Q, l and c. The
+paper's set is a box (eq. 25 to eq. 28), which does not exist here; see ``hsv_paper.box``.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from hsv.design.disturbance import DisturbanceSet
-from hsv.design.error_system import ErrorSystem
+from hsv.base.errors import DesignError
+from hsv.control.design import TubeSet
+from hsv.control.optimisation import SolverReport, image, inverse
+from hsv.design.sets.problem import TubeProblem
+from hsv.design.sets.star_norms import StarNorms
+from hsv.model.signals import N_RIGID
 
 
 @dataclass(frozen=True)
-class TubeProblem:
-    """Error system and disturbances for which a set is sought.
+class InvariantSet:
+    """A set centre + Z that the error never leaves, with what certifies it; SI.
 
-    Vertices may change arbitrarily from step to step, and so may the disturbances within their bounds.
-    """
-
-    system: ErrorSystem
-    disturbance: DisturbanceSet
-
-    def centre(self) -> np.ndarray:
-        """Return the equilibrium of the mean vertex under the mid-points of the disturbances (n)."""
-        A, G = self.system.A.mean(axis=0), self.system.G.mean(axis=0)
-        return np.linalg.solve(np.eye(len(A)) - A, G @ self.disturbance.centre)
-
-    def columns(self, centre: np.ndarray) -> np.ndarray:
-        """Return (r, n, d + 1) the effect of the disturbances at half their width on e - ``centre``.
-
-        The last column is what each vertex moves the centre by under the mid-points: no choice of centre makes it
-        vanish at all vertices.
-        """
-        A, G = self.system.A, self.system.G
-        drift = A @ centre + G @ self.disturbance.centre - centre
-        return np.concatenate((G * self.disturbance.half_width, drift[:, :, None]), axis=2)
-
-
-@dataclass(frozen=True)
-class InvariantSet(ABC):
-    """A set centre + Z that the error never leaves, and its outer box.
-
-    ``centre`` c (n); ``half_width`` z (n) of Z; ``feedback`` (2) the half-range of F e over Z; SI.
+    ``centre`` c (n), ``Q`` (n, n), ``contraction`` lam, ``multipliers`` l (r, d + 1). With ``star_norms`` it is the
+    intersection with their sums, and half-widths and feedback are the lesser ones.
     """
 
     problem: TubeProblem
     centre: np.ndarray
-    half_width: np.ndarray
-    feedback: np.ndarray
+    Q: np.ndarray
+    contraction: float
+    multipliers: np.ndarray
+    solver: SolverReport
+    star_norms: StarNorms | None = None
 
-    kind = ""
+    @property
+    def half_width(self) -> np.ndarray:
+        """Half-widths z (n) of Z (paper eq. 28)."""
+        return self._bounds(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
 
-    @abstractmethod
+    @property
+    def feedback(self) -> np.ndarray:
+        """Half-range (2) of F e over Z."""
+        F = self.problem.system.F
+        return self._bounds(np.sqrt(np.einsum("ij,jk,ik->i", F, self.Q, F)), slice(N_RIGID, None))
+
+    def _bounds(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
+        if self.star_norms:
+            narrower = self.star_norms.bounds(self.problem)[rows]
+            bounds[: len(narrower)] = np.minimum(bounds[: len(narrower)], narrower)
+        return bounds
+
+    def seen(self) -> TubeSet:
+        """Return the set as a controller sees it: its shadow on the states before those of actuators, if it has any."""
+        n = self.problem.system.seen
+        return TubeSet(self.centre[:n], inverse(self.Q[:n, :n]), self.half_width[:n])
+
     def level(self, error: np.ndarray) -> np.ndarray:
-        """Return the level of errors e (..., n): at most 1 inside the set, larger outside."""
+        """Return (e - c)' Q^-1 (e - c) of errors (..., n): at most 1 inside the ellipsoid."""
+        v = error - self.centre
+        return np.asarray(np.einsum("...i,ij,...j->...", v, inverse(self.Q), v))
 
-    @abstractmethod
+    def residuals(self) -> np.ndarray:
+        """Return the smallest eigenvalue (r) of the inequality at each vertex; above zero: invariant.
+
+        By its Schur complement, with Q and the diagonal scaled to the identity.
+        """
+        columns = self.problem.columns(self.centre) / np.sqrt(self.multipliers)[:, None, :]
+        return 1.0 - image(self.Q, "ellipsoid: Q", self.problem.system.A / np.sqrt(self.contraction), columns) ** 2
+
     def certify(self) -> dict[str, Any]:
         """Recompute that the set is invariant at every vertex and return the evidence, for JSON.
 
         Raises:
-            DesignError: It is not.
+            DesignError: It is not, or zero error, where flights start, lies outside.
         """
+        sums = self.multipliers.sum(axis=1).max()
+        if not (self.multipliers.min() > 0.0 and sums <= (1.0 - self.contraction) * (1.0 + 1e-12)):
+            raise DesignError("ellipsoid: multipliers: expected all above zero, sums of at most 1 - contraction")
+        residuals, origin = self.residuals(), float(self.level(np.zeros(len(self.Q))))
+        worst = int(np.argmin(residuals))
+        if not residuals[worst] > 0.0:
+            raise DesignError(f"ellipsoid: inequality at vertex {worst} = {residuals[worst]:.3g}, expected above zero")
+        if not origin <= 1.0:
+            raise DesignError(f"ellipsoid: level of e = 0 is {origin:.6g}, expected at most 1: flights start there")
+        evidence: dict[str, Any] = {"lmi_smallest_eigenvalues": residuals.tolist(), "level_of_zero_error": origin}
+        if self.star_norms:
+            evidence["star_norms"] = self.star_norms.certify(self.problem, self.centre)
+        return evidence
 
-    def size(self, state_scale: np.ndarray) -> float:
-        """Return the geometric mean of the half-widths of the rigid states over ``state_scale`` (5)."""
-        return mean_size(self.half_width, state_scale)
+    def narrowed(self, star_norms: StarNorms) -> InvariantSet:
+        """Return the intersection with the sums of ``star_norms``."""
+        return replace(self, star_norms=star_norms)
 
+    def report(self) -> dict[str, Any]:
+        """Return the set for a certificate."""
+        star = {"star_norms": self.star_norms.as_dict()} if self.star_norms else {}
+        return {
+            "kind": "ellipsoid",
+            "states": list(self.problem.system.names),
+            "centre": self.centre.tolist(),
+            "half_width": self.half_width.tolist(),
+            "feedback_half_range": self.feedback.tolist(),
+            "Q": self.Q.tolist(),
+            "contraction": self.contraction,
+            "multipliers": self.multipliers.tolist(),
+            "solver": self.solver.as_dict(),
+            **star,
+        }
 
-def mean_size(half_width: np.ndarray, state_scale: np.ndarray) -> float:
-    """Return the geometric mean of the first half-widths over the ``state_scale`` (k) of their states."""
-    return float(np.exp(np.mean(np.log(half_width[: len(state_scale)] / state_scale))))
+    @classmethod
+    def from_report(cls, problem: TubeProblem, report: Mapping[str, Any]) -> InvariantSet:
+        """Return the set that :meth:`report` wrote.
+
+        Raises:
+            DesignError: A set of another kind, or star norms that are not those of such a problem.
+        """
+        if report["kind"] != "ellipsoid":
+            raise DesignError(f"invariant set of kind {report['kind']!r}: expected an ellipsoid")
+        centre, Q, multipliers = (np.array(report[name]) for name in ("centre", "Q", "multipliers"))
+        star = StarNorms.from_report(report["star_norms"], problem) if "star_norms" in report else None
+        solver = SolverReport(**report["solver"], time=0.0)
+        return cls(problem, centre, Q, report["contraction"], multipliers, solver, star)

@@ -1,7 +1,7 @@
 """Bounds of the error row by row and channel by channel: star norms (Abedor, Nagpal and Poolla 1996).
 
 One ellipsoid for all disturbances and all outputs has one contraction, although the poles of the error system lie
-decades apart. But the error is the sum of what each disturbance channel makes of it, and each of these stays in an
+decades apart. But the error is the sum of the contributions of the disturbance channels, and each of these stays in an
 ellipsoid of its own: at vertex i, v+ = A_i v + g_i d with |d| <= 1 stays in {v: v' Q^-1 v <= 1} if, for a contraction
 lam,
 
@@ -14,29 +14,42 @@ sums is invariant, and the bounds of all rows hold in it at once.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import cholesky
 
 from hsv.base.errors import DesignError
-from hsv.control.optimisation import smallest_eigenvalues
-from hsv.design.sets.invariant_set import TubeProblem
-from hsv.model.signals import N_RIGID
+from hsv.control.optimisation import Unknown, image, minimise, rounded_matrix, spectral_radii
+from hsv.design.sets.problem import TubeProblem
 
+_INFLATION = 1.002
+"""Factor on Q, so that it is invariant as rounded, too."""
 
-def output_rows(problem: TubeProblem) -> np.ndarray:
-    """Return the rows (7, n) of the outputs that are bounded: the rigid states, and F of the two inputs."""
-    return np.vstack((np.eye(N_RIGID, len(problem.centre())), problem.system.F))
+_REGULAR = 1e-9
+"""Share of the unit matrix in the coordinates of the search: a channel that excites few states makes them singular."""
+
+_SHARES = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
+"""Values of 1 - lam to try, as shares of 1 - rho^2, rho the largest spectral radius of a vertex; at 1 there is no Q."""
+
+_CONTRACTION_DIGITS = 8
+"""Decimals of a contraction: processors agree on more."""
+
+_BOUNDED = 1e-5
+"""Weight of the trace of Q against that of the row, so that Q is bounded in directions that the row does not see."""
+
+_NEGLIGIBLE = 1e-12
+"""Share of the sum below which further terms of a Gramian are left out."""
 
 
 @dataclass(frozen=True)
 class StarNorms:
     """Ellipsoids by row and channel: ``Q`` (7, d + 1, n, n) and ``contraction`` (7, d + 1).
 
-    Rows are those of :func:`output_rows`; the last channel is the drift of the centre, see
-    :meth:`hsv.design.sets.invariant_set.TubeProblem.columns`. A channel that does nothing has Q = 0.
+    Rows are those of :meth:`TubeProblem.output_rows`; the last channel is the drift of the centre, see
+    :meth:`TubeProblem.columns`. A channel that does nothing has Q = 0.
     """
 
     Q: np.ndarray
@@ -44,33 +57,24 @@ class StarNorms:
 
     def bounds(self, problem: TubeProblem) -> np.ndarray:
         """Return the largest magnitudes (7) of the output rows about the centre, SI."""
-        rows = output_rows(problem)
+        rows = problem.output_rows()
         return np.asarray(np.sqrt(np.einsum("ki,kjil,kl->kj", rows, self.Q, rows)).sum(axis=1))
 
     def residuals(self, problem: TubeProblem, centre: np.ndarray) -> np.ndarray:
         """Return the smallest eigenvalue (7, d + 1) of the inequality over the vertices; above zero: invariant.
 
-        With Q scaled to the identity; infinite for a channel that does nothing.
+        Q is scaled to the identity; infinite for a channel that does nothing.
 
         Raises:
-            DesignError: A Q that is not positive definite, or a contraction that is not between 0 and 1.
+            DesignError: A Q that is not positive definite.
         """
         A, G = problem.system.A, problem.columns(centre)
         residuals = np.full(self.contraction.shape, np.inf)
         for (row, channel), lam in np.ndenumerate(self.contraction):
-            if not G[:, :, channel].any():
-                continue
-            if not 0.0 < lam < 1.0:
-                raise DesignError(f"star norms: contraction[{row}, {channel}] = {lam:g}: expected between 0 and 1")
-            try:
-                factor = np.linalg.cholesky(self.Q[row, channel])
-            except np.linalg.LinAlgError as error:
-                raise DesignError(f"star norms: Q[{row}, {channel}] is not positive definite") from error
-            inside = np.linalg.solve(factor, A @ factor)
-            g = np.linalg.solve(factor, G[:, :, channel].T).T
-            M = np.eye(len(factor)) - inside @ np.swapaxes(inside, 1, 2) / lam
-            M -= g[:, :, None] * g[:, None, :] / (1.0 - lam)
-            residuals[row, channel] = smallest_eigenvalues(M).min()
+            g = G[:, :, channel, None] / np.sqrt(1.0 - lam)
+            if g.any():
+                reach = image(self.Q[row, channel], f"star norms: Q[{row}, {channel}]", A / np.sqrt(lam), g)
+                residuals[row, channel] = 1.0 - reach.max() ** 2
         return residuals
 
     def level_at_start(self, problem: TubeProblem, centre: np.ndarray, error: np.ndarray | None = None) -> float:
@@ -124,31 +128,118 @@ class StarNorms:
         """Return the ellipsoids that :meth:`as_dict` wrote, of as many rows, channels and states as ``problem`` has.
 
         Raises:
-            DesignError: Something is missing, or is not a finite number, or there are more or fewer; or a Q is not
-                symmetric: its inequality and its bounds would not be of the same ellipsoid.
+            DesignError: Something is missing, not a finite number, of another size, or not symmetric.
         """
         _, n, d = problem.system.G.shape
-        shape = (len(output_rows(problem)), d + 1)
-        Q, contraction = _stored(report, "Q", (*shape, n, n)), _stored(report, "contraction", shape)
-        crooked = np.argwhere(np.swapaxes(Q, 2, 3) != Q)
-        if crooked.size:
-            row, channel = crooked[0, :2]
-            raise DesignError(f"star_norms.Q[{row}, {channel}]: expected a symmetric matrix")
-        return cls(Q, contraction)
-
-
-def _stored(report: Mapping[str, Any], name: str, shape: tuple[int, ...]) -> np.ndarray:
-    expected = f"expected finite numbers of shape {shape}"
-    try:
-        values = np.array(report[name], float)
-    except (LookupError, TypeError, ValueError) as error:
-        raise DesignError(f"star_norms.{name}: {expected}") from error
-    if values.shape != shape:
-        raise DesignError(f"star_norms.{name}: shape {values.shape}, {expected}")
-    if not np.all(np.isfinite(values)):
-        raise DesignError(f"star_norms.{name}: {expected}")
-    return values
+        found = []
+        for name, shape in (("Q", (7, d + 1, n, n)), ("contraction", (7, d + 1))):
+            expected = f"star_norms.{name}: expected finite numbers of shape {shape}"
+            try:
+                values = np.array(report[name], float)
+            except (LookupError, TypeError, ValueError) as error:
+                raise DesignError(expected) from error
+            if values.shape != shape or not np.all(np.isfinite(values)):
+                raise DesignError(expected)
+            found.append(values)
+        if np.any(np.swapaxes(found[0], 2, 3) != found[0]):
+            raise DesignError("star_norms.Q: expected symmetric matrices")
+        return cls(*found)
 
 
 def _level(Q: np.ndarray, v: np.ndarray) -> float:
     return float(v @ np.linalg.solve(Q, v))
+
+
+def star_norms(
+    problem: TubeProblem, centre: np.ndarray, progress: Callable[[int, int], None] = lambda done, total: None
+) -> StarNorms:
+    """Return the ellipsoids that bound each output row the least.
+
+    Args:
+        problem: Error system and disturbances.
+        centre: (n) centre of the set.
+        progress: Told how many ellipsoids of all are found.
+
+    Raises:
+        DesignError: A row and a channel for which there is none.
+    """
+    rows, G = problem.output_rows(), problem.columns(centre)
+    A, shape = problem.system.A, (len(rows), G.shape[2])
+    margin = 1.0 - float(spectral_radii(A).max()) ** 2
+    if not margin > 0.0:
+        raise DesignError("star norms: a vertex is not stable, expected spectral radii below 1")
+    contractions = [round(1.0 - share * margin, _CONTRACTION_DIGITS) for share in _SHARES]
+    Q, chosen = np.zeros((*shape, *A.shape[1:])), np.zeros(shape)
+    for done, (row, channel) in enumerate(np.ndindex(shape)):
+        progress(done, chosen.size)
+        Q[row, channel], chosen[row, channel] = _least(A, G[:, :, channel], rows[row], contractions)
+    progress(chosen.size, chosen.size)
+    return StarNorms(Q, chosen)
+
+
+def _least(A: np.ndarray, g: np.ndarray, row: np.ndarray, contractions: Sequence[float]) -> tuple[np.ndarray, float]:
+    """Return the Q that bounds ``row`` the least, and its contraction.
+
+    At which contraction that is, the vertices tell one by one: the Gramian of each bounds every Q of all from below.
+    """
+    if not g.any():
+        return np.zeros(A.shape[1:]), contractions[0]
+    failure: DesignError | None = None
+    for contraction in sorted(contractions, key=lambda one: np.max(row @ _gramians(A, _outer(g), one) @ row)):
+        try:
+            return _solve(A, g, row, contraction), contraction
+        except DesignError as error:
+            failure = error
+    raise DesignError(f"no star norm for a contraction in {contractions}: {failure}")
+
+
+def _solve(A: np.ndarray, g: np.ndarray, row: np.ndarray, contraction: float) -> np.ndarray:
+    """Return the Q of the least row Q row' at one contraction.
+
+    Raises:
+        DesignError: There is none.
+    """
+    T = _coordinates(A, g, contraction)
+    inside, columns, output = np.linalg.solve(T, A @ T), np.linalg.solve(T, g.T).T, row @ T
+    output /= np.linalg.norm(output)
+
+    def inequalities(Q: np.ndarray) -> list[np.ndarray]:
+        return [
+            Q - A_i @ Q @ A_i.T / contraction - np.outer(g_i, g_i) / (1.0 - contraction)
+            for A_i, g_i in zip(inside, columns, strict=True)
+        ]
+
+    (Q,), _ = minimise(
+        (Unknown((len(T), len(T)), symmetric=True),),
+        lambda Q: float(output @ Q @ output + _BOUNDED * np.trace(Q)),
+        inequalities,
+        f"star norms, contraction {contraction}",
+    )
+    return rounded_matrix(_INFLATION * T @ Q @ T.T)
+
+
+def _coordinates(A: np.ndarray, g: np.ndarray, contraction: float) -> np.ndarray:
+    """Return T (n, n) such that in x = T z the Q of the mean vertex alone would be near the identity."""
+    held = _outer(g).mean(axis=0, keepdims=True)
+    gramian = _gramians(A.mean(axis=0, keepdims=True), held, contraction)[0]
+    size = np.sqrt(gramian.diagonal())
+    size = np.where(size > 0.0, size, 1.0)  # of a state that the channel does not excite
+    scaled = 0.5 * (gramian + gramian.T) / np.outer(size, size)
+    return np.asarray(size[:, None] * cholesky(scaled + _REGULAR * np.eye(len(size)), lower=True))
+
+
+def _gramians(A: np.ndarray, held: np.ndarray, contraction: float) -> np.ndarray:
+    """Return the least Q (r, n, n) with Q = A Q A' / lam + ``held`` / (1 - lam), for each A (r, n, n) alone."""
+    power, gramian = A / np.sqrt(contraction), held / (1.0 - contraction)
+
+    def diagonals(matrices: np.ndarray) -> np.ndarray:
+        return np.asarray(np.diagonal(matrices, axis1=1, axis2=2))
+
+    # By doubling the number of terms of the sum: sizes of the states lie many decades apart, too many for a solver.
+    while np.any(diagonals(term := power @ gramian @ np.swapaxes(power, 1, 2)) > _NEGLIGIBLE * diagonals(gramian)):
+        gramian, power = gramian + term, power @ power
+    return gramian
+
+
+def _outer(g: np.ndarray) -> np.ndarray:
+    return np.asarray(g[:, :, None] * g[:, None, :])

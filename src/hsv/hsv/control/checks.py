@@ -1,0 +1,174 @@
+"""Checks of a design: an item that is recomputed, the value found, and the value expected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.control.design import ControlDesign, certificate_path, read_certificate, read_design
+from hsv.control.tolerances import PARAMETERS, TOLERANCES, entry_size
+from hsv.model.vehicle import Vehicle, load_vehicle
+
+
+@dataclass(frozen=True)
+class Check:
+    """One item of a design, recomputed: ``value`` is the value found, ``expected`` describes the expected one in words.
+
+    A design that fails a ``required`` check must not fly; other checks only show that it is not the design as written.
+    ``fields``: fields of the certificate that the check holds to their value.
+    """
+
+    name: str
+    value: float | str
+    expected: str
+    ok: bool
+    required: bool = False
+    fields: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.shown}, expected {self.expected}"
+
+    @property
+    def shown(self) -> str:
+        """The value found, as text."""
+        return self.value if isinstance(self.value, str) else f"{self.value:.6g}"
+
+
+Checks = Iterable[Check]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A design to verify: the design as it is flown, and its certificate."""
+
+    design: ControlDesign
+    certificate: dict[str, Any]
+
+    def stated(self, field: str) -> Any:
+        """Return a field of the certificate, by its path, e.g. ``"nominal.0.Q"``."""
+        found: Any = self.certificate
+        for key in field.split("."):
+            found = found[int(key) if isinstance(found, list) else key]
+        return found
+
+    @cached_property
+    def vehicle(self) -> Vehicle:
+        """The vehicle in the certificate; where there is none, the default one."""
+        values = self.certificate["inputs"].get("vehicle")
+        if not isinstance(values, dict | None):
+            raise DesignError(f"inputs.vehicle = {values!r}: expected the parameters of a vehicle")
+        return Vehicle.from_parameters(values) if values else load_vehicle()
+
+
+def load_subject(path: Path) -> Subject:
+    """Return the parameter file at ``path`` with its certificate.
+
+    Raises:
+        DesignError: A file that is missing or malformed.
+    """
+    return Subject(read_design(path), read_certificate(certificate_path(path)))
+
+
+def same(name: str, value: Any, expected: Any, tolerance: str, size: Any = 1.0) -> Check:
+    """Return the check that every entry of ``value`` equals that of ``expected``, within a tolerance of the table."""
+    value, expected = np.asarray(value, float), np.asarray(expected, float)
+    if value.shape != expected.shape:
+        return Check(name, f"shape {value.shape}", f"shape {expected.shape}", False)
+    shares = np.abs(value - expected) / TOLERANCES[tolerance].allowed(expected, size)
+    shares = np.where(np.isnan(shares), np.inf, shares)
+    if shares.max(initial=0.0) <= 1.0:
+        return Check(name, float(shares.max(initial=0.0)), "at most 1 tolerance", True)
+    worst = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    where = "" if value.ndim == 0 else f"[{', '.join(str(i) for i in worst)}]"
+    return Check(f"{name}{where}", float(value[worst]), f"{float(expected[worst])!r}", False)
+
+
+def recomputed(subject: Subject, field: str, value: Any, tolerance: str, size: Any = 1.0) -> Check:
+    """Return the check that a ``field`` of the certificate has the recomputed ``value``."""
+    return replace(same(field, subject.stated(field), value, tolerance, size), fields=(field,))
+
+
+def equal(subject: Subject, field: str, expected: Any) -> Check:
+    """Return the check that a ``field`` of the certificate, no array of numbers, is as ``expected``."""
+    found = subject.stated(field)
+    return Check(field, repr(found), repr(expected), found == expected, fields=(field,))
+
+
+def parameter(
+    subject: Subject,
+    name: str,
+    value: Any,
+    expected: Any,
+    shown: str = "",
+    index: Any = ...,
+    fields: Sequence[str] = (),
+) -> Check:
+    """Return the check of every entry of ``value``, a parameter of the design file or its part ``[index]``."""
+    size = entry_size(name, subject.certificate)[index]
+    return replace(same(shown or name, value, expected, PARAMETERS[name], size), fields=tuple(fields))
+
+
+def at_most(name: str, value: float, limit: float) -> Check:
+    """Return the check that ``value`` is at most ``limit``; NaN fails."""
+    return Check(name, float(value), f"at most {limit:g}", bool(value <= limit))
+
+
+def above(name: str, value: float, limit: float) -> Check:
+    """Return the check that ``value`` is above ``limit``; NaN fails."""
+    return Check(name, float(value), f"above {limit:g}", bool(value > limit))
+
+
+def required(check: Check) -> Check:
+    """Return ``check`` as a required one."""
+    return replace(check, required=True)
+
+
+def gathered(name: str, checks: Callable[[], Checks]) -> list[Check]:
+    """Return the checks; an error in them becomes the last check, which fails under ``name``."""
+    done: list[Check] = []
+    try:
+        done.extend(checks())
+    # A certificate may hold anything anywhere.
+    except (DesignError, LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        missing = isinstance(error, KeyError)
+        value = f"no field {error}" if missing else str(error)
+        done.append(Check(name, value, "to be recomputable", False, required=True))
+    return done
+
+
+def unchecked(subject: Subject, checks: Iterable[Check], *, whole: bool = True) -> list[str]:
+    """Return the fields of the certificate that no check recomputes: they are stated, not checked.
+
+    ``whole``: a table without any checked field is named as a whole, and the entries of a list once, as in
+    ``nominal.*.gamma``.
+    """
+    held = {field for check in checks for field in check.fields}
+    free: dict[str, bool] = {}
+    for leaf in leaves(subject.certificate):
+        parts = leaf.split(".")
+        above = [".".join(parts[: n + 1]) for n in range(len(parts))]
+        for field in above:
+            free[field] = free.get(field, True) and held.isdisjoint(above)
+    if not whole:
+        return [field for field in leaves(subject.certificate) if free[field]]
+    named = [field for field, is_free in free.items() if is_free and not free.get(field.rpartition(".")[0])]
+    return list(dict.fromkeys(".".join("*" if part.isdigit() else part for part in f.split(".")) for f in named))
+
+
+def leaves(value: Any, field: str = "") -> Iterator[str]:
+    """Return the paths of all fields in ``value``; an array of numbers is one field."""
+    nested = value.items() if isinstance(value, dict) else enumerate(value) if _tables(value) else ()
+    if not nested:
+        yield field
+    for key, inner in nested:
+        yield from leaves(inner, f"{field}.{key}" if field else str(key))
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)

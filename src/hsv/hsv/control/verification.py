@@ -1,0 +1,845 @@
+"""Independent evidence for a design: everything that its certificate states, recomputed with numpy from its two files.
+
+Nothing here comes from the code that computes designs. The design file brings the numbers that fly: vertices A_i, B_i,
+gains F and K. The certificate brings what is stated about them. Vertices are recomputed from the parameters of the
+vehicle and every inequality from its matrices; :mod:`hsv.flight.verification` repeats the flights. The parts follow the
+paper: model (10)-(12), gain F (24), gains K (31)-(35), error system (22), (23), invariant set (25)-(28), tightened
+inputs (30), adjustable factor (47)-(54).
+
+Every inequality is a bound on a singular value. With Q = L L', a matrix M maps the ellipsoid x' Q^-1 x <= 1 into itself
+if and only if the largest singular value of L^-1 M L is at most 1; see :func:`image`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.control.checks import (
+    Check,
+    Checks,
+    Subject,
+    above,
+    at_most,
+    equal,
+    gathered,
+    leaves,
+    parameter,
+    recomputed,
+    required,
+    same,
+)
+from hsv.control.design import ControlDesign, find_certificate, read_certificate
+from hsv.control.notch_filter import continuous, discretise, series
+from hsv.control.tolerances import ROUNDING
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.lpv.actuated import actuator_names, sampled_actuators
+from hsv.model.lpv.linearisation import (
+    Filter,
+    extended_jacobian,
+    extended_state,
+    from_true_rate,
+    linearise,
+    linearise_extended,
+    zero_order_hold,
+)
+from hsv.model.lpv.polytope import Polytope
+from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_RIGID, N_STATES, PITCH_RATE, STATE_NAMES
+from hsv.model.trim import trim
+from hsv.model.vehicle import Vehicle
+
+CHANNELS = {
+    "acceleration": "m/s^2",
+    "angle_of_attack_rate": "rad/s",
+    "pitch_acceleration": "rad/s^2",
+    "lost_elevator": "rad",
+    "filtered_nominal_rate": "rad/s",
+    "altitude_residual": "m",
+    "pitch_angle_residual": "rad",
+}
+"""Channels of the disturbance set W in the order of the columns of G, with their units."""
+
+ACCELERATED, REMAINING = [1, 2, 4], [0, 3]
+"""Rigid states that the three accelerations act on, and those in which a residual remains."""
+
+STEERING = (
+    "inputs.description",
+    "inputs.feedback",
+    "inputs.invariant_set.contraction",
+    "inputs.invariant_set.input_scale",
+    "inputs.invariant_set.state_scale",
+    "inputs.model.grid",
+    "inputs.model.tensor_product.tolerance",
+    "inputs.tightening",
+)
+"""Inputs that steer the search for a design: what was found is judged whatever they are."""
+
+_POINTS = 46
+"""Altitudes, and velocities, at which the model is compared with the vehicle, between its samples."""
+
+_FREQUENCIES = np.logspace(-2.0, 2.0, 200)
+"""rad/s, those of the paper's figure 2."""
+
+_STATUS = ("optimal", "optimal_inaccurate")
+_KEPT_OFF = 0.05
+"""Share of the range of the certified plans by which another plan stays below their top."""
+
+
+# --- algebra ---------------------------------------------------------------------------------------------------------
+
+
+def image(Q: np.ndarray, M: np.ndarray, *columns: np.ndarray) -> np.ndarray:
+    """Return the largest singular value (...) of L^-1 [M L, columns] with Q = L L'.
+
+    At most 1: M x + columns d stays in {x: x' Q^-1 x <= 1} for all x there and d with x' Q^-1 x + d' d <= 1.
+    """
+    L = np.linalg.cholesky(Q)
+    return np.asarray(np.linalg.norm(np.linalg.solve(L, np.concatenate((M @ L, *columns), axis=-1)), 2, axis=(-2, -1)))
+
+
+def level(Q: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """Return x' Q^-1 x of rows x (..., n)."""
+    return np.asarray(np.sum(np.linalg.solve(np.linalg.cholesky(Q), x.T) ** 2, axis=0))
+
+
+def radii(M: np.ndarray) -> np.ndarray:
+    """Return the spectral radii (r) of matrices (r, n, n)."""
+    return np.asarray(np.abs(np.linalg.eigvals(M)).max(axis=-1))
+
+
+def inverse(Q: np.ndarray) -> np.ndarray:
+    """Return Q^-1, symmetric."""
+    P = np.linalg.inv(Q)
+    return np.asarray(0.5 * (P + P.T))
+
+
+def quotient(M: np.ndarray, N: np.ndarray) -> np.ndarray:
+    """Return the gain (2, 9) M N^-1, N scaled to a unit diagonal first; nothing acts on the flexible states."""
+    scale = np.sqrt(np.diag(N))
+    gain = np.zeros((len(M), N_STATES))
+    gain[:, :N_RIGID] = np.linalg.solve(N / np.outer(scale, scale), (M / scale).T).T / scale
+    return gain
+
+
+def sizes(table: Mapping[str, float], names: Sequence[str]) -> np.ndarray:
+    """Return the numbers of a table of the inputs in the order of ``names``."""
+    return np.array([table[name] for name in names])
+
+
+# --- statement and inputs --------------------------------------------------------------------------------------------
+
+
+def statement_checks(subject: Subject) -> Checks:
+    """Compare names, units and digests; no other check relies on a digest."""
+    from pydantic_core import to_json  # writes numbers as the inputs were digested; a node does without
+
+    design, inputs = subject.design, subject.certificate["inputs"]
+    yield equal(subject, "name", design.name)
+    yield equal(subject, "inputs.name", design.name)
+    yield equal(subject, "units", "SI")
+    check = equal(subject, "inputs_sha256", hashlib.sha256(to_json(inputs)).hexdigest())
+    fields = (f"inputs.{field}" for field in leaves(inputs))
+    yield replace(check, fields=(check.name, *(field for field in fields if not field.startswith(STEERING))))
+    yield equal(subject, "parameters_sha256", design.digest)
+    yield recomputed(subject, "vertices", len(design.polytope.A), "copied")
+
+
+def input_checks(subject: Subject) -> Checks:
+    """Compare the values that a design copies from its inputs, and check its weights."""
+    design, inputs = subject.design, subject.certificate["inputs"]
+    yield recomputed(subject, "inputs.model.period", design.period, "copied")
+    for i, section in enumerate(design.notch):
+        for name, value in vars(section).items():
+            yield recomputed(subject, f"inputs.notch.{i}.{name}", value, "copied")
+    yield same("notch, sections", len(design.notch), len(inputs["notch"]), "copied")
+    yield equal(subject, "inputs.disturbance.coupling", design.coupling)
+    known = " ".join(name for name in (inputs.get("actuator") or {}).values() if name)
+    given = " ".join(design.actuators)
+    yield Check("design.actuators", given, repr(known), given == known, required=True, fields=("inputs.actuator",))
+    limits, digest = subject.vehicle.decoupled, subject.vehicle.digest
+    yield Check("design.vehicle", design.vehicle, repr(digest), design.vehicle == digest, fields=("inputs.vehicle",))
+    yield parameter(subject, "input.minimum", design.input_minimum, limits.input_minimum)
+    yield parameter(subject, "input.maximum", design.input_maximum, limits.input_maximum)
+    for axis, (_, weights) in (("altitude", design.altitude_samples), ("velocity", design.velocity_samples)):
+        sums = weights.sum(axis=1)
+        yield same(f"scheduling.{axis}.weights, sums", sums, np.ones_like(sums), "sums")
+        yield above(f"scheduling.{axis}.weights, least", weights.min(), -ROUNDING)
+
+
+def solver_checks(subject: Subject) -> Checks:
+    """Look at the status of every solver; what it returned is judged by the matrices, not by this."""
+    for field in leaves(subject.certificate):
+        if field.endswith("solver.status"):
+            found = subject.stated(field)
+            yield Check(field, repr(found), f"one of {', '.join(_STATUS)}", found in _STATUS, fields=(field,))
+
+
+# --- polytopic model, (10)-(12), (45) --------------------------------------------------------------------------------
+
+
+class Model(NamedTuple):
+    """The model recomputed: ``whole`` with the filter's states if they belong to it, ``polytope`` of nine states."""
+
+    whole: Polytope
+    polytope: Polytope
+    samples: tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+    singular_values: tuple[np.ndarray, ...]
+    exact: Callable[[float, float], tuple[np.ndarray, np.ndarray]]
+    scales: tuple[np.ndarray, np.ndarray]
+
+
+def notch_in_series(design: ControlDesign) -> Filter:
+    """Return A_s, B_s, C_s, D_s of the notch filter (38) in continuous time (39)."""
+    return Filter(*series(continuous(design.notch)))
+
+
+def recomputed_model(subject: Subject) -> Model:
+    """Return the polytopic model of the vehicle (10)-(12), or of the vehicle with its notch filter (45); seconds."""
+    from hsv.model.lpv.linearisation import grid_polytope, sample
+    from hsv.model.lpv.tensor_product import tensor_product
+
+    inputs, vehicle, notch = subject.certificate["inputs"]["model"], subject.vehicle, notch_in_series(subject.design)
+    product, period, extended = inputs["tensor_product"], inputs["period"], inputs["system"] == "ECM"
+    continuous_time = (
+        partial(linearise_extended, vehicle.decoupled, notch) if extended else partial(linearise, vehicle.decoupled)
+    )
+    states = sizes(product["state_scale"], STATE_NAMES)
+    if extended:
+        filters = sizes(product["filter_scale"], ("state_1", "state_2"))
+        states = np.concatenate((states, *[filters] * len(subject.design.notch)))
+    scales = states, sizes(product["input_scale"], INPUT_NAMES)
+    of_grid = inputs["representation"] == "grid"
+    counts = [
+        inputs["grid"][f"{axis}_vertices"] if of_grid else product[f"{axis}_samples"]
+        for axis in ("altitude", "velocity")
+    ]
+    axes = np.linspace(*vehicle.altitude_range, counts[0]), np.linspace(*vehicle.velocity_range, counts[1])
+    if of_grid:
+        whole = grid_polytope(continuous_time, *axes, period)
+        samples, values = tuple((axis, np.eye(len(axis))) for axis in axes), ()
+    else:
+        options = product["tolerance"], product["functions"]
+        found = tensor_product(*sample(continuous_time, *axes, period), *axes, *scales, *options)
+        whole, samples, values = found.polytope, (found.altitude_samples, found.velocity_samples), found.singular_values
+    polytope = whole
+    if extended:
+        # x' = T x: with the true pitch rate in the state, no state of the filter acts on the vehicle.
+        T = from_true_rate(notch)
+        A, B = np.linalg.solve(T, whole.A @ T), np.linalg.solve(T, whole.B)
+        vehicle_only = slice(N_STATES)
+        polytope = Polytope(A[:, vehicle_only, vehicle_only], B[:, vehicle_only], whole.altitude, whole.velocity)
+
+    def exact(altitude: float, velocity: float) -> tuple[np.ndarray, np.ndarray]:
+        return zero_order_hold(*continuous_time(altitude, velocity), period)
+
+    return Model(whole, polytope, samples, values, exact, scales)
+
+
+def model_checks(subject: Subject) -> Checks:
+    """Compare vertices, weights and accuracy with those recomputed from the parameters of the vehicle."""
+    from hsv.model.lpv.accuracy import model_accuracy, off_grid
+
+    design, model, inputs = subject.design, recomputed_model(subject), subject.certificate["inputs"]["model"]
+    shown = "{} from the vehicle".format
+    yield parameter(subject, "model.a", design.polytope.A, model.polytope.A, shown("model.a"))
+    yield parameter(subject, "model.b", design.polytope.B, model.polytope.B, shown("model.b"))
+    expected = "linear" if inputs["representation"] == "grid" else "cubic"
+    yield Check("scheduling.interpolation", design.interpolation, repr(expected), design.interpolation == expected)
+    given = design.altitude_samples, design.velocity_samples
+    for axis, flown, found in zip(("altitude", "velocity"), given, model.samples, strict=True):
+        yield parameter(subject, f"scheduling.{axis}.breakpoints", flown[0], found[0])
+        yield parameter(subject, f"scheduling.{axis}.weights", flown[1], found[1])
+    yield equal(subject, "model.representation", inputs["representation"])
+    yield recomputed(subject, "model.vertices", [samples.shape[1] for _, samples in model.samples], "copied")
+    shown_values = [values[:8] for values in model.singular_values]
+    yield recomputed(subject, "model.singular_values", shown_values, "singular values")
+    judged = design.polytope if inputs["system"] == "DM" else model.whole
+    points = (off_grid(*limits, _POINTS) for limits in (subject.vehicle.altitude_range, subject.vehicle.velocity_range))
+    below_nyquist = _FREQUENCIES[0.99 * np.pi / design.period > _FREQUENCIES]
+    accuracy = model_accuracy(judged, model.exact, *points, *model.scales, below_nyquist, design.period)
+    for name, value in accuracy.report().items():
+        kind = {"points": "copied", "smallest_weight": "weights", "weight_sum_error": "sums"}.get(name, "accuracy")
+        yield recomputed(subject, f"model.accuracy.{name}", value, kind)
+
+
+# --- feedback gain F, (24) -------------------------------------------------------------------------------------------
+
+
+def feedback_checks(subject: Subject) -> Checks:
+    """(24): e' N^-1 e decreases at every vertex under F = M N^-1."""
+    design, F = subject.design, subject.design.feedback_gain
+    A, B = design.polytope.A, design.polytope.B
+    M, N = np.array(subject.stated("feedback.M")), np.array(subject.stated("feedback.N"))
+    shown, fields = "feedback.gain = M N^-1", ("feedback.M", "feedback.N")
+    yield parameter(subject, "feedback.gain", F, quotient(M, N), shown, fields=fields)
+    yield symmetric("feedback.N", N)
+    rigid = (A + B @ F)[:, :N_RIGID, :N_RIGID]
+    # The smallest eigenvalue of [N, (A_c N)'; A_c N, N] with N scaled to the identity.
+    residuals = 1.0 - image(N, rigid)
+    yield required(above("(24) smallest eigenvalue", residuals.min(), 0.0))
+    yield recomputed(subject, "feedback.lmi_smallest_eigenvalues", residuals, "eigenvalues")
+    yield recomputed(subject, "feedback.spectral_radii", radii(rigid), "spectral radii")
+    whole = radii(A + B @ F).max()
+    yield recomputed(subject, "feedback.spectral_radius_all_states", whole, "spectral radii")
+    yield required(at_most("spectral radius of A + BF, all states", whole, 1.0 - 1e-6))
+    yield equal(subject, "feedback.method", subject.stated("inputs.feedback.method"))
+
+
+# --- nominal gains K, (31)-(35) --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NominalWeights:
+    """The problem (31)-(35): vertices, weights psi and sigma of the cost, bounds (2) of |u_n|."""
+
+    A: np.ndarray
+    B: np.ndarray
+    psi: np.ndarray
+    sigma: np.ndarray
+    bound: np.ndarray
+
+    @classmethod
+    def of(cls, subject: Subject) -> NominalWeights:
+        """Return the weights of the inputs; costs are in seconds, so that they do not depend on the period."""
+        polytope, inputs = subject.design.polytope, subject.certificate["inputs"]["nominal"]
+        scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
+        psi, sigma = (subject.design.period * np.diag(scale**-2.0) for scale in scales)
+        adjustable = subject.certificate.get("adjustable")
+        bound = np.array(adjustable["input_bound"]) if adjustable else sizes(inputs["input_bound"], INPUT_NAMES)
+        return cls(polytope.A[:, :N_RIGID, :N_RIGID], polytope.B[:, :N_RIGID], psi, sigma, bound)
+
+    def cost(self, K: np.ndarray, Q: np.ndarray) -> float:
+        """(31): the least gamma with gamma (Q^-1 - A_c' Q^-1 A_c) >= psi + K' sigma K at every vertex."""
+        L = np.linalg.cholesky(Q)
+        M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
+        decrease = np.eye(len(Q)) - np.swapaxes(M, 1, 2) @ M
+        if not (least := np.linalg.eigvalsh(decrease).min()) > 0.0:
+            raise DesignError(f"decrease of the cost = {least:.3g}, expected above zero")
+        stage = L.T @ (self.psi + K.T @ self.sigma @ K) @ L
+        return float(np.linalg.eigvals(np.linalg.solve(decrease, stage)).real.max())
+
+    def decrease(self, K: np.ndarray, Q: np.ndarray, gamma: float) -> np.ndarray:
+        """(34): its smallest eigenvalue (r) for the cost ``gamma``, scaled to a unit diagonal."""
+        L = np.linalg.cholesky(Q)
+        M = np.linalg.solve(L, (self.A + self.B @ K) @ L)
+        stage = np.vstack((np.sqrt(self.psi) @ L, np.sqrt(self.sigma) @ K @ L)) / np.sqrt(gamma)
+        stacked = np.concatenate((M, np.broadcast_to(stage, (len(M), *stage.shape))), axis=1)
+        return np.asarray(1.0 - np.linalg.norm(stacked, 2, axis=(1, 2)))
+
+
+def nominal_checks(subject: Subject) -> Checks:
+    """(31)-(35): every K = Y Q^-1 with its ellipsoid, and the nesting of the ellipsoids."""
+    design, inputs = subject.design, subject.certificate["inputs"]["nominal"]
+    weights, stated = NominalWeights.of(subject), subject.certificate["nominal"]
+    scales = sizes(inputs["state_scale"], STATE_NAMES[:N_RIGID]), sizes(inputs["input_scale"], INPUT_NAMES)
+    for name, flown, scale in (
+        ("state_scale", design.nominal_state_scale, scales[0]),
+        ("input_scale", design.nominal_input_scale, scales[1]),
+        ("input_bound", design.nominal_input_bound, weights.bound),
+    ):
+        fields = () if name == "input_bound" and "adjustable" in subject.certificate else (f"inputs.nominal.{name}",)
+        yield parameter(subject, f"nominal.{name}", flown, scale, fields=fields)
+    counts = [len(design.nominal_gains), len(design.nominal_ellipsoids), len(stated)]
+    yield same("number of nominal gains, ellipsoids, statements", counts, [len(inputs["scales"])] * 3, "copied")
+    start = step(subject)
+    for i, (one, K, P) in enumerate(zip(stated, design.nominal_gains, design.nominal_ellipsoids, strict=True)):
+        Q, field = np.array(one["Q"]), f"nominal.{i}"
+        fields = (f"{field}.Y", f"{field}.Q")
+        yield parameter(
+            subject, "nominal.gains", K, quotient(np.array(one["Y"]), Q), f"nominal.gains[{i}] = Y Q^-1", fields=fields
+        )
+        yield parameter(subject, "nominal.ellipsoids", P, inverse(Q), f"nominal.ellipsoids[{i}] = Q^-1", i)
+        yield from _gain_checks(subject, field, weights, K[:, :N_RIGID], inputs["scales"][i] * start)
+        yield recomputed(subject, f"{field}.scale", inputs["scales"][i], "copied")
+        radius = radii(design.polytope.A + design.polytope.B @ K).max()
+        yield recomputed(subject, f"{field}.spectral_radius_all_states", radius, "spectral radii")
+        yield required(at_most(f"spectral radius of A + BK, gain {i}", radius, 1.0 - 1e-6))
+    yield equal(subject, "nominal.0.nesting_residual", None)
+    for i, (outer, inner) in enumerate(pairwise([np.array(one["Q"]) for one in stated]), start=1):
+        # The inner ellipsoid in coordinates where the outer one is the unit ball.
+        room = 1.0 - float(image(outer, np.zeros_like(outer), np.linalg.cholesky(inner))) ** 2
+        yield recomputed(subject, f"nominal.{i}.nesting_residual", room, "eigenvalues")
+        yield above(f"ellipsoid {i} inside the one before", room, 0.0)
+        if design.interpolated:
+            K = design.nominal_gains[i][:, :N_RIGID]
+            between = 1.0 - image(outer, weights.A + weights.B @ K) ** 2
+            yield required(above(f"decrease in ellipsoid {i - 1} under gain {i}", between.min(), 0.0))
+            yield recomputed(subject, f"nominal.{i}.between_smallest_eigenvalues", between, "eigenvalues")
+    interpolated, fields = bool(inputs.get("interpolated")), ("inputs.nominal.interpolated",)
+    value, ok = str(design.interpolated), design.interpolated == interpolated
+    yield Check("nominal.interpolated", value, str(interpolated), ok, required=True, fields=fields)
+
+
+def step(subject: Subject) -> np.ndarray:
+    """Return x_n(0) (5): the trim at the start of the design's step less the trim at its target."""
+    inputs, vehicle = subject.certificate["inputs"]["nominal"], subject.vehicle.decoupled
+    start, target = (trim(vehicle, inputs[at]["altitude"], inputs[at]["velocity"]).state for at in ("start", "target"))
+    return np.asarray((start - target)[:N_RIGID])
+
+
+def _gain_checks(subject: Subject, field: str, weights: NominalWeights, K: np.ndarray, state: np.ndarray) -> Checks:
+    Q = np.array(subject.stated(f"{field}.Q"))
+    yield symmetric(f"{field}.Q", Q)
+    try:
+        gamma = weights.cost(K, Q)
+    except DesignError as error:
+        raise DesignError(f"{field}: {error}") from error
+    yield recomputed(subject, f"{field}.certified_gamma", gamma, "certified costs")
+    decrease = weights.decrease(K, Q, subject.stated(f"{field}.certified_gamma"))
+    yield required(above(f"{field}: (34) smallest eigenvalue", decrease.min(), -ROUNDING))
+    yield recomputed(subject, f"{field}.lmi_smallest_eigenvalues", decrease, "eigenvalues")
+    # (33): the design state lies in the ellipsoid.
+    room = 1.0 - float(level(Q, state))
+    yield above(f"{field}: (33) room of the design state", room, -ROUNDING)
+    yield recomputed(subject, f"{field}.state_residual", room, "eigenvalues")
+    # (35): the largest |K x| over the ellipsoid stays within the bounds.
+    inputs = 1.0 - np.sum((K @ Q) * K, axis=1) / weights.bound**2
+    yield above(f"{field}: (35) room of the inputs", inputs.min(), 0.0)
+    yield recomputed(subject, f"{field}.input_residuals", inputs, "eigenvalues")
+    yield recomputed(subject, f"{field}.spectral_radii", radii(weights.A + weights.B @ K), "spectral radii")
+
+
+def symmetric(name: str, Q: np.ndarray) -> Check:
+    """Return the check that ``Q`` (..., n, n) equals its transpose: bounds and inequality are of the same matrix."""
+    crooked = float(np.abs(Q - np.swapaxes(Q, -1, -2)).max(initial=0.0))
+    return required(at_most(f"{name}, difference from its transpose", crooked, 0.0))
+
+
+# --- error system, (22), (23) ----------------------------------------------------------------------------------------
+
+
+def acceleration_channels(vehicle: Vehicle, period: float) -> np.ndarray:
+    """Return the effect (5, 3) on the rigid states of unit accelerations held over a period, at mid-envelope."""
+    A, _ = linearise(vehicle.decoupled, *vehicle.centre)
+    unit = np.zeros((N_RIGID, 3))
+    unit[ACCELERATED, [0, 1, 2]] = 1.0
+    return zero_order_hold(A[:N_RIGID, :N_RIGID], unit, period)[1]
+
+
+class ErrorSystem(NamedTuple):
+    """e(k+1) = A_i e(k) + G_i d(k), feedback F e + F_d d; e: rigid states, notch filter, actuators of the design."""
+
+    A: np.ndarray
+    G: np.ndarray
+    F: np.ndarray
+    F_d: np.ndarray
+    names: tuple[str, ...]
+
+
+def error_system(design: ControlDesign, vehicle: Vehicle, tau: np.ndarray, effectiveness: float = 1.0) -> ErrorSystem:
+    """Return (22), (23) for the feedback tau F, with notch filter and actuators in the state.
+
+    The feedback sees the filtered pitch rate, q_f = C_s s + D_s q; actuators are driven by the feedback, and act on the
+    vehicle by their mean position over a period, C_a a + D_a u.
+
+    Args:
+        design: Vertices, F, notch filter and actuators.
+        vehicle: Vehicle of the design.
+        tau: (5) factors of the feedback.
+        effectiveness: Share of the elevator that is left.
+    """
+    period, polytope = design.period, design.polytope
+    A_s, B_s, C_s, D_s = series(discretise(design.notch, period))
+    actuators = [ACTUATOR_SETS[name] for name in design.actuators]
+    a = sampled_actuators(actuators, period)
+    r, x, s, n = len(polytope.A), N_RIGID, len(A_s), len(a.A)
+    filters, positions = slice(x, x + s), slice(x + s, x + s + n)
+    B_x = polytope.B[:, :x] * np.array([1.0, effectiveness])
+    A, B = np.zeros((r, x + s + n, x + s + n)), np.zeros((r, x + s + n, N_INPUTS))
+    A[:, :x, :x], A[:, :x, positions], A[:, positions, positions] = polytope.A[:, :x, :x], B_x @ a.C, a.A
+    A[:, filters, PITCH_RATE], A[:, filters, filters] = B_s, A_s
+    B[:, :x], B[:, positions] = B_x @ (a.D if actuators else np.eye(N_INPUTS)), a.B
+    rigid = design.feedback_gain[:, :x] * tau
+    F = np.zeros((N_INPUTS, x + s + n))
+    F[:, :x], F[:, filters] = rigid, np.outer(rigid[:, PITCH_RATE], C_s)
+    F[:, PITCH_RATE] *= D_s
+    G, F_d = np.zeros((r, x + s + n, len(CHANNELS))), np.zeros((N_INPUTS, len(CHANNELS)))
+    G[:, :x, :3] = acceleration_channels(vehicle, period)
+    G[:, :, 3], G[:, :, 4] = B[:, :, 1], B @ rigid[:, PITCH_RATE]  # lost elevator; notch(q_n) - q_n through F
+    G[:, 0, 5] = G[:, 3, 6] = 1.0
+    F_d[:, 4] = rigid[:, PITCH_RATE]
+    names = STATE_NAMES[:x] + tuple(f"filter_{i + 1}" for i in range(s)) + actuator_names(actuators)
+    return ErrorSystem(A + B @ F, G, F, F_d, names)
+
+
+def factors(design: ControlDesign) -> list[np.ndarray]:
+    """Return the factors (5 each) between which all certified ones lie: the least one and 1.
+
+    A set that is invariant under both is invariant under any variation of the factor between them.
+    """
+    one = np.ones(N_RIGID)
+    return [one] if np.array_equal(design.tau_minimum, one) else [design.tau_minimum, one]
+
+
+# --- invariant set, (25)-(28), and tightened inputs, (30) ------------------------------------------------------------
+
+
+class Tube:
+    """A tube that a certificate states under ``field``, for the closed loops of a design.
+
+    ``c`` (n) and ``Q`` (n, n): the ellipsoid (e - c)' Q^-1 (e - c) <= 1; ``middle`` and ``half`` (7) of W.
+    """
+
+    def __init__(self, subject: Subject, design: ControlDesign, field: str) -> None:
+        """Read the set and its disturbances, and make the error system."""
+        self.field, self.design = field, design
+        systems = [error_system(design, subject.vehicle, tau) for tau in factors(design)]
+        self.system = systems[0]
+        self.A, self.G = (np.concatenate([getattr(s, name) for s in systems]) for name in ("A", "G"))
+        stated = subject.stated(f"{field}.invariant_set")
+        self.c, self.Q, self.l = (np.array(stated[name]) for name in ("centre", "Q", "multipliers"))
+        self.lam = float(stated["contraction"])
+        channels = subject.stated(f"{field}.disturbance.channels")
+        self.lower, self.upper = (np.array([channels[name][side] for name in CHANNELS]) for side in ("lower", "upper"))
+        self.middle, self.half = 0.5 * (self.lower + self.upper), 0.5 * (self.upper - self.lower)
+        self.star = None
+        if "star_norms" in stated:
+            self.star = StarNorms(*(np.array(stated["star_norms"][name]) for name in ("Q", "contraction")))
+        self.rows = np.vstack((np.eye(N_RIGID, len(self.c)), self.system.F))
+
+    @property
+    def columns(self) -> np.ndarray:
+        """(r, n, 8): effect of W at half its width on e - c, and the drift of c under its mid-points."""
+        drift = self.A @ self.c + self.G @ self.middle - self.c
+        return np.concatenate((self.G * self.half, drift[:, :, None]), axis=2)
+
+    @property
+    def half_width(self) -> np.ndarray:
+        """(28): half-widths (n) of the set."""
+        return self._narrowed(np.sqrt(np.diag(self.Q)), slice(N_RIGID))
+
+    @property
+    def feedback(self) -> np.ndarray:
+        """Half-ranges (2) of F e over the set."""
+        F = self.system.F
+        return self._narrowed(np.sqrt(np.sum((F @ self.Q) * F, axis=1)), slice(N_RIGID, None))
+
+    def _narrowed(self, bounds: np.ndarray, rows: slice) -> np.ndarray:
+        if self.star is None:
+            return bounds
+        # Each row is at most the sum over the channels of its reach in the ellipsoid of the channel.
+        star = np.sqrt(np.einsum("ki,kjil,kl->kj", self.rows, self.star.Q, self.rows)).sum(axis=1)[rows]
+        return np.append(np.minimum(bounds[: len(star)], star), bounds[len(star) :])
+
+    def residuals(self) -> np.ndarray:
+        """(27): above zero, c + Q is invariant at a vertex (r), by the S-procedure.
+
+        Errors in the set have lam v' Q^-1 v <= lam, disturbances sum_j l_j d_j^2 <= sum_j l_j <= 1 - lam.
+        """
+        if self.l.min() <= 0.0 or self.l.sum(axis=1).max() > (1.0 - self.lam) * (1.0 + 1e-12):
+            raise DesignError("multipliers: expected all above zero and sums of at most 1 - contraction")
+        scaled = self.columns / np.sqrt(self.l)[:, None, :]
+        return 1.0 - image(self.Q, self.A / np.sqrt(self.lam), scaled) ** 2
+
+    def tightened(self, lag: Sequence[Sequence[float]] = ((0.0, 0.0), (0.0, 0.0))) -> np.ndarray:
+        """(30), (53): bounds (lower and upper, 2 inputs) of u_n + u_r, U less the range of the feedback."""
+        middle = self.system.F @ self.c + self.system.F_d @ self.middle
+        half = self.feedback + np.abs(self.system.F_d) @ self.half
+        lower, upper = self.design.input_minimum - middle + half, self.design.input_maximum - middle - half
+        return np.stack((lower - lag[0], upper - lag[1]))
+
+
+class StarNorms(NamedTuple):
+    """Ellipsoids ``Q`` (7, 8, n, n) of each output row and channel, with ``contraction`` (7, 8)."""
+
+    Q: np.ndarray
+    contraction: np.ndarray
+
+    def residuals(self, tube: Tube) -> np.ndarray:
+        """Above zero (7, acting channels), v(k+1) = A_i v + g_i d with |d| <= 1 stays in v' Q^-1 v <= 1.
+
+        Q - A_i Q A_i' / lam - g_i g_i' / (1 - lam) >= 0 (Abedor, Nagpal and Poolla 1996), Q scaled to the identity.
+        """
+        if not (self.contraction.min() > 0.0 and self.contraction.max() < 1.0):
+            raise DesignError("star_norms.contraction: expected between 0 and 1")
+        acting, columns = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.columns
+        return np.array(
+            [
+                [
+                    1.0
+                    - image(Q[j], tube.A / np.sqrt(lam[j]), columns[:, :, j, None] / np.sqrt(1.0 - lam[j])).max() ** 2
+                    for j in acting
+                ]
+                for Q, lam in zip(self.Q, self.contraction, strict=True)
+            ]
+        )
+
+    def start(self, tube: Tube) -> float:
+        """Return the largest level of terms, one a channel, whose sum is -c, where a flight starts (e = 0).
+
+        A term is what the mid-point of its channel makes of the mean vertex; the last one takes the rest.
+        """
+        acting, mean = np.flatnonzero(tube.columns.any(axis=(0, 1))), tube.A.mean(axis=0)
+        terms = np.linalg.solve(mean - np.eye(len(mean)), tube.G.mean(axis=0) * tube.middle).T
+        terms = np.vstack((terms, np.zeros(len(mean))))
+        terms[acting[-1]] = -tube.c - terms[acting[:-1]].sum(axis=0)
+        return max(float(level(Q[j], terms[j])) for Q, j in product(self.Q, acting))
+
+
+def set_checks(subject: Subject) -> Checks:
+    """Recompute invariance, half-widths, W and tightened inputs of the tube that flies."""
+    design = subject.design
+    tube = Tube(subject, design, "tube")
+    yield Check("tube parameters", str(design.tube is not None), "True", design.tube is not None)
+    seen = len(tube.c) - sum(name.startswith(INPUT_NAMES) for name in tube.system.names)
+    if design.tube is not None:
+        shape = inverse(tube.Q[:seen, :seen])
+        yield required(
+            parameter(subject, "tube.centre", design.tube.centre, tube.c[:seen], fields=("tube.invariant_set.centre",))
+        )
+        yield required(parameter(subject, "tube.shape", design.tube.shape, shape, "tube.shape = Q^-1"))
+        half_width = tube.half_width[:seen]
+        yield required(
+            parameter(subject, "tube.half_width", design.tube.half_width, half_width, "tube.half_width from Q")
+        )
+    yield from _tube_checks(subject, tube)
+    declared, carried = subject.stated("inputs.invariant_set.method") == "star_norms", tube.star is not None
+    fields = ("inputs.invariant_set.method",)
+    yield Check("star norms", str(carried), str(declared), carried == declared, fields=fields)
+    if tube.star:
+        yield from _star_checks(subject, tube)
+    tightening, bounds = subject.certificate["tube"]["tightening"], tube.tightened(lag_feedback(subject))
+    plan = tightening["plan"]
+    lowest, highest = np.array(plan["lowest"]), np.array(plan["highest"])
+    yield recomputed(subject, "tube.tightening.plan.margin_to_lower", lowest - bounds[0], "room of plans")
+    yield recomputed(subject, "tube.tightening.plan.margin_to_upper", bounds[1] - highest, "room of plans")
+    yield above("room of the nominal plan", min((lowest - bounds[0]).min(), (bounds[1] - highest).min()), 0.0)
+    yield Check("nominal plan bounds", str(design.plan_bounds is not None), "True", design.plan_bounds is not None)
+    if design.plan_bounds is not None:
+        low, high = plan["pitch_acceleration"]
+        lowest, highest = np.append(lowest, low), np.append(highest, high)
+        shift = _KEPT_OFF * (highest - lowest) * np.array([1.0, 1.0, 0.0])
+        expected = bounds[0], bounds[1], lowest - shift, highest - shift
+        names = "input_minimum", "input_maximum", "region_minimum", "region_maximum"
+        fields = tuple(f"tube.tightening.plan.{name}" for name in ("lowest", "highest", "pitch_acceleration"))
+        for name, value in zip(names, expected, strict=True):
+            shown, flown = f"nominal.{name} from the tightened bounds and plans", getattr(design.plan_bounds, name)
+            yield parameter(subject, f"nominal.{name}", flown, value, shown, fields=fields)
+
+
+def lag_feedback(subject: Subject) -> Sequence[Sequence[float]]:
+    """Return the least and the largest feedback (2 each) to the lag of the plan behind actuators, as stated."""
+    lag = subject.certificate["tube"]["tightening"].get("lag_feedback")
+    return (lag["lower"], lag["upper"]) if lag else ((0.0, 0.0), (0.0, 0.0))
+
+
+def _tube_checks(subject: Subject, tube: Tube) -> Checks:
+    """Check set, disturbances and tightened inputs that are stated under the field of ``tube``."""
+    field = tube.field
+    inside, inputs = f"{field}.invariant_set", subject.certificate["inputs"]["disturbance"]
+    yield equal(subject, f"{inside}.kind", "ellipsoid")
+    yield equal(subject, f"{inside}.states", list(tube.system.names))
+    yield symmetric(f"{inside}.Q", tube.Q)
+    yield recomputed(subject, f"{inside}.half_width", tube.half_width, "half-widths")
+    yield recomputed(subject, f"{inside}.feedback_half_range", tube.feedback, "half-widths")
+    residuals = tube.residuals()
+    fields = tuple(f"{inside}.{name}" for name in ("Q", "centre", "contraction", "multipliers"))
+    shown = f"{field}: invariance, smallest eigenvalue over the vertices"
+    yield replace(required(above(shown, residuals.min(), 0.0)), fields=fields)
+    yield recomputed(subject, f"{inside}.certificate.lmi_smallest_eigenvalues", residuals, "eigenvalues")
+    at_start = float(level(tube.Q, -tube.c))
+    yield required(at_most(f"{field}: level of e = 0", at_start, 1.0))
+    yield recomputed(subject, f"{inside}.certificate.level_of_zero_error", at_start, "eigenvalues")
+    measured = subject.stated(f"{field}.disturbance.measured")
+    for side, bounds, sign in (("lower", tube.lower, -1.0), ("upper", tube.upper, 1.0)):
+        outward = widened(sign * np.array(measured[side]), inputs["inflation"])
+        fields = (
+            f"{field}.disturbance.measured.{side}",
+            *(f"{field}.disturbance.channels.{c}.{side}" for c in CHANNELS),
+        )
+        check = same(f"{field}.disturbance, {side}", bounds, sign * inputs["share"] * outward, "disturbance bounds")
+        yield replace(check, fields=fields)
+    for channel, unit in CHANNELS.items():
+        yield equal(subject, f"{field}.disturbance.channels.{channel}.unit", unit)
+    lag = lag_feedback(subject) if field == "tube" else ((0.0, 0.0), (0.0, 0.0))
+    for side, bound in zip(("lower", "upper"), tube.tightened(lag), strict=True):
+        check = recomputed(subject, f"{field}.tightening.{side}", bound, "tightened bounds")
+        yield replace(check, fields=(*check.fields, f"{field}.tightening.lag_feedback.{side}"))
+
+
+def widened(bounds: np.ndarray, inflation: float) -> np.ndarray:
+    """(19): ``inflation`` times ``bounds`` on the side above zero, rounded up to six significant digits."""
+    bounds = inflation * np.maximum(bounds, 0.0)
+    quantum = 10.0 ** (np.floor(np.log10(np.where(bounds > 0.0, bounds, 1.0))) - 5.0)
+    return np.asarray(quantum * np.ceil(bounds / quantum * (1.0 - 1e-12)))
+
+
+def _star_checks(subject: Subject, tube: Tube) -> Checks:
+    star, inside = tube.star, "tube.invariant_set"
+    assert star is not None
+    shape = (len(tube.rows), len(CHANNELS) + 1)
+    yield required(same("star norms, shape", star.Q.shape, (*shape, *tube.Q.shape), "copied"))
+    yield symmetric("star norms", star.Q)
+    least, start = star.residuals(tube).min(), star.start(tube)
+    fields = f"{inside}.star_norms.Q", f"{inside}.star_norms.contraction"
+    yield replace(required(above("invariance of the star norms, smallest eigenvalue", least, 0.0)), fields=fields)
+    yield required(at_most("level of e = 0 in the star norms", start, 1.0))
+    yield recomputed(subject, f"{inside}.certificate.star_norms.smallest_eigenvalue", least, "eigenvalues")
+    yield recomputed(subject, f"{inside}.certificate.star_norms.level_of_zero_error", start, "eigenvalues")
+
+
+def counter_example_checks(subject: Subject) -> Checks:
+    """Recompute how far the stated sequences of disturbances drive the error: no half-width can be below.
+
+    At a constant vertex i, row c of e(m) is at most sum_j |c A_i^j G_i| half over the last m steps, and
+    disturbances with the signs of the terms attain it.
+    """
+    inside = "tube.invariant_set"
+    if "star_norms" not in subject.stated(inside):
+        return
+    tube, stated = Tube(subject, subject.design, "tube"), subject.stated(f"{inside}.counter_examples")
+    driven = np.zeros(len(tube.rows))
+    for k, (row, vertex, steps) in enumerate(zip(tube.rows, stated["vertex"], stated["steps"], strict=True)):
+        for _ in range(steps):
+            driven[k] += np.abs(row @ tube.G[vertex]) @ tube.half
+            row = row @ tube.A[vertex]
+    check = recomputed(subject, f"{inside}.counter_examples.half_range", driven, "half-widths")
+    names = "half_range", "vertex", "steps"
+    yield replace(check, fields=tuple(f"{inside}.counter_examples.{name}" for name in names))
+    certified = np.concatenate((tube.half_width[:N_RIGID], tube.feedback))
+    yield required(at_most("counter-examples, largest share of a half-width", (driven / certified).max(), 1.0))
+
+
+# --- adjustable factor, (47)-(54) ------------------------------------------------------------------------------------
+
+
+def factor_checks(subject: Subject) -> Checks:
+    """Recompute what a change of the factor in flight rests on; a design without one has the factor 1 alone."""
+    design, stated = subject.design, subject.certificate.get("adjustable")
+    filtered = stated is not None
+    yield required(Check("nominal.filtered", str(design.filtered), str(filtered), design.filtered == filtered))
+    least = np.ones(N_RIGID) if stated is None else stated["tau_minimum"]
+    fields = () if stated is None else ("adjustable.tau_minimum",)
+    yield required(parameter(subject, "feedback.tau_minimum", design.tau_minimum, least, fields=fields))
+    if stated is None:
+        return
+    # e' N^-1 e decreases for every factor, with the whole elevator and with what the fault leaves of it.
+    shares = 1.0, subject.stated("inputs.disturbance.elevator_effectiveness")
+    loops = [error_system(design, subject.vehicle, tau, share).A for tau, share in product(factors(design), shares)]
+    N = np.array(stated["lyapunov"]["N"])
+    yield symmetric("adjustable.lyapunov.N", N)
+    residuals = 1.0 - image(N, np.concatenate(loops))
+    fields = ("adjustable.lyapunov.N",)
+    yield replace(required(above("common Lyapunov function, smallest eigenvalue", residuals.min(), 0.0)), fields=fields)
+    yield recomputed(subject, "adjustable.lyapunov.lmi_smallest_eigenvalues", residuals, "eigenvalues")
+    bounds = Tube(subject, replace(design, tau_minimum=np.ones(N_RIGID)), "tube").tightened()
+    plan = subject.stated("tube.tightening.plan")
+    room = np.minimum(plan["lowest"] - bounds[0], bounds[1] - plan["highest"])
+    yield recomputed(subject, "adjustable.room_at_one", room, "room of plans")
+    yield required(above("least room of the nominal plan at tau = 1", float(room.min()), 0.0))
+
+
+def adjustable_checks(subject: Subject) -> Checks:
+    """Recompute Z at tau = 1, the relaxed bounds that follow from it, the single K' and the poles."""
+    design, stated = subject.design, subject.certificate.get("adjustable")
+    if stated is None:
+        return
+    tau = np.array(subject.stated("inputs.adjustable.tau"))
+    tau = np.full(N_RIGID, tau[0]) if len(tau) == 1 else tau
+    yield recomputed(subject, "adjustable.tau", tau, "copied")
+    yield recomputed(subject, "adjustable.share", tau.max(), "copied")
+    yield parameter(subject, "feedback.tau", design.tau, tau, fields=("inputs.adjustable.tau",))
+    one = np.ones(N_RIGID)
+    complete = Tube(subject, replace(design, tau=one, tau_minimum=one), "adjustable.complete")
+    incomplete = Tube(subject, design, "adjustable.incomplete")
+    yield from _tube_checks(subject, complete)
+    yield from _tube_checks(subject, incomplete)
+    scaled = np.append(tau, np.full(len(complete.c) - N_RIGID, tau[-1])) * complete.half_width
+    yield recomputed(subject, "adjustable.scaled_half_width", scaled, "half-widths")
+    # (52): |u_n| may grow as U minus F' Z' is wider than U minus F Z, about the target's trim.
+    target = subject.stated("inputs.nominal.target")
+    at_target = trim(subject.vehicle.decoupled, target["altitude"], target["velocity"]).input
+    rooms = [np.minimum(at_target - t[0], t[1] - at_target) for t in (complete.tightened(), incomplete.tightened())]
+    bound = sizes(subject.stated("inputs.nominal.input_bound"), INPUT_NAMES)
+    relaxed = np.round(bound * rooms[1] / rooms[0], 6)
+    check = recomputed(subject, "adjustable.input_bound", relaxed, "relaxed bounds")
+    yield replace(check, fields=("adjustable.input_bound", "inputs.nominal.input_bound"))
+    single, weights = "adjustable.single_gain", NominalWeights.of(subject)
+    Q = np.array(subject.stated(f"{single}.Q"))
+    K = quotient(np.array(subject.stated(f"{single}.Y")), Q)[:, :N_RIGID]
+    for check in _gain_checks(subject, single, weights, K, step(subject)):
+        yield replace(check, fields=(*check.fields, f"{single}.Q", f"{single}.Y"))
+    yield equal(subject, f"{single}.nesting_residual", None)
+    yield from _full_state_checks(subject)
+
+
+def _full_state_checks(subject: Subject) -> Checks:
+    """The full-state F' of section 4.3 cancels the notch filter: rightmost poles of the coupled vehicle with it."""
+    design, field, notch = subject.design, "adjustable.full_state", notch_in_series(subject.design)
+    gain, whole = np.array(subject.stated(f"{field}.gain")), recomputed_model(subject).whole
+    kept = [*range(N_RIGID), *range(N_STATES, N_STATES + len(notch.B))]
+    loops = whole.A[:, kept][:, :, kept] + whole.B[:, kept] @ gain
+    yield recomputed(subject, f"{field}.spectral_radii", radii(loops), "spectral radii")
+    on_rate = (gain @ from_true_rate(notch)[np.ix_(kept, kept)])[1, PITCH_RATE]
+    check = recomputed(subject, f"{field}.elevator_on_pitch_rate", on_rate, "feedback gain")
+    yield replace(check, fields=(f"{field}.elevator_on_pitch_rate", f"{field}.gain"))
+    structured = design.feedback_gain[1, PITCH_RATE]
+    yield recomputed(subject, f"{field}.structured_elevator_on_pitch_rate", structured, "copied")
+    target = subject.stated("inputs.nominal.target")
+    for coupling in subject.vehicle.couplings:
+        vehicle = subject.vehicle.coupled(coupling)
+        at = trim(vehicle, target["altitude"], target["velocity"])
+        jacobian = extended_jacobian(extended_state(at.state, notch), at.input, vehicle, notch, False)
+        A, B = zero_order_hold(*jacobian, design.period)
+        for name, values in (("structured", design.feedback_gain[:, :N_RIGID]), ("full_state", gain)):
+            F = np.zeros((N_INPUTS, len(A)))
+            F[:, kept[: values.shape[1]]] = values
+            pole = float(np.log(radii(A + B @ F)) / design.period)
+            yield recomputed(subject, f"{field}.largest_real_part.{name}.{coupling}", pole, "rightmost poles")
+            if name == "structured":
+                yield at_most(f"rightmost pole of the coupled vehicle, {coupling} coupling", pole, 0.0)
+
+
+# --- before a flight -------------------------------------------------------------------------------------------------
+
+Part = Callable[[Subject], Checks]
+
+QUICK: dict[str, Part] = {
+    "inputs": input_checks,
+    "feedback gain": feedback_checks,
+    "nominal gains": nominal_checks,
+    "invariant set": set_checks,
+    "adjustable factor": factor_checks,
+}
+"""Checks by part that need neither solvers nor models: fast enough for a node at its start."""
+
+RECOMPUTED: dict[str, Part] = {
+    "statement": statement_checks,
+    "solvers": solver_checks,
+    "polytopic model": model_checks,
+    "adjustable design": adjustable_checks,
+    "counter-examples": counter_example_checks,
+}
+"""Checks by part that take a few seconds."""
+
+
+def preflight(design: ControlDesign, certificate: str = "") -> str:
+    """Return warnings about ``design`` before a flight, usually none.
+
+    A design that differs from the one that was certified may fly, people tune, as long as what its safety rests on
+    holds for it: gains stable at every vertex; one Lyapunov function for F with (24), one for every K with (34); the
+    invariant set that is watched in flight is the certified one, and invariant at every vertex under the gain that
+    flies. Each of these refuses. Everything else that no longer agrees with the certificate is a warning, and so is a
+    design without a certificate. That is the file ``certificate`` or, where none is named, the one beside the design's
+    own file.
+
+    Raises:
+        DesignError: Names the check that fails, or the certificate that cannot be read.
+    """
+    path = find_certificate(design.name, certificate)
+    if path is None:
+        return f"design {design.name!r}: no certificate found, not verified"
+    subject = Subject(design, read_certificate(path))
+    checks = [check for name, part in QUICK.items() for check in gathered(name, partial(part, subject))]
+    failing = [check for check in checks if not check.ok]
+    refused = next((check for check in failing if check.required), None)
+    if refused:
+        raise DesignError(f"design {design.name!r}: check fails: {refused}")
+    return f"design {design.name!r} is not as certified: {failing[0]}" if failing else ""

@@ -1,0 +1,61 @@
+"""Difference between a recomputed design and the shipped one, in scaled coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hsv.control.checks import Subject
+from hsv.control.design import ControlDesign
+from hsv.control.tolerances import PARAMETERS, RECOMPUTED_DESIGN, entry_size
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Largest deviation of a parameter, at its entry ``[index]``: ``value`` where ``expected`` was shipped, SI.
+
+    ``scaled``: their difference over the larger of the shipped entry and the entry's size.
+    """
+
+    parameter: str
+    scaled: float
+    index: tuple[int, ...]
+    value: float
+    expected: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether the two agree."""
+        return self.scaled <= RECOMPUTED_DESIGN
+
+    def __str__(self) -> str:
+        where = f"[{', '.join(map(str, self.index))}]" if self.index else ""
+        return (
+            f"{self.parameter}{where} = {self.value!r}: expected {self.expected!r}; they differ by {self.scaled:.2g} "
+            f"in scaled coordinates, expected at most {RECOMPUTED_DESIGN:g}"
+        )
+
+
+def deviations(design: ControlDesign, shipped: Subject) -> list[Deviation]:
+    """Return the largest deviation of each parameter of ``design`` from ``shipped``, infinite for other sizes."""
+    values, expected = design.to_parameters(), shipped.design.to_parameters()
+    return [
+        _largest(name, values.get(name, []), expected.get(name, []), entry_size(name, shipped.certificate))
+        for name in PARAMETERS
+        if name in values or name in expected
+    ]
+
+
+def _largest(parameter: str, given: float | list[float], written: float | list[float], size: np.ndarray) -> Deviation:
+    value, expected = np.array(given, float), np.array(written, float)
+    if value.shape != expected.shape:
+        return Deviation(parameter, np.inf, (), float(value.size), float(expected.size))
+    if size.ndim > 1:
+        shape = size.shape if value.size == size.size else (-1, *size.shape)
+        value, expected = value.reshape(shape), expected.reshape(shape)
+    scaled = np.abs(value - expected) / np.maximum(np.abs(expected), size if expected.ndim else size[0])
+    scaled = np.where(np.isnan(scaled), np.inf, scaled)
+    worst = np.unravel_index(int(np.argmax(scaled)), scaled.shape)
+    index = tuple(int(i) for i in worst)
+    return Deviation(parameter, float(scaled[worst]), index, float(value[worst]), float(expected[worst]))

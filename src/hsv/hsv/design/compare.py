@@ -1,0 +1,73 @@
+"""The invariant sets of a design side by side: ellipsoid, star norms, and what no set can be below."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.control.design import ControlDesign
+from hsv.design.inputs import InvariantSetInputs
+from hsv.design.sets.counter_example import counter_examples
+from hsv.design.sets.ellipsoid import ellipsoid
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.sets.problem import TubeProblem, mean_size
+from hsv.design.sets.star_norms import star_norms
+from hsv.design.tightening import tighten
+from hsv.model.signals import N_RIGID
+
+
+@dataclass(frozen=True)
+class Row:
+    """One set, or why there is none (``note``); half-widths and feedback in SI.
+
+    ``size``: geometric mean of the half-widths of the rigid states over their scales. ``lower`` and ``upper`` (2): the
+    tightened bounds of u_n + u_r, where anything is left.
+    """
+
+    name: str
+    note: str = ""
+    half_width: np.ndarray | None = None
+    feedback: np.ndarray | None = None
+    size: float | None = None
+    lower: np.ndarray | None = None
+    upper: np.ndarray | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the row for JSON."""
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in vars(self).items()
+            if value is not None
+        }
+
+
+def compare_sets(design: ControlDesign, problem: TubeProblem, inputs: InvariantSetInputs) -> list[Row]:
+    """Return a row for the ellipsoid, for star norms, and for the counter-examples.
+
+    Args:
+        design: Gains and vertices.
+        problem: The error system with its disturbances.
+        inputs: Scales, and contractions for the ellipsoid.
+    """
+    scale, rows = inputs.state_scale.array(), []
+    try:
+        found = ellipsoid(problem, scale, inputs.input_scale.array(), inputs.contraction)
+        rows.append(_row("ellipsoid", found, design, scale))
+        rows.append(_row("star norms", found.narrowed(star_norms(problem, found.centre)), design, scale))
+    except DesignError as error:
+        rows.append(Row(("ellipsoid", "star norms")[len(rows)], str(error)))
+    driven = counter_examples(problem).half_range
+    return [*rows, Row("counter-examples", "", driven[:N_RIGID], driven[N_RIGID:], mean_size(driven, scale))]
+
+
+def _row(name: str, found: InvariantSet, design: ControlDesign, scale: np.ndarray) -> Row:
+    found.certify()
+    size = mean_size(found.half_width, scale)
+    try:
+        bounds = tighten(found, design.input_minimum, design.input_maximum)
+    except DesignError as error:
+        return Row(name, str(error), found.half_width, found.feedback, size)
+    return Row(name, "", found.half_width, found.feedback, size, bounds.lower, bounds.upper)

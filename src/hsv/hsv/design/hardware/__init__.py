@@ -1,0 +1,1 @@
+"""Certification of a design with hardware and air beside the disturbances of its certificate: ``hsv certify``."""

@@ -1,0 +1,229 @@
+"""Whether a design stays certified with models of hardware and air beside the disturbances of its certificate.
+
+Actuators add states. The invariant set is sought as a design seeks its own, under all vertices, and the nominal plan of
+the certificate has to fit into what it leaves of the inputs. Whether limits of actuators act in that set is said by
+:mod:`hsv.design.hardware.limits`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.base.processes import Progress
+from hsv.base.units import UnitSystem, in_words
+from hsv.control.design import ControlDesign
+from hsv.design.certified import CertifiedDesign
+from hsv.design.disturbance import widened
+from hsv.design.hardware.effects import N_SCHEDULING, Measured, Model, with_models
+from hsv.design.hardware.limits import Reach, reaches
+from hsv.design.hardware.plan import Plan
+from hsv.design.region import Region, incomplete_share, record
+from hsv.design.sets.invariant_set import InvariantSet
+from hsv.design.sets.problem import TubeProblem
+from hsv.design.tightening import left_by
+from hsv.design.tube import invariant_set
+from hsv.design.tube_problem import channel_model, tube_problem
+from hsv.model.actuators import ACTUATOR_SETS, IDEAL
+from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_RIGID
+
+Lag = tuple[np.ndarray, np.ndarray] | None
+"""Least and largest feedback (2 each) to the lag of the plan behind actuators; none where they are ideal."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether a design is certified with some models: ``half_width`` (5) of the rigid states, ``feedback`` (2), SI.
+
+    ``room`` (2, 2): what the nominal plan leaves of each input, lower and upper side; below zero it does not fit.
+    ``reason``: why there is no set at all.
+    """
+
+    name: str
+    reason: str = ""
+    half_width: np.ndarray | None = None
+    feedback: np.ndarray | None = None
+    room: np.ndarray | None = None
+    shares: np.ndarray | None = None
+    """The room (2, 2) as a share of the input's range."""
+    start: float = 0.0
+    """Largest level at which a flight may start: x_n takes errors of the first measurement for the truth"""
+    reaches: tuple[Reach, ...] = ()
+    """Ranges of the actuators over the set."""
+    without_limits: Verdict | None = None
+    """For a verdict on the limits of actuators: the verdict without them."""
+
+    def said(self, units: UnitSystem = UnitSystem.metric) -> str:
+        """Return by how much, in words."""
+        if self.without_limits:
+            return "; ".join(reach.said(units) for reach in self.reaches) or self.without_limits.said(units)
+        if self.room is None or self.shares is None:
+            return self.reason
+        if self.start > 1.0:
+            return f"flights may start outside the set, at level {self.start:.3g}"
+        input, side = np.unravel_index(int(np.argmin(self.shares)), self.room.shape)
+        amount = in_words(abs(float(self.room[input, side])), INPUT_UNITS[input], units)
+        where = f"{INPUT_NAMES[input]}, {('lower', 'upper')[side]} side"
+        return f"room of {amount} ({where})" if self.certified else f"the plan lacks {amount} ({where})"
+
+    @property
+    def certified(self) -> bool:
+        """Whether the set is found and the plan fits."""
+        return self.room is not None and bool(self.room.min() > 0.0) and self.start <= 1.0
+
+    def limited(self) -> Verdict:
+        """Return the verdict on the same actuators with their limits: certified where no limit is reached."""
+        inactive = self.certified and all(reach.inactive for reach in self.reaches)
+        limited = replace(self, name=f"{self.name}, limits of actuators", without_limits=self)
+        limited = limited if inactive else replace(limited, half_width=None, feedback=None, room=None, shares=None)
+        return replace(limited, reason=limited.said(UnitSystem.si))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the verdict for JSON."""
+        arrays = {name: value.tolist() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        reach = [one.as_dict() for one in self.reaches]
+        numbers = {"start_level": self.start, **arrays, "actuators": reach}
+        return {"name": self.name, "certified": self.certified, "reason": self.reason, **numbers}
+
+
+def certified_with(
+    subject: CertifiedDesign,
+    models: Mapping[str, Model],
+    actuators: str = "",
+    progress: Progress = lambda *_: None,
+    unbounded: Sequence[str] = (),
+) -> list[Verdict]:
+    """Return a verdict for the design as it is, with its ``actuators``, with each model alone, and with all.
+
+    Where actuators are known and all is certified without their limits, a last verdict is on these.
+
+    Args:
+        subject: The design with its certificate.
+        models: Models by name.
+        actuators: Names with commas between, or "ideal"; empty: those that the design knows.
+        progress: Told of every verdict.
+        unbounded: Further effects for which no bound is known; with any of them nothing is certified.
+
+    Raises:
+        DesignError: Unknown actuators, or two of one channel.
+    """
+    design = subject.design
+    names = _named(actuators) if actuators else design.actuators
+    lag = subject.lag_feedback
+    cases: list[tuple[str, ControlDesign, list[Model], Lag]] = [("as certified", design, [], lag)]
+    behind = design
+    if set(names) != set(design.actuators):
+        behind = replace(design, actuators=names)
+        lag = _lag_of_the_plan(subject, behind) if names else None
+        cases.append((f"actuators {', '.join(names)}" if names else "ideal actuators", behind, [], lag))
+    cases += [(name, behind, [model], lag) for name, model in models.items()]
+    if len(models) > 1:
+        cases.append(("all", behind, list(models.values()), lag))
+    verdicts = []
+    for done, (name, flown, added, bounds) in enumerate(cases):
+        progress("invariant sets", done, len(cases))
+        verdicts.append(verdict(name, flown, subject, added, bounds))
+    progress("invariant sets", len(cases), len(cases))
+    if verdicts[-1].reaches:
+        verdicts.append(verdicts[-1].limited())
+    return [*verdicts, *(Verdict(name, "no bound is known for its effect") for name in unbounded)]
+
+
+def _named(actuators: str) -> tuple[str, ...]:
+    """Return the names in a text of ``actuators``, none of ideal ones.
+
+    Raises:
+        DesignError: Unknown actuators, or two of one channel.
+    """
+    if actuators.strip() == IDEAL:
+        return ()
+    names = tuple(name.strip() for name in actuators.split(","))
+    for name in names:
+        if name not in ACTUATOR_SETS:
+            raise DesignError(f"actuators = {actuators!r}: expected {IDEAL}, or names from {', '.join(ACTUATOR_SETS)}")
+    if len({ACTUATOR_SETS[name].channel for name in names}) < len(names):
+        raise DesignError(f"actuators = {actuators!r}: expected at most one a channel")
+    return names
+
+
+def _lag_of_the_plan(subject: CertifiedDesign, design: ControlDesign) -> tuple[np.ndarray, np.ndarray]:
+    """Return least and largest feedback (2 each) to the lag of the nominal vehicle's plan, inflated as a design's."""
+    inputs = subject.inputs
+    flight = Region(subject.design, inputs, incomplete_share(inputs)).fly({})
+    feedback = channel_model(design, subject.vehicle).errors(record(flight))[1]
+    return widened(feedback.min(axis=0), feedback.max(axis=0), inputs.disturbance.inflation)
+
+
+def verdict(
+    name: str,
+    design: ControlDesign,
+    subject: CertifiedDesign,
+    models: Sequence[Model] = (),
+    lag: Lag = None,
+) -> Verdict:
+    """Return whether ``design`` is certified with ``models`` in addition to its certificate's disturbances.
+
+    Args:
+        name: Name of the verdict.
+        design: Design of ``subject``, with the actuators to certify.
+        subject: The design with its certificate.
+        models: Beside those disturbances.
+        lag: Lag of the nominal input.
+    """
+    tube, inputs = subject.certificate["tube"], subject.inputs.invariant_set
+    problem = with_models(tube_problem(design, subject.vehicle, subject.disturbance), models)
+    own = tube["invariant_set"]["contraction"]
+    others = [value for value in inputs.contraction if value != own]
+    measured = [model for model in models if isinstance(model, Measured)]
+    error = np.sum([model.error for model in measured] or [np.zeros(N_RIGID)], axis=0)
+    late = np.sum([model.late for model in measured] or [np.zeros(N_RIGID)], axis=0) > 0.0
+    best = Verdict(name, "no contraction to try")
+    for contractions in ([own], others):
+        # Seldom is another contraction better than the certificate's by much: they are tried where it does not do.
+        if not best.certified and contractions:
+            found = _with_contractions(name, design, subject, problem, contractions, lag, error, late)
+            best = max(found, best, key=lambda one: -np.inf if one.shares is None else float(one.shares.min()))
+    return best
+
+
+def _with_contractions(
+    name: str,
+    design: ControlDesign,
+    subject: CertifiedDesign,
+    problem: TubeProblem,
+    contractions: list[float],
+    lag: Lag,
+    error: np.ndarray,
+    late: np.ndarray,
+) -> Verdict:
+    inputs, plan = subject.inputs.invariant_set, subject.certificate["tube"]["tightening"]["plan"]
+    try:
+        found = invariant_set(problem, inputs.model_copy(update={"contraction": contractions}))
+    except DesignError as failure:
+        return Verdict(name, str(failure))
+    scheduling = late & (np.arange(N_RIGID) < N_SCHEDULING)
+    if np.any(found.half_width[:N_RIGID][scheduling] > Plan.of(subject).half_width[scheduling]):
+        # Measured took them to be as far from the truth as the design's own set is wide.
+        return Verdict(name, "the set is wider than late samples of altitude and velocity were bounded by")
+    bounds = left_by(found, design.input_minimum, design.input_maximum, lag)
+    room = bounds.margins(np.array(plan["lowest"]), np.array(plan["highest"]))
+    limits = design.input_maximum - design.input_minimum
+    feedback = 0.5 * (limits - bounds.upper + bounds.lower)
+    reach = tuple(reaches(found, design, Plan.of(subject))) if design.actuators else ()
+    start = _start(found, error)
+    return Verdict(name, "", found.half_width[:N_RIGID], feedback, room, room / limits[:, None], start, reach)
+
+
+def _start(found: InvariantSet, error: np.ndarray) -> float:
+    """Return the largest level of the error with which a flight starts that is measured with an ``error`` (5)."""
+    corners = np.array(list(product((-1.0, 1.0), repeat=N_RIGID))) * error
+    errors = np.pad(corners, ((0, 0), (0, len(found.centre) - N_RIGID)))
+    level = float(found.level(errors).max())
+    if found.star_norms is None:
+        return level
+    return max(level, *(found.star_norms.level_at_start(found.problem, found.centre, error) for error in errors))

@@ -1,0 +1,66 @@
+"""Random sequences of vertices and disturbances against an ellipsoid: evidence that needs no faith in the inequality.
+
+Sequences start at e = 0, where flights start, or on the boundary of the set. Kinds: *iid* draws vertex and signs of
+all disturbances anew at every step; *held* keeps them; *switching* keeps them for random times; *adversarial* keeps
+vertices for random times and picks the signs that push outwards most, every twenty-fifth of them the vertex too.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hsv.base.processes import over_threads
+from hsv.core import doubles, lib
+
+KINDS = ("iid", "held", "switching", "adversarial")
+"""Sequence j is of kind j mod 4."""
+
+_BATCH = 2500
+
+_WIDEST = 32
+"""Numbers in a state, as in ``core/sequences.h``."""
+
+
+def random_sequences(
+    A: np.ndarray, columns: np.ndarray, centre: np.ndarray, Q: np.ndarray, sequences: int, steps: int, seed: int
+) -> dict[str, Any]:
+    """Return the worst level reached, by kind and start; the same ``seed`` gives the same bits on any thread count.
+
+    Args:
+        A: (r, n, n) closed loops, between which the sequences switch.
+        columns: (r, n, d) effect of disturbances of at most 1 on the error less ``centre``.
+        centre: (n) centre of the ellipsoid.
+        Q: (n, n) its matrix.
+        sequences: Number of sequences.
+        steps: Steps of each.
+        seed: Seed.
+    """
+    factor = np.linalg.cholesky(Q)
+    A, G = np.linalg.solve(factor, A @ factor), np.linalg.solve(factor, columns)
+    start = np.linalg.solve(factor, -centre)
+    n = len(factor)
+    # Padded with zeros: the inner loops then run over whole vectors.
+    width = -(-n // 4) * 4
+    both = np.zeros((len(A), n + G.shape[2], width))
+    both[:, :n, :n], both[:, n:, :n] = np.swapaxes(A, 1, 2), np.swapaxes(G, 1, 2)
+    assert width <= _WIDEST
+    begin = np.zeros(width)
+    begin[:n] = start
+
+    def batch(first: int) -> np.ndarray:
+        worst = np.zeros((len(KINDS), 2))
+        end = min(first + _BATCH, sequences)
+        lib.hsv_sample_sequences(*both.shape, doubles(both), n, doubles(begin), first, end, steps, seed, doubles(worst))
+        return worst
+
+    worst = np.max(over_threads(batch, range(0, sequences, _BATCH)), axis=0)
+    return {
+        "sequences": sequences,
+        "steps": steps,
+        "seed": seed,
+        "worst_level": float(worst.max()),
+        "worst_level_from_zero": {kind: float(w) for kind, w in zip(KINDS, worst[:, 0], strict=True)},
+        "worst_level_from_boundary": {kind: float(w) for kind, w in zip(KINDS, worst[:, 1], strict=True)},
+    }

@@ -1,0 +1,298 @@
+"""Flights and random sequences of a design repeated: the second half of :mod:`hsv.control.verification`.
+
+Nothing here comes from the code that computes designs. Flights are simulated by the real loop, and the disturbances
+that acted in them are what the polytopic model does not explain, (13)-(19).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsv.base.errors import DesignError
+from hsv.base.processes import Progress
+from hsv.control.checks import Check, Checks, Subject, above, at_most, gathered, recomputed
+from hsv.control.design import ControlDesign
+from hsv.control.notch_filter import discretise
+from hsv.control.tolerances import ROUNDING, TOLERANCES
+from hsv.control.verification import (
+    ACCELERATED,
+    CHANNELS,
+    QUICK,
+    RECOMPUTED,
+    REMAINING,
+    Part,
+    Tube,
+    acceleration_channels,
+    lag_feedback,
+    level,
+)
+from hsv.flight.assembly import assemble, assemble_flight
+from hsv.flight.closed_loop import Components, fly
+from hsv.flight.corners import Corner, corners, fraction
+from hsv.flight.flight import Flight
+from hsv.flight.random_sequences import random_sequences
+from hsv.flight.responses import along_filter, lag_response
+from hsv.flight.scenario import Scenario
+from hsv.flight.side_by_side import fly_perturbed
+from hsv.model.actuators import ACTUATOR_SETS
+from hsv.model.lpv.actuated import respond, sampled_actuators
+from hsv.model.lpv.polytope import evaluate
+from hsv.model.plant import FlightStatus
+from hsv.model.signals import N_INPUTS, N_RIGID, N_STATES, PITCH_RATE
+from hsv.model.trim import trim
+
+_FLIGHTS, _SEED = 48, 7
+"""Number and seed of random corners that are flown in addition to those that determine a bound."""
+
+_NO_STOP = 1e3
+"""Stop of an actuator that leaves those of the vehicle, which hold as well."""
+
+
+def region(subject: Subject, design: ControlDesign, share: float) -> Components:
+    """Return the nominal flight of the declared region: the step of the design with ``share`` of the fault, (47)."""
+    inputs = subject.certificate["inputs"]
+    declared, ramp = inputs["disturbance"], inputs["disturbance"].get("ramp")
+    start, target = inputs["nominal"]["start"], inputs["nominal"]["target"]
+    points = [start, target] if ramp else [target]
+    values: dict[str, Any] = {
+        "duration": declared["duration"],
+        **subject.vehicle.to_parameters(),
+        "vehicle.coupling": declared["coupling"],
+        "initial.altitude": start["altitude"],
+        "initial.velocity": start["velocity"],
+        "reference.times": [ramp["start"], ramp["end"]] if ramp else [0.0],
+        "reference.altitudes": [point["altitude"] for point in points],
+        "reference.velocities": [point["velocity"] for point in points],
+        "fault.channels": ["elevator_deflection"],
+        "fault.types": ["loss_of_effectiveness"],
+        "fault.parameters": [f"effectiveness={1.0 - share * (1.0 - declared['elevator_effectiveness'])!r}"],
+        "fault.starts": [declared["fault_start"]],
+    }
+    if ramp and ramp.get("blend"):
+        values["reference.blend"] = ramp["blend"]
+    for name in design.actuators:
+        channel = f"actuator.{ACTUATOR_SETS[name].channel}"
+        values |= {f"{channel}.set": name, f"{channel}.stop": [_NO_STOP]}
+    return assemble({**design.to_parameters(), **values})
+
+
+class Disturbances(NamedTuple):
+    """A flight in the coordinates of the tube, a row a step: ``channels`` (n, 7) of W, ``error`` e (n + 1, states).
+
+    ``lag`` (n + 1, 2): feedback to the lag of the plan behind actuators.
+    """
+
+    channels: np.ndarray
+    error: np.ndarray
+    lag: np.ndarray
+
+
+def disturbances(subject: Subject, flight: Flight) -> Disturbances:
+    """Return the disturbances that acted in a flight, (13)-(18), and its error in the tube, (22).
+
+    Delta(k) = x(k+1) - [x_r(k+1) + d_r(k)] - A(p) (x - x_r) - B(p) (u - u_r), and of it B_e(p) times the lost elevator
+    is the fault; the rest is written as three held accelerations and what they leave in altitude and pitch angle.
+    Behind actuators u and the lost elevator are mean positions over a period.
+    """
+    design, vehicle, h = subject.design, subject.vehicle, flight.history
+    notch, plan = discretise(design.notch, design.period), h.nominal_input + flight.reference_input
+    lost = np.zeros_like(h.command)
+    lost[:, 1] = (h.actuator - h.command)[:, 1]
+    acting, through = h.command, lost
+    if design.actuators:
+        actuators = sampled_actuators([ACTUATOR_SETS[name] for name in design.actuators], design.period)
+        at_rest = trim(vehicle.decoupled, h.state[0, 0], h.state[0, 1]).input
+        acting, through = at_rest + respond(actuators, h.command - at_rest)[1], respond(actuators, lost)[1]
+    polytope = design.polytope
+    S = np.concatenate((polytope.A, polytope.B), axis=2)
+    at = evaluate(polytope.altitude, h.state[:-1, 0]), evaluate(polytope.velocity, h.state[:-1, 1])
+    weights = (at[0][:, :, None] * at[1][:, None, :]).reshape(len(at[0]), -1)
+    S = (weights @ S.reshape(len(S), -1)).reshape(-1, N_STATES, N_STATES + N_INPUTS)
+    moved = np.hstack((h.state - flight.reference, acting - flight.reference_input))[:-1]
+    delta = h.state[1:] - flight.reference[1:] - flight.defect[:-1] - np.einsum("kij,kj->ki", S, moved)
+    rest = delta - S[:, :, -1] * through[:-1, 1:]
+    columns, rate = acceleration_channels(vehicle, design.period), (h.deviation + flight.reference)[:-1, PITCH_RATE]
+    channels = np.zeros((len(rest), len(CHANNELS)))
+    channels[:, :3] = np.linalg.solve(columns[ACCELERATED], rest[:, ACCELERATED].T).T
+    channels[:, 3] = lost[:-1, 1]
+    channels[:, 4] = 0.0 if design.filtered else along_filter(notch, rate)[0] - rate
+    channels[:, 5:] = rest[:, REMAINING] - channels[:, :3] @ columns[REMAINING].T
+    rigid = (h.state - h.deviation - flight.reference)[:, :N_RIGID]
+    error = np.hstack((rigid, along_filter(notch, rigid[:, PITCH_RATE])[1]))
+    if not design.actuators:
+        return Disturbances(channels, error, np.zeros_like(h.command))
+    error = np.hstack((error, respond(actuators, h.actuator - plan)[0]))
+    late = at_rest + respond(actuators, plan - at_rest)[1] - plan
+    gain = design.feedback_gain[:, :N_RIGID] * design.tau
+    moved_by_lag, lag = lag_response(polytope, gain, notch, actuators, h.state[:, :2], late)
+    return Disturbances(channels, error - moved_by_lag, lag)
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a flight shows: largest ``level`` in the set, largest ``ratio`` of a disturbance to its bound, and where.
+
+    ``lowest``, ``highest`` (3): of u_n + u_r and of the nominal pitch acceleration; ``lag`` (2, 2): least and largest
+    feedback to the lag; ``channels`` (2, 7): least and largest disturbances.
+    """
+
+    level: float
+    ratio: float
+    channel: str
+    step: int
+    lowest: np.ndarray
+    highest: np.ndarray
+    lag: np.ndarray
+    channels: np.ndarray
+
+
+def evidence(subject: Subject, tube: Tube, flight: Flight) -> Evidence:
+    """Return what ``flight`` shows of the ``tube``.
+
+    Raises:
+        DesignError: The flight diverged, or its input was limited.
+    """
+    h = flight.history
+    if flight.status is not FlightStatus.FINISHED or np.any(h.command != h.u_unsaturated):
+        raise DesignError(f"flight: {flight.status.name}, expected FINISHED, no input limited")
+    found = disturbances(subject, flight)
+    bounds = np.where(found.channels > 0.0, tube.upper, tube.lower)
+    ratios = np.where(found.channels == 0.0, 0.0, np.inf)
+    np.divide(found.channels, bounds, out=ratios, where=bounds != 0.0)
+    step, channel = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
+    plan = h.nominal_input + flight.reference_input
+    turning = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
+    return Evidence(
+        float(level(tube.Q, found.error - tube.c).max()),
+        float(ratios[step, channel]),
+        list(CHANNELS)[channel],
+        int(step),
+        np.append(plan.min(axis=0), turning.min()),
+        np.append(plan.max(axis=0), turning.max()),
+        np.stack((found.lag.min(axis=0), found.lag.max(axis=0))),
+        np.stack((found.channels.min(axis=0), found.channels.max(axis=0))),
+    )
+
+
+def share_of(inputs: Mapping[str, Any]) -> float:
+    """Return the share of fault and parameter bounds that W' covers, (47): the largest factor, or 1 without one."""
+    return float(max(inputs["adjustable"]["tau"])) if inputs.get("adjustable") else 1.0
+
+
+def flight_checks(subject: Subject) -> Checks:
+    """Repeat the flights at the corners that determine a bound of W, and at a sample of all corners."""
+    certified = replace(subject.design, tau=subject.design.tau_minimum)  # in flight the factor may be another one
+    subject = replace(subject, design=certified)
+    tube, share, bounds = Tube(subject, certified, "tube"), share_of(subject.certificate["inputs"]), subject.vehicle
+    parts, seen = region(subject, certified, share), fraction(bounds.uncertainty, share)
+    measured = subject.stated("tube.disturbance.measured")
+    setters = sorted({0, *measured["lower_flight"], *measured["upper_flight"]})
+
+    def show(corner: Corner, flight: Flight) -> Evidence:
+        return evidence(subject, tube, flight)
+
+    again = fly_perturbed(parts, [seen[i] for i in setters], show)
+    for k, side in enumerate(("lower", "upper")):
+        attained = [again[setters.index(i)].channels[k, j] for j, i in enumerate(measured[f"{side}_flight"])]
+        field = f"tube.disturbance.measured.{side}"
+        yield replace(recomputed(subject, field, attained, "flights"), fields=(field, f"{field}_flight"))
+    yield recomputed(subject, "tube.disturbance.flights", len(seen), "copied")
+    everyone = corners(bounds.uncertainty, share)
+    yield recomputed(subject, "tube.flights.flights", len(everyone), "copied")
+    drawn = np.random.default_rng(_SEED).choice(len(everyone), min(_FLIGHTS, len(everyone)), replace=False)
+    flown = [*again, *fly_perturbed(parts, [everyone[i] for i in (0, *drawn)], show)]
+    yield from _worst(subject, "tube.flights", flown)
+    plan = subject.stated("tube.tightening.plan")
+    low, high = plan["pitch_acceleration"]
+    least, most = np.append(plan["lowest"], low), np.append(plan["highest"], high)
+    yield above("nominal plan of flown corners, lowest", min(float(np.min(f.lowest - least)) for f in flown), -ROUNDING)
+    yield above(
+        "nominal plan of flown corners, highest", min(float(np.min(most - f.highest)) for f in flown), -ROUNDING
+    )
+    yield _lag_check("feedback to the lag of the plan", subject, flown)
+    if "adjustable" in subject.certificate:
+        whole, everyone = region(subject, certified, 1.0), corners(bounds.uncertainty, 1.0)
+        field = "adjustable.complete_fault"
+        yield recomputed(subject, f"{field}.flights", len(everyone), "copied")
+        yield from _worst(subject, field, fly_perturbed(whole, [everyone[i] for i in (0, *drawn)], show))
+
+
+def _worst(subject: Subject, field: str, flown: Sequence[Evidence]) -> Checks:
+    """Hold the flown corners to what is stated of all: a sample may stay below it, and not exceed it."""
+    stated, allowance = subject.stated(field), 1.0 + TOLERANCES["flights"].relative
+    yield at_most(f"{field}: level", max(f.level for f in flown), min(1.0, stated["worst_level"] * allowance))
+    ratio = stated["disturbance_membership"]["worst_ratio"] * allowance
+    yield at_most(f"{field}: disturbance over its bound", max(f.ratio for f in flown), ratio)
+
+
+def _lag_check(name: str, subject: Subject, flown: Sequence[Evidence]) -> Check:
+    lower, upper = lag_feedback(subject)
+    room = min(float(min((f.lag[0] - lower).min(), (upper - f.lag[1]).min())) for f in flown)
+    return above(f"{name}, room to its bounds", room, -ROUNDING)
+
+
+def sequence_checks(subject: Subject) -> Checks:
+    """Repeat the random sequences."""
+    tube, field = Tube(subject, subject.design, "tube"), "tube.invariant_set.sampling"
+    stated = subject.stated(field)
+    count = stated["sequences"], stated["steps"], stated["seed"]
+    drawn = random_sequences(tube.A, tube.columns, tube.c, tube.Q, *count)
+    yield at_most("worst level of random sequences", drawn["worst_level"], 1.0)
+    check = recomputed(subject, f"{field}.worst_level", drawn["worst_level"], "random sequences")
+    yield replace(check, fields=(check.name, *(f"{field}.{name}" for name in ("sequences", "steps", "seed"))))
+    for start in ("worst_level_from_zero", "worst_level_from_boundary"):
+        for kind, value in drawn[start].items():
+            yield recomputed(subject, f"{field}.{start}.{kind}", value, "random sequences")
+
+
+def bounding_corners(subject: Subject) -> list[Corner]:
+    """Return the nominal vehicle and the corners of the parameters that set a bound of the disturbances."""
+    measured = subject.stated("tube.disturbance.measured")
+    seen = fraction(subject.vehicle.uncertainty, share_of(subject.certificate["inputs"]))
+    return [seen[i] for i in sorted({0, *measured["lower_flight"], *measured["upper_flight"]})]
+
+
+def scenario_checks(
+    subject: Subject, scenario: Scenario, over: Sequence[Corner] = ({},), progress: Progress = lambda *_: None
+) -> Checks:
+    """Fly ``scenario`` with the design, the vehicle changed to each of ``over``, and check level, disturbances, plan.
+
+    Raises:
+        DesignError: The scenario is not flown by the tube law.
+    """
+    name = scenario.name
+    if scenario.controller != "tube_mpc":
+        raise DesignError(f"scenario {name!r}: controller = {scenario.controller!r}, expected 'tube_mpc'")
+    parts, tube, flown = assemble_flight(scenario, subject.design), Tube(subject, subject.design, "tube"), []
+    for corner in over:
+        flown.append(evidence(subject, tube, fly(parts.perturbed(corner))))
+        progress("flights", len(flown), len(over))
+    yield at_most(f"{name}: level in the set", max(f.level for f in flown), 1.0)
+    worst, share = max(flown, key=lambda f: f.ratio), share_of(subject.certificate["inputs"])
+    held = f" (W' holds {share:g} of fault and parameter bounds, eq. 47)" if share < 1.0 else ""
+    where = f"{name}: disturbance over its bound, {worst.channel} at step {worst.step}{held}"
+    yield at_most(where, worst.ratio, 1.0)
+    if subject.design.actuators:
+        yield _lag_check(f"{name}: feedback to the lag of the plan", subject, flown)
+    stated = subject.stated("tube.tightening")
+    room = min(min((f.lowest[:2] - stated["lower"]).min(), (stated["upper"] - f.highest[:2]).min()) for f in flown)
+    yield above(f"{name}: room of the nominal plan in U minus F Z", float(room), 0.0)
+
+
+FLOWN: dict[str, Part] = {"flights": flight_checks, "random sequences": sequence_checks}
+"""Checks by part that take longer."""
+
+
+def verify(subject: Subject, quick: bool = False, progress: Progress = lambda *_: None) -> dict[str, list[Check]]:
+    """Return every check recomputed, by part; with ``quick`` only those that need no flights or random sequences."""
+    checks: dict[str, list[Check]] = {}
+    for name, part in (QUICK | RECOMPUTED | ({} if quick else FLOWN)).items():
+        progress(name, 0, 1)
+        checks[name] = gathered(name, partial(part, subject))
+        progress(name, 1, 1)
+    return checks

@@ -1,0 +1,284 @@
+"""The independent verification: what it holds to its value, what it refuses, and what it only states."""
+
+import copy
+import dataclasses
+import subprocess
+import sys
+from functools import partial
+
+import numpy as np
+import pytest
+
+from hsv.base.errors import DesignError
+from hsv.control.checks import Subject, gathered, leaves, load_subject, unchecked
+from hsv.control.design import (
+    ControlDesign,
+    certificate_path,
+    find_design,
+    read_certificate,
+    read_parameters,
+    write_certificate,
+)
+from hsv.control.tolerances import PARAMETERS, TOLERANCES, entry_size
+from hsv.control.verification import QUICK, RECOMPUTED, preflight
+from hsv.design.results import DESIGNS
+
+PARTS = QUICK | RECOMPUTED
+
+
+def made(subject, parts=PARTS):
+    return [check for name, part in parts.items() for check in gathered(name, partial(part, subject))]
+
+
+def failing(subject, parts=PARTS):
+    """Return the name of the first check that fails, or an empty text; parts are made until one fails."""
+    for name, part in parts.items():
+        for check in gathered(name, partial(part, subject)):
+            if not check.ok:
+                return check.name
+    return ""
+
+
+@pytest.fixture(scope="module")
+def baseline():
+    return load_subject(find_design("baseline"))
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return read_parameters(find_design("baseline"))
+
+
+@pytest.mark.parametrize("name", DESIGNS)
+def test_every_shipped_design_passes(name):
+    assert [str(check) for check in made(load_subject(find_design(name))) if not check.ok] == []
+
+
+def test_nothing_is_shared_with_the_design():
+    code = (
+        "import sys, hsv.control.verification; "
+        "print([m for m in sys.modules if m.startswith('hsv.design') or m in ('cvxpy', 'pydantic')])"
+    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
+
+
+# --- tampering -------------------------------------------------------------------------------------------------------
+
+
+ARRAYS = {
+    "model.a": "polytope.A",
+    "model.b": "polytope.B",
+    "scheduling.altitude.breakpoints": "altitude_samples.0",
+    "scheduling.altitude.weights": "altitude_samples.1",
+    "scheduling.velocity.breakpoints": "velocity_samples.0",
+    "scheduling.velocity.weights": "velocity_samples.1",
+    "feedback.gain": "feedback_gain",
+    "feedback.tau": "tau",
+    "feedback.tau_minimum": "tau_minimum",
+    "nominal.gains": "nominal_gains",
+    "nominal.ellipsoids": "nominal_ellipsoids",
+    "nominal.input_bound": "nominal_input_bound",
+    "nominal.state_scale": "nominal_state_scale",
+    "nominal.input_scale": "nominal_input_scale",
+    "tube.centre": "tube.centre",
+    "tube.shape": "tube.shape",
+    "tube.half_width": "tube.half_width",
+    "nominal.input_minimum": "plan_bounds.input_minimum",
+    "nominal.input_maximum": "plan_bounds.input_maximum",
+    "nominal.region_minimum": "plan_bounds.region_minimum",
+    "nominal.region_maximum": "plan_bounds.region_maximum",
+    "input.minimum": "input_minimum",
+    "input.maximum": "input_maximum",
+}
+"""Where a design has the array of each parameter."""
+
+
+def array(design, name):
+    found = design
+    for key in ARRAYS[name].split("."):
+        found = found[int(key)] if key.isdigit() else getattr(found, key)
+    return found
+
+
+def tampered_design(subject, name, draw):
+    """Return ``subject`` with one entry of a parameter changed by ten times its tolerance."""
+    design = copy.deepcopy(subject.design)
+    values = array(design, name)
+    size = np.broadcast_to(entry_size(name, subject.certificate), values.shape)
+    step = 10.0 * TOLERANCES[PARAMETERS[name]].allowed(values, size)
+    entry = np.unravel_index(int(draw.integers(values.size)), values.shape)
+    values[entry] += draw.choice((-1.0, 1.0)) * step[entry]
+    return dataclasses.replace(subject, design=design)
+
+
+def tampered_certificate(subject, field, draw):
+    """Return ``subject`` with one entry of a field of its certificate changed by a thousandth, or another text.
+
+    The accuracy of a model that agrees to rounding has a tolerance of 5 %.
+    """
+    share = 0.5 if field.startswith("model.accuracy") else 1e-3
+    certificate = copy.deepcopy(subject.certificate)
+    *parents, last = field.split(".")
+    table = certificate
+    for key in parents:
+        table = table[int(key) if isinstance(table, list) else key]
+    value = table[last]
+    if isinstance(value, list) and not isinstance(value[0], str):
+        values = np.array(value, object)
+        entry = tuple(int(draw.integers(n)) for n in values.shape)
+        values[entry] += 1 if isinstance(values[entry], int) else share * abs(values[entry]) + 1e-6
+        table[last] = values.tolist()
+    else:
+        table[last] = (
+            value * (1.0 + share) + 1e-6 if isinstance(value, float) else value + 1 if type(value) is int else "other"
+        )
+    return Subject(subject.design, certificate)
+
+
+@pytest.mark.parametrize("name", ["baseline", "adjustable", "realistic", "tight"])
+def test_seeded_tamperings_are_noticed(name):
+    """25 of each design, 100 together: an entry of the design file, or a field of the certificate that is checked."""
+    subject, draw = load_subject(find_design(name)), np.random.default_rng(5)
+    stated = set(unchecked(subject, made(subject), whole=False))
+    fields = [field for field in leaves(subject.certificate) if field not in stated]
+    parameters = [name for name in ARRAYS if name in subject.design.to_parameters()]
+    missed = []
+    for number in range(25):
+        if number % 2:
+            chosen = str(draw.choice(parameters))
+            changed = tampered_design(subject, chosen, draw)
+        else:
+            chosen = str(draw.choice(fields))
+            changed = tampered_certificate(subject, chosen, draw)
+        if not failing(changed):
+            missed.append(chosen)
+    assert missed == []
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", DESIGNS)
+def test_every_field_is_recomputed_or_stated(name):
+    subject, draw = load_subject(find_design(name)), np.random.default_rng(7)
+    stated = set(unchecked(subject, made(subject), whole=False))
+    missed = [
+        field
+        for field in leaves(subject.certificate)
+        if field not in stated and not failing(tampered_certificate(subject, field, draw))
+    ]
+    assert missed == []
+
+
+@pytest.mark.parametrize("name", sorted(PARAMETERS.keys() - ARRAYS.keys()))
+def test_period_and_notch_are_held_to_their_tolerance(baseline, shipped, name):
+    changed = np.array(shipped[name]) + 10.0 * TOLERANCES[PARAMETERS[name]].allowed(np.array(shipped[name]))
+    design = ControlDesign.from_parameters(shipped | {name: changed.tolist()})
+    assert failing(dataclasses.replace(baseline, design=design), {"inputs": QUICK["inputs"]})
+
+
+def test_a_falsified_certificate_is_refused_field_by_field(baseline):
+    certificate = copy.deepcopy(baseline.certificate)
+    false = {"vertices": 1, "units": "US", "name": "other", "feedback.method": "none"}
+    for gain in ("feedback", *(f"nominal.{i}" for i in range(7))):
+        false |= {f"{gain}.spectral_radius_all_states": 0.5, f"{gain}.solver.status": "infeasible"}
+    false["model.accuracy.relative_frobenius_error"] = 0.0
+    for field, value in false.items():
+        *parents, last = field.split(".")
+        table = certificate
+        for key in parents:
+            table = table[int(key) if isinstance(table, list) else key]
+        table[last] = value
+    failed = {check.name for check in made(Subject(baseline.design, certificate)) if not check.ok}
+    assert failed >= set(false)
+
+
+def test_what_is_stated_only_is_named(baseline):
+    stated = unchecked(baseline, made(baseline))
+    assert {"versions", "nominal.*.gamma", "inputs.feedback", "tube.disturbance.boxes"} <= set(stated)
+    assert not {"inputs", "feedback", "nominal", "tube"} & set(stated)
+
+
+def test_a_certificate_without_a_field_says_which(baseline):
+    certificate = copy.deepcopy(baseline.certificate)
+    del certificate["tube"]["invariant_set"]["Q"]
+    checks = made(Subject(baseline.design, certificate), {"invariant set": QUICK["invariant set"]})
+    assert [check.value for check in checks if not check.ok] == ["no field 'Q'"]
+
+
+def test_the_least_entries_are_held_to_the_size_of_their_coordinates():
+    """Zero but for rounding: seen as 1.5e-17 and 7.4e-16 on two processors (adjustable, model.a[2, 4, 5])."""
+    subject = load_subject(find_design("adjustable"))
+    subject.design.polytope.A[2, 4, 5] = 1.5e-17
+    assert not failing(subject, {"polytopic model": RECOMPUTED["polytopic model"]})
+
+
+def test_a_wider_range_of_the_factor_than_certified_is_refused():
+    subject = load_subject(find_design("adjustable"))
+    values = subject.design.to_parameters() | {"feedback.tau_minimum": [0.7]}
+    checks = made(dataclasses.replace(subject, design=ControlDesign.from_parameters(values)), QUICK)
+    assert any(c.name.startswith("feedback.tau_minimum") and c.required for c in checks if not c.ok)
+
+
+# --- before a flight -------------------------------------------------------------------------------------------------
+
+
+def with_entry(values, name, index, factor):
+    changed = [v * factor if i == index else v for i, v in enumerate(values[name])]
+    return ControlDesign.from_parameters(values | {name: changed})
+
+
+def test_a_design_as_certified_flies_without_a_word(baseline):
+    assert preflight(baseline.design) == ""
+
+
+def test_a_tuned_gain_flies_with_a_warning(shipped):
+    warning = preflight(with_entry(shipped, "feedback.gain", 12, 1.000001))
+    assert warning.startswith("design 'baseline' is not as certified: feedback.gain = M N^-1[1, 3]: ")
+    assert "nominal.input_bound" in preflight(with_entry(shipped, "nominal.input_bound", 0, 1.01))
+
+
+@pytest.mark.parametrize(
+    ("name", "index", "factor", "check"),
+    [
+        # Stable at every vertex still, but no longer with the certified Lyapunov function.
+        ("feedback.gain", 13, 0.7, r"\(24\)"),
+        ("nominal.gains", 13, 1.5, r"nominal\.0: decrease of the cost"),
+        ("tube.centre", 1, 1.01, r"tube\.centre\[1\]"),
+        ("tube.shape", 0, 1.01, r"tube\.shape = Q\^-1\[0, 0\]"),
+        ("tube.half_width", 2, 0.99, r"tube\.half_width from Q\[2\]"),
+    ],
+)
+def test_a_design_without_its_stability_or_its_set_is_refused(shipped, name, index, factor, check):
+    with pytest.raises(DesignError, match=rf"design 'baseline': check fails: .*{check}"):
+        preflight(with_entry(shipped, name, index, factor))
+
+
+def test_a_set_that_is_not_invariant_is_refused(shipped, tmp_path):
+    small = read_certificate(certificate_path(find_design("baseline")))
+    described = small["tube"]["invariant_set"]
+    described["Q"] = (0.9 * np.array(described["Q"])).tolist()
+    described["half_width"] = (np.sqrt(0.9) * np.array(described["half_width"])).tolist()
+    write_certificate(tmp_path / "small.json", small)
+    values = shipped | {
+        "tube.shape": (np.array(shipped["tube.shape"]) / 0.9).tolist(),
+        "tube.half_width": described["half_width"],
+    }
+    with pytest.raises(DesignError, match="check fails: tube: invariance, smallest eigenvalue over the vertices"):
+        preflight(ControlDesign.from_parameters(values), str(tmp_path / "small.json"))
+
+
+def test_a_design_without_a_certificate_flies_with_a_warning(shipped):
+    mine = ControlDesign.from_parameters(shipped | {"design.name": "mine"})
+    assert preflight(mine) == "design 'mine': no certificate found, not verified"
+    with pytest.raises(DesignError, match=r"absent\.json: cannot be read"):
+        preflight(mine, "absent.json")
+
+
+def test_certificates_are_reproducible_bytes(baseline, tmp_path):
+    path = tmp_path / "x.certificate.json"
+    write_certificate(path, baseline.certificate)
+    first = path.read_bytes()
+    write_certificate(path, read_certificate(path))
+    assert path.read_bytes() == first
+    path.write_text("{}")
+    with pytest.raises(DesignError, match="expected a design certificate"):
+        read_certificate(path)

@@ -1,0 +1,102 @@
+"""Repeated flights and random sequences agree with the design's own decomposition and keep to the certificate."""
+
+import copy
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from hsv.base.errors import DesignError
+from hsv.control.checks import Subject, load_subject
+from hsv.control.design import find_design
+from hsv.control.verification import Tube
+from hsv.design.certified import load_certified
+from hsv.design.region import Region, record
+from hsv.design.tube_problem import channel_model
+from hsv.flight.closed_loop import fly
+from hsv.flight.random_sequences import random_sequences
+from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
+from hsv.flight.verification import (
+    bounding_corners,
+    disturbances,
+    flight_checks,
+    region,
+    scenario_checks,
+    share_of,
+    verify,
+)
+
+
+@pytest.fixture(scope="module")
+def baseline():
+    return load_subject(find_design("baseline"))
+
+
+@pytest.mark.parametrize("name", ["baseline", "adjustable", "realistic"])
+def test_disturbances_and_errors_are_those_of_the_design(name):
+    """Two independent decompositions of one flight: numpy here, the core's compiled sums in the design."""
+    subject = load_certified(find_design(name))
+    share = share_of(subject.certificate["inputs"])
+    flight = fly(region(subject, subject.design, share).perturbed({"mass": 0.05}))
+    theirs = Region(subject.design, subject.inputs, share).fly({"mass": 0.05})
+    assert np.array_equal(flight.history.flown, theirs.history.flown)
+    found, model = disturbances(subject, flight), channel_model(subject.design, subject.vehicle)
+    error, lag = model.errors(record(theirs))
+    assert_allclose(found.error, error, rtol=0.0, atol=1e-9 * np.abs(error).max())
+    assert_allclose(found.lag, lag, rtol=0.0, atol=1e-12)
+    channels = model.signals(record(theirs)).channels
+    size = np.maximum(np.abs(channels).max(axis=0), 1e-12)
+    assert_allclose(found.channels / size, channels / size, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["baseline", pytest.param("adjustable", marks=pytest.mark.long)])
+def test_a_shipped_design_passes_with_its_flights_and_sequences(name):
+    subject = load_subject(find_design(name))
+    failed = [str(check) for checks in verify(subject).values() for check in checks if not check.ok]
+    assert failed == []
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "named"),
+    [
+        (("disturbance", "measured", "lower", 0), -0.39, "tube.disturbance.measured.lower[0]"),
+        (("disturbance", "measured", "upper_flight", 2), 17, "tube.disturbance.measured.upper[2]"),
+        (("flights", "flights"), 1024, "tube.flights.flights"),
+        (("flights", "worst_level"), 0.2, "tube.flights: level"),
+        (("tightening", "plan", "highest", 1), 0.2, "nominal plan of flown corners, highest"),
+    ],
+)
+def test_a_falsified_statement_about_flights_is_noticed(baseline, field, value, named):
+    certificate = copy.deepcopy(baseline.certificate)
+    table = certificate["tube"]
+    for key in field[:-1]:
+        table = table[key]
+    table[field[-1]] = value
+    assert named in [check.name for check in flight_checks(Subject(baseline.design, certificate)) if not check.ok]
+
+
+def test_no_sequence_leaves_the_set_and_the_seed_decides(baseline):
+    tube = Tube(baseline, baseline.design, "tube")
+    of_tube = tube.A, tube.columns, tube.c
+    first = random_sequences(*of_tube, tube.Q, 4000, 600, 5)
+    assert 0.9 < first["worst_level"] <= 1.0
+    assert first == random_sequences(*of_tube, tube.Q, 4000, 600, 5) != random_sequences(*of_tube, tube.Q, 4000, 600, 6)
+    assert random_sequences(*of_tube, 0.5 * tube.Q, 4000, 600, 5)["worst_level"] > 1.0
+
+
+def test_a_flight_of_the_declared_region_keeps_to_the_certificate(baseline):
+    checks = list(scenario_checks(baseline, load_scenario("case1"), bounding_corners(baseline)))
+    assert [check.ok for check in checks] == [True] * 3
+    assert 0.0 < checks[0].value <= baseline.certificate["tube"]["flights"]["worst_level"] * (1 + 1e-6)
+
+
+def test_a_fault_beyond_the_region_is_found_outside(baseline):
+    scenario = parse_scenario(scenario_text("case1").replace("effectiveness = 0.9", "effectiveness = 0.7"), "worse")
+    _, disturbance, room = scenario_checks(baseline, scenario)
+    assert not disturbance.ok and disturbance.value > 2.0 and "lost_elevator" in disturbance.name
+    assert room.ok
+
+
+def test_without_a_tube_there_is_nothing_to_check(baseline):
+    with pytest.raises(DesignError, match="controller = 'robust_mpc', expected 'tube_mpc'"):
+        list(scenario_checks(baseline, load_scenario("case1_rmpc")))
