@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from hsv.control.checks import same
 from hsv.control.tolerances import TOLERANCES, page
 
-PAGE = Path(__file__).parents[3] / "docs" / "tolerances.md"
+PAGE = Path(__file__).parents[2] / "docs" / "tolerances.md"
 
 
 def test_the_page_is_that_of_the_table():

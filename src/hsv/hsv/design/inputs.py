@@ -61,7 +61,13 @@ class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-class RigidScale(_Table):
+class _Sizes(_Table):
+    def array(self) -> np.ndarray:
+        """Return the sizes in the order of the fields, SI."""
+        return np.array(list(self.model_dump().values()), float)
+
+
+class RigidScale(_Sizes):
     """Sizes of the five rigid states that count as equal."""
 
     altitude: Length = Positive
@@ -70,20 +76,12 @@ class RigidScale(_Table):
     pitch_angle: Angle = Positive
     pitch_rate: AngularRate = Positive
 
-    def array(self) -> np.ndarray:
-        """Return the scales (5), SI."""
-        return np.array([self.altitude, self.velocity, self.angle_of_attack, self.pitch_angle, self.pitch_rate], float)
 
-
-class InputSize(_Table):
+class InputSize(_Sizes):
     """Sizes of the two inputs."""
 
     fuel_equivalence_ratio: Number = Positive
     elevator_deflection: Angle = Positive
-
-    def array(self) -> np.ndarray:
-        """Return the sizes (2), SI."""
-        return np.array([self.fuel_equivalence_ratio, self.elevator_deflection], float)
 
 
 class FlightPoint(_Table):
@@ -101,21 +99,12 @@ class StateScale(RigidScale):
     elastic_coordinate_2: ElasticCoordinate = Positive
     elastic_rate_2: ElasticRate = Positive
 
-    def array(self) -> np.ndarray:
-        """Return the scales (9), SI."""
-        elastic = [self.elastic_coordinate_1, self.elastic_rate_1, self.elastic_coordinate_2, self.elastic_rate_2]
-        return np.append(super().array(), elastic)
 
-
-class FilterScale(_Table):
+class FilterScale(_Sizes):
     """Sizes of the two states of a section of the notch filter that count as equal to those of the vehicle."""
 
     state_1: Angle = Positive
     state_2: AngleTime = Positive
-
-    def array(self) -> np.ndarray:
-        """Return the scales (2), SI."""
-        return np.array([self.state_1, self.state_2], float)
 
 
 class GridInputs(_Table):

@@ -39,9 +39,8 @@ _SHOWN = (
 
 @dataclass(frozen=True)
 class Tube:
-    """Disturbance set, invariant set, tightened inputs and bounds of the plan, with the ``report`` (for JSON)."""
+    """Invariant set, tightened inputs and bounds of the plan, with the ``report`` (for JSON)."""
 
-    disturbance: DisturbanceSet
     found: InvariantSet
     bounds: TightenedInputs
     plan: PlanBounds
@@ -78,10 +77,12 @@ class MeasuredSet:
 
     def report(self) -> dict[str, Any]:
         """Return disturbances, set and tightened inputs, for JSON."""
+        found = self.found
         lag = {"lag_feedback": {"lower": self.lag[0].tolist(), "upper": self.lag[1].tolist()}} if self.lag else {}
+        driven = {"counter_examples": counter_examples(found.problem).as_dict()} if found.star_norms else {}
         return {
             "disturbance": _disturbance_report(self.measured, self.disturbance),
-            "invariant_set": {**_set_report(self.found), "certificate": self.certified},
+            "invariant_set": {**found.report(), **driven, "certificate": self.certified},
             "tightening": {**lag, "lower": self.bounds.lower.tolist(), "upper": self.bounds.upper.tolist()},
         }
 
@@ -135,7 +136,7 @@ def design_tube(design: ControlDesign, inputs: DesignInputs, progress: Progress)
     report["invariant_set"]["sampling"] = sampling
     report["tightening"]["plan"] = plan
     report["flights"] = flights_report(flown)
-    return Tube(tube.disturbance, found, bounds, allowed, report)
+    return Tube(found, bounds, allowed, report)
 
 
 def flights_in_tube(
@@ -154,8 +155,7 @@ def flights_in_tube(
 class FlightEvidence:
     """Results of one flight: largest ``level``, ratios |e - c| / z (n), membership, extremes of its plan, metrics.
 
-    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2); ``lag_feedback`` (2, 2):
-    least and largest feedback to the lag of the plan.
+    ``lowest`` and ``highest`` (3): total nominal inputs, nominal pitch acceleration (rad/s^2).
     """
 
     level: float
@@ -163,7 +163,6 @@ class FlightEvidence:
     membership: Membership
     lowest: np.ndarray
     highest: np.ndarray
-    lag_feedback: np.ndarray
     metrics: np.ndarray
 
 
@@ -172,7 +171,7 @@ def flight_evidence(
 ) -> FlightEvidence:
     """Return what ``flight`` shows of the tube."""
     h, recorded = flight.history, record(flight)
-    errors, lag_feedback = model.errors(recorded)
+    errors, _ = model.errors(recorded)
     plan = recorded.plan
     pitch_acceleration = np.diff(h.deviation[:, PITCH_RATE]) / flight.period
     metrics = flight_metrics(flight.data())
@@ -182,7 +181,6 @@ def flight_evidence(
         membership=disturbance.membership(model.signals(recorded).channels),
         lowest=np.append(plan.min(axis=0), pitch_acceleration.min()),
         highest=np.append(plan.max(axis=0), pitch_acceleration.max()),
-        lag_feedback=np.stack((lag_feedback.min(axis=0), lag_feedback.max(axis=0))),
         metrics=np.array([abs(metrics[name]) for name in _SHOWN]),
     )
 
@@ -201,11 +199,6 @@ def _disturbance_report(measured: RegionResult, disturbance: DisturbanceSet) -> 
         },
         "boxes": {name: {"lower": e.lower.tolist(), "upper": e.upper.tolist()} for name, e in extremes.items()},
     }
-
-
-def _set_report(found: InvariantSet) -> dict[str, Any]:
-    driven = {"counter_examples": counter_examples(found.problem).as_dict()} if found.star_norms else {}
-    return found.report() | driven
 
 
 def flights_report(flown: list[FlightEvidence]) -> dict[str, Any]:

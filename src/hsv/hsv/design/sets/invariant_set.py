@@ -69,7 +69,7 @@ class InvariantSet:
         return np.asarray(np.einsum("...i,ij,...j->...", v, inverse(self.Q), v))
 
     def residuals(self) -> np.ndarray:
-        """Return the smallest eigenvalue (r) of the inequality at each vertex; above zero: invariant.
+        """Return the smallest eigenvalue (r) of the inequality at each vertex; above zero: invariant (for eq. 27).
 
         By its Schur complement, with Q and the diagonal scaled to the identity.
         """
