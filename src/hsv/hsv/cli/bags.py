@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
+from typer import Option
 
 from hsv.base.errors import ParameterError, RecordingError, RunError, did_you_mean
 from hsv.base.units import significant
@@ -21,16 +22,12 @@ if TYPE_CHECKING:
 
 def replay(
     bag: BagArgument,
-    node: Annotated[str, typer.Option(help="Replay this node only.")] = "",
-    parameters: Annotated[
-        Path | None, typer.Option(help="Parameter YAML file to test instead of the attached design.")
-    ] = None,
+    node: Annotated[str, Option(help="Replay this node only.")] = "",
+    parameters: Annotated[Path | None, Option(help="Parameter file to test in place of the attached design.")] = None,
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
-    rerun: Annotated[
-        bool, typer.Option("--rerun", help="Repeat the whole loop instead of each node separately.")
-    ] = False,
-    over_dds: Annotated[bool, typer.Option("--over-dds", help="Run the real node processes.")] = False,
+    rerun: Annotated[bool, Option("--rerun", help="Repeat the whole loop, not each node.")] = False,
+    over_dds: Annotated[bool, Option("--over-dds", help="Run the real node processes.")] = False,
     trust: TrustOption = False,
     json: JsonOption = False,
 ) -> None:
@@ -148,7 +145,7 @@ def _difference(difference: Difference | None, expected: str, actual: str) -> di
 def diff(
     first: BagArgument,
     second: BagArgument,
-    tolerance: Annotated[float, typer.Option(help="Absolute and relative tolerance; 0: compare every bit.")] = 0.0,
+    tolerance: Annotated[float, Option(help="Absolute and relative tolerance; 0: compare every bit.")] = 0.0,
     json: JsonOption = False,
 ) -> None:
     """Compare two bags step by step: print the first difference, and the largest difference of every field.
@@ -213,25 +210,15 @@ def _print_comparison(compared: list[Comparison], earliest: Difference | None) -
 
 def export(
     bag: BagArgument,
-    csv: Annotated[bool, typer.Option("--csv", help="A folder of CSV files, one per topic.")] = False,
-    parquet: Annotated[bool, typer.Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
-    npz: Annotated[bool, typer.Option("--npz", help="One .npz file.")] = False,
-    scene: Annotated[
-        bool,
-        typer.Option(
-            "--scene", help="One MCAP file: a copy of the bag with the vehicle in 3-D, for Foxglove and Lichtblick."
-        ),
-    ] = False,
-    exaggeration: Annotated[
-        float | None, typer.Option(help="Factor on the bending in the scene; default: that of docs/airframe.md.")
-    ] = None,
+    csv: Annotated[bool, Option("--csv", help="A folder of CSV files, one per topic.")] = False,
+    parquet: Annotated[bool, Option("--parquet", help="A folder of Parquet files, one per topic.")] = False,
+    npz: Annotated[bool, Option("--npz", help="One .npz file.")] = False,
+    scene: Annotated[bool, Option("--scene", help="A copy of the bag with the vehicle in 3-D, for Foxglove.")] = False,
+    exaggeration: Annotated[float | None, Option(help="Factor on the bending in the scene.")] = None,
     topic: Annotated[
-        list[str] | None,
-        typer.Option(help="Topic to export, can be repeated; default: all topics with one message per step."),
+        list[str] | None, Option(help="Topic to export, repeatable; default: all with a message per step.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(help="What to write; default: in the bag's folder, named after the format.")
-    ] = None,
+    out: Annotated[Path | None, Option(help="What to write; default: in the bag's folder.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Write the topics of a bag as tables with field names and units (SI) in the header, or add a 3-D scene to the bag.
@@ -271,10 +258,7 @@ def export(
 
 def recover(
     bag: BagArgument,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Bag to write; default: next to the old one, with _recovered appended to its name."),
-    ] = None,
+    out: Annotated[Path | None, Option(help="Bag to write; default: the old name with _recovered.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Write a new bag from the intact data of a truncated or damaged one, which is not modified.
@@ -326,14 +310,12 @@ def recover(
 
 def play(
     bag: BagArgument,
-    rate: Annotated[float, typer.Option(help="Pace: 1 is as recorded, 10 ten times as fast.")] = 1.0,
-    topic: Annotated[list[str] | None, typer.Option(help="Topic to publish, can be repeated; default: all.")] = None,
-    clock: Annotated[bool, typer.Option(help="Publish the clock.")] = True,
-    paused: Annotated[
-        bool, typer.Option("--paused", help="Start paused; continue with the services /player/step and /player/resume.")
-    ] = False,
-    namespace: Annotated[str, typer.Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
-    delay: Annotated[float, typer.Option(help="Wall time (s) that subscribers get to discover the player.")] = 1.0,
+    rate: Annotated[float, Option(help="Pace: 1 is as recorded, 10 ten times as fast.")] = 1.0,
+    topic: Annotated[list[str] | None, Option(help="Topic to publish, can be repeated; default: all.")] = None,
+    clock: Annotated[bool, Option(help="Publish the clock.")] = True,
+    paused: Annotated[bool, Option("--paused", help="Start paused, until /player/resume or step.")] = False,
+    namespace: Annotated[str, Option(help="ROS namespace to publish in; default: that of the bag.")] = "",
+    delay: Annotated[float, Option(help="Wall time (s) that subscribers get to discover the player.")] = 1.0,
 ) -> None:
     """Republish a bag over DDS, for a viewer or a node under test.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
+from typer import Argument, Option
 
 from hsv.base.errors import DesignError, ParameterError, QuantityError
 from hsv.base.units import UnitSystem, in_system, in_words, significant
@@ -51,17 +52,12 @@ ALTITUDE, VELOCITY = "85000 ft", "7702.0808 ft/s"
 AT_REST = ("0 m/s", "0 m/s^2")
 """Climb rate and acceleration of level, steady flight."""
 
-AltitudeOption = Annotated[str, typer.Option(help="Altitude with unit, e.g. '85500 ft'.")]
-VelocityOption = Annotated[str, typer.Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
+AltitudeOption = Annotated[str, Option(help="Altitude with unit, e.g. '85500 ft'.")]
+VelocityOption = Annotated[str, Option(help="Velocity with unit, e.g. '7900 ft/s'.")]
 CouplingOption = Annotated[
-    str,
-    typer.Option(
-        help="Inertial coupling: a set of the vehicle, by default its first, or a multiple of derived, as 0.65."
-    ),
+    str, Option(help="Inertial coupling: a set of the vehicle, or a multiple of derived, as 0.65.")
 ]
-VehicleOption = Annotated[
-    str, typer.Option(help="Name of a vehicle (hsv list vehicles), or path of a TOML file; default: the paper's.")
-]
+VehicleOption = Annotated[str, Option(help="Vehicle, by name or path of a TOML file; default: the paper's.")]
 
 READINGS = ("physical", "printed")
 FILTER_UNITS = ("rad", "rad s")
@@ -103,8 +99,8 @@ def _trim_at(
 def trim(
     altitude: AltitudeOption = ALTITUDE,
     velocity: VelocityOption = VELOCITY,
-    climb_rate: Annotated[str, typer.Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
-    acceleration: Annotated[str, typer.Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
+    climb_rate: Annotated[str, Option(help="Climb rate with unit, e.g. '10 ft/s'.")] = AT_REST[0],
+    acceleration: Annotated[str, Option(help="Acceleration with unit, e.g. '4 ft/s^2'.")] = AT_REST[1],
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
     units: UnitsOption = UnitSystem.metric,
@@ -135,15 +131,8 @@ def linearise(
     velocity: VelocityOption = VELOCITY,
     vehicle: VehicleOption = "",
     coupling: CouplingOption = "",
-    model: Annotated[
-        str, typer.Option(help="Coupled (CM) or decoupled (DM) model, or CM with the notch filter in it (ECM).")
-    ] = "CM",
-    reading: Annotated[
-        str,
-        typer.Option(
-            help="Of eq. 40 (ECM): pitch rate that moves the vehicle, physical (q) or printed (q'); default: physical."
-        ),
-    ] = "",
+    model: Annotated[str, Option(help="Model: coupled (CM), decoupled (DM), with notch filter (ECM).")] = "CM",
+    reading: Annotated[str, Option(help="Pitch rate in eq. 40 (ECM): physical (q) or printed (q').")] = "",
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -233,20 +222,12 @@ def _pole_table(title: str, poles: list[Mode]) -> Table:
 
 
 def design(
-    name: Annotated[str, typer.Argument(help="Name of a design input in offline_design/, or path of a TOML file.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Parameter file to write; default: NAME.yaml in this folder.")
-    ] = None,
+    name: Annotated[str, Argument(help="Name of a design input in offline_design/, or path of a TOML file.")],
+    out: Annotated[Path | None, Option(help="Parameter file to write; default: NAME.yaml.")] = None,
     force: ForceOption = False,
-    compare_sets: Annotated[
-        bool, typer.Option("--compare-sets", help="Also print ellipsoid, star norms and counter-examples in a table.")
-    ] = False,
-    tau: Annotated[
-        str, typer.Option(help="Adjustable factor in place of the input's: one number, or five with commas between.")
-    ] = "",
-    check: Annotated[
-        bool, typer.Option("--check", help="Write nothing; compare with the parameter file in the folder of the input.")
-    ] = False,
+    compare_sets: Annotated[bool, Option("--compare-sets", help="Also print star norms and counter-examples.")] = False,
+    tau: Annotated[str, Option(help="Adjustable factor: one number, or five with commas between.")] = "",
+    check: Annotated[bool, Option("--check", help="Only compare with the shipped parameter file.")] = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -400,13 +381,9 @@ def _steps(report: dict[str, Any], units: UnitSystem) -> Table:
 
 def verify(
     file: DesignArgument,
-    quick: Annotated[bool, typer.Option("--quick", help="Omit flights and random sequences.")] = False,
-    scenario: Annotated[
-        str, typer.Option(help="Fly this scenario instead, and check level, disturbances and nominal inputs.")
-    ] = "",
-    corners: Annotated[
-        bool, typer.Option("--corners", help="With --scenario: also at the corners that determine a bound.")
-    ] = False,
+    quick: Annotated[bool, Option("--quick", help="Omit flights and random sequences.")] = False,
+    scenario: Annotated[str, Option(help="Fly this scenario, and check level, disturbances, inputs.")] = "",
+    corners: Annotated[bool, Option("--corners", help="With --scenario: also corners.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Recompute what a design and its certificate state, and name the first item that fails.
@@ -462,30 +439,16 @@ def _found(check: Check) -> str:
 
 def certify(
     file: DesignArgument,
-    sensors: Annotated[str, typer.Option(help="Published sensors by name, with their noise and bias.")] = "ideal",
-    bias: Annotated[
-        list[str],
-        typer.Option(help="Constant bias of a rigid state, e.g. 'angle_of_attack=0.05 deg'; can be repeated."),
-    ] = [],  # noqa: B006
+    sensors: Annotated[str, Option(help="Published sensors by name, with their noise and bias.")] = "ideal",
+    bias: Annotated[list[str], Option(help="Bias of a rigid state, 'angle_of_attack=0.05 deg'; repeatable.")] = [],  # noqa: B006
     actuators: Annotated[
-        str,
-        typer.Option(
-            help="Published actuators by name, with commas between, or ideal; "
-            "default: the scenario's, without a scenario those the design knows."
-        ),
+        str, Option(help="Published actuators, with commas between, or ideal; default: the scenario's or the design's.")
     ] = "",
-    gust: Annotated[str, typer.Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
-    turbulence: Annotated[str, typer.Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
-    density: Annotated[str, typer.Option(help="Largest difference of the density from the model's.")] = "0 %",
-    scenario: Annotated[
-        str,
-        typer.Option(
-            help="Also the actuators, sensors and air of this scenario, by name or path, beside what else is given."
-        ),
-    ] = "",
-    reach: Annotated[
-        float, typer.Option(help="Standard deviations that bound noise and turbulence; 8.572 is beyond all of ours.")
-    ] = 3.0,
+    gust: Annotated[str, Option(help="Wind from below and from behind of at most this velocity.")] = "0 ft/s",
+    turbulence: Annotated[str, Option(help="Standard deviation of turbulence, both ways.")] = "0 ft/s",
+    density: Annotated[str, Option(help="Largest difference of the density from the model's.")] = "0 %",
+    scenario: Annotated[str, Option(help="Also the actuators, sensors and air of this scenario.")] = "",
+    reach: Annotated[float, Option(help="Standard deviations that bound noise and turbulence.")] = 3.0,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -536,10 +499,8 @@ def certify(
 
 def govern(
     scenario: ScenarioArgument = "case1",
-    blend: Annotated[
-        str, typer.Option(help="Half the time in which climb rate and acceleration change at a corner.")
-    ] = "2 s",
-    out: Annotated[Path | None, typer.Option(help="Scenario file to write, with the reference.")] = None,
+    blend: Annotated[str, Option(help="Half the time of a change of climb rate and acceleration.")] = "2 s",
+    out: Annotated[Path | None, Option(help="Scenario file to write, with the reference.")] = None,
     force: ForceOption = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
@@ -596,8 +557,8 @@ def govern(
 
 
 def export_controller(
-    design: Annotated[str, typer.Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
-    out: Annotated[Path, typer.Option(help="Folder for the C files; new, or with such files only.")],
+    design: Annotated[str, Argument(help="Name of a design in offline_design/, or path of its parameter file.")],
+    out: Annotated[Path, Option(help="Folder for the C files; new, or with such files only.")],
     json: JsonOption = False,
 ) -> None:
     """Write the notch filter, nominal trajectory and tube law of a design as C99; print the cost of a step.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperGroup
 
 from hsv.base.errors import CampaignError, ParameterError, RecordingError, RunError
@@ -39,38 +40,31 @@ if TYPE_CHECKING:
 
 RealTimeFactorOption = Annotated[
     float | None,
-    typer.Option(help="Pace: 1 is real time, 0 as fast as possible; default: 0, with --live 1.", show_default=False),
+    Option(help="Pace: 1 is real time, 0 as fast as possible; default: 0, with --live 1.", show_default=False),
 ]
-LiveOption = Annotated[
-    bool, typer.Option("--live", help="Show the flight live, on a page in the browser and in Foxglove.")
-]
+LiveOption = Annotated[bool, Option("--live", help="Show the flight live, on a page in the browser and in Foxglove.")]
 LivePortOption = Annotated[
     int | None,
-    typer.Option(
-        help="Port for Foxglove, with --live; the page has the next one. 0: any two that are free; default: 8765.",
+    Option(
+        help="Port for Foxglove, 8765, with --live; the page has the next one. 0: any two that are free.",
         show_default=False,
     ),
 ]
 StepTimeoutOption = Annotated[
-    float | None,
-    typer.Option(help="Wall time (s) after which a silent node ends the run; default: 10, beside a foreign node 2.5."),
+    float | None, Option(help="Wall time (s) until a silent node ends the run; default: 10, for a foreign node 2.5.")
 ]
-NewBagOption = Annotated[Path | None, typer.Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
-ComposedOption = Annotated[bool, typer.Option("--composed", help="All nodes in one process: faster, same bytes.")]
-ExternalOption = Annotated[bool, typer.Option("--external", help="Wait for a controller node that you start by hand.")]
-NamespaceOption = Annotated[
-    str, typer.Option(help="ROS namespace of all nodes and topics, such as /veh1: several graphs fly in one domain.")
-]
-ReportOption = Annotated[bool, typer.Option(help="Write the report into the bag's folder.")]
-StrictOption = Annotated[bool, typer.Option("--strict", help="Exit code 1 if a limit of the scenario is not kept.")]
-AllOption = Annotated[bool, typer.Option("--all", help="Say which metrics the scenario does not limit, too.")]
-WorkersOption = Annotated[
-    int, typer.Option(help="Number of processes on this machine; 0: one per processor, 1: fly in this process.")
-]
-SchedulerOption = Annotated[str, typer.Option(help="Address of a Dask scheduler whose workers are used instead.")]
-ResultArgument = Annotated[Path, typer.Argument(help="Result file of a campaign (.parquet).")]
-FlightOption = Annotated[int, typer.Option("--flight", help="Number of the flight.")]
-PageOption = Annotated[bool, typer.Option(help="Write the page of the results beside them.")]
+NewBagOption = Annotated[Path | None, Option("--bag", help="Bag to write; default: bags/<scenario>_<UTC>.")]
+ComposedOption = Annotated[bool, Option("--composed", help="All nodes in one process: faster, same bytes.")]
+ExternalOption = Annotated[bool, Option("--external", help="Wait for a controller node that you start by hand.")]
+NamespaceOption = Annotated[str, Option(help="ROS namespace of all nodes and topics, such as /veh1.")]
+ReportOption = Annotated[bool, Option(help="Write the report into the bag's folder.")]
+StrictOption = Annotated[bool, Option("--strict", help="Exit code 1 if a limit of the scenario is not kept.")]
+AllOption = Annotated[bool, Option("--all", help="Say which metrics the scenario does not limit, too.")]
+WorkersOption = Annotated[int, Option(help="Processes on this machine; 0: one per processor, 1: this process.")]
+SchedulerOption = Annotated[str, Option(help="Address of a Dask scheduler whose workers are used instead.")]
+ResultArgument = Annotated[Path, Argument(help="Result file of a campaign (.parquet).")]
+FlightOption = Annotated[int, Option("--flight", help="Number of the flight.")]
+PageOption = Annotated[bool, Option(help="Write the page of the results beside them.")]
 
 
 def run(
@@ -84,7 +78,7 @@ def run(
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = None,
     report: ReportOption = True,
-    verbose: Annotated[bool, typer.Option("--verbose", help="Show the log output of the nodes.")] = False,
+    verbose: Annotated[bool, Option("--verbose", help="Show the log output of the nodes.")] = False,
     strict: StrictOption = False,
     every: AllOption = False,
     units: UnitsOption = UnitSystem.metric,
@@ -138,7 +132,7 @@ def run(
 def simulate(
     scenario: ScenarioArgument = "case1",
     units: UnitsOption = UnitSystem.metric,
-    out: Annotated[Path | None, typer.Option(help="Also save the time histories to this .npz file (SI).")] = None,
+    out: Annotated[Path | None, Option(help="Also save the time histories to this .npz file (SI).")] = None,
     strict: StrictOption = False,
     every: AllOption = False,
     json: JsonOption = False,
@@ -194,9 +188,7 @@ def prepare(
     bag: NewBagOption = None,
     namespace: NamespaceOption = "/",
     step_timeout: StepTimeoutOption = None,
-    folder: Annotated[
-        Path | None, typer.Option(help="Folder for the parameter files; default: a new temporary one.")
-    ] = None,
+    folder: Annotated[Path | None, Option(help="Folder for the parameter files; default: temporary.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Prepare a flight for another launcher: check the scenario, create the bag, write the parameter files.
@@ -267,7 +259,7 @@ def prepare(
 def conclude(
     bag: BagArgument,
     report: ReportOption = True,
-    failure: Annotated[str, typer.Option(help="Error message of a process that failed; it becomes the verdict.")] = "",
+    failure: Annotated[str, Option(help="Error message of a process that failed.")] = "",
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -301,15 +293,6 @@ def _conclude(
     wall_time: float | None = None,
 ) -> None:
     """Print the summary of the flight in a closed ``bag``, and write its report into the bag's folder.
-
-    Args:
-        bag: The bag directory.
-        report: Whether to write the report.
-        units: Units in which to print.
-        json: Whether to print JSON.
-        strict: Whether a limit that is not kept is an error.
-        every: Whether to name the metrics that have no limit, too.
-        wall_time: Wall time (s) that the flight took, where it is known.
 
     Raises:
         RecordingError: The bag holds no flight with its scenario, or the report cannot be written.
@@ -389,23 +372,18 @@ montecarlo = typer.Typer(
 @montecarlo.command()
 def fly(
     scenario: ScenarioArgument = "case1",
-    samples: Annotated[int | None, typer.Option(help=f"Number of flights; default: {_SAMPLES}.")] = None,
-    seed: Annotated[int, typer.Option(help="Determines all samples.")] = 1,
-    sampling: Annotated[Sampling | None, typer.Option(help="How samples are drawn; default: uniform.")] = None,
-    corners: Annotated[
-        bool, typer.Option("--corners", help="Fly all combinations of smallest and largest values.")
-    ] = False,
-    scale: Annotated[float, typer.Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
+    samples: Annotated[int | None, Option(help=f"Number of flights; default: {_SAMPLES}.")] = None,
+    seed: Annotated[int, Option(help="Determines all samples.")] = 1,
+    sampling: Annotated[Sampling | None, Option(help="How samples are drawn; default: uniform.")] = None,
+    corners: Annotated[bool, Option("--corners", help="Fly all combinations of extreme values.")] = False,
+    scale: Annotated[float, Option(help="Factor on the parameters' bounds; 0 leaves them alone.")] = 1.0,
     factor: Annotated[
-        list[str] | None,
-        typer.Option(help="Vary a field of the scenario, FIELD=LEAST..LARGEST, e.g. 'fault[0].start=90 s..110 s'."),
+        list[str] | None, Option(help="Vary a field, e.g. 'fault[0].start=90 s..110 s'; repeatable.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
+    out: Annotated[Path | None, Option(help="Result file; default: campaigns/<what is flown>.parquet.")] = None,
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    restart: Annotated[
-        bool, typer.Option("--restart", help="Discard existing results and start from the beginning.")
-    ] = False,
+    restart: Annotated[bool, Option("--restart", help="Discard existing results.")] = False,
     page: PageOption = True,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
@@ -488,8 +466,8 @@ def summary(
 def replay(
     result: ResultArgument,
     flight: FlightOption,
-    over_dds: Annotated[bool, typer.Option("--over-dds", help="Fly it with the graph of node processes.")] = False,
-    bag: Annotated[Path | None, typer.Option(help="With --over-dds: bag to write; default: bags/<flight>.")] = None,
+    over_dds: Annotated[bool, Option("--over-dds", help="Fly it with the graph of node processes.")] = False,
+    bag: Annotated[Path | None, Option(help="With --over-dds: bag to write; default: bags/<flight>.")] = None,
     trust: TrustOption = False,
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
@@ -550,9 +528,7 @@ def replay(
 def scenario(
     result: ResultArgument,
     flight: FlightOption,
-    design: Annotated[
-        Path | None, typer.Option(help="Also write the design that was flown to this file (.yaml), and refer to it.")
-    ] = None,
+    design: Annotated[Path | None, Option(help="Also write the flown design to this .yaml file.")] = None,
     trust: TrustOption = False,
 ) -> None:
     """Print the scenario of a single flight of a campaign; flown by itself it has the same fingerprint.
@@ -591,19 +567,12 @@ def _waiting() -> None:
 
 
 def resilience(
-    controllers: Annotated[
-        str,
-        typer.Option(
-            help="Scenarios, by name or path, separated by commas; default: five with Tube-MPC and robust MPC."
-        ),
-    ] = "",
-    faults: Annotated[str, typer.Option(help="Faults to try, separated by commas; default: all (see --list).")] = "",
-    out: Annotated[
-        Path, typer.Option(help="Folder for the report, the scenarios of the worst flights, and the results.")
-    ] = Path("resilience"),
+    controllers: Annotated[str, Option(help="Scenarios, separated by commas; default: Tube-MPC, robust MPC.")] = "",
+    faults: Annotated[str, Option(help="Faults to try, separated by commas; default: all (see --list).")] = "",
+    out: Annotated[Path, Option(help="Folder for report, worst flights, results.")] = Path("resilience"),
     workers: WorkersOption = 0,
     scheduler: SchedulerOption = "",
-    listed: Annotated[bool, typer.Option("--list", help="List the faults with their severities and exit.")] = False,
+    listed: Annotated[bool, Option("--list", help="List the faults with their severities and exit.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Fly controllers with faults of increasing severity until each is lost, and make a map of what they survive.

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
+from typer import Argument, Option
 
 from hsv.base.units import UnitSystem
 from hsv.cli.options import GraphNamespaceOption, JsonOption, UnitsOption
@@ -23,15 +24,12 @@ fault = typer.Typer(
 
 @fault.command(context_settings={"ignore_unknown_options": True})  # a negative value is no option
 def inject(
-    channel: Annotated[str, typer.Argument(help="What fails, e.g. elevator_deflection, engine, pitch_rate.")],
-    type: Annotated[str, typer.Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
+    channel: Annotated[str, Argument(help="What fails, e.g. elevator_deflection, engine, pitch_rate.")],
+    type: Annotated[str, Argument(help="Type of the fault, e.g. loss_of_effectiveness.")],
     parameters: Annotated[
-        list[str] | None,
-        typer.Argument(help="Parameters of the type, e.g. 'amplitude=1 deg' 'frequency=2 Hz'; a single one as 0.8."),
+        list[str] | None, Argument(help="Its parameters, 'amplitude=1 deg'; a single one as 0.8.")
     ] = None,
-    duration: Annotated[
-        str, typer.Option(help="Simulated time after which the fault ends, e.g. '5 s'; default: until it is cleared.")
-    ] = "0 s",
+    duration: Annotated[str, Option(help="Simulated time until it ends, '5 s'; default: until cleared.")] = "0 s",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
@@ -50,8 +48,8 @@ def inject(
 
 @fault.command()
 def clear(
-    channel: Annotated[str, typer.Argument(help="What fails; default: everything.")] = "",
-    type: Annotated[str, typer.Argument(help="Type of the fault; default: all of them.")] = "",
+    channel: Annotated[str, Argument(help="What fails; default: everything.")] = "",
+    type: Annotated[str, Argument(help="Type of the fault; default: all of them.")] = "",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
@@ -76,8 +74,8 @@ def list_(namespace: GraphNamespaceOption = "", json: JsonOption = False) -> Non
 
 
 def set_(
-    name: Annotated[str, typer.Argument(help="Parameter that may change in flight: tau (feedback.tau).")],
-    value: Annotated[str, typer.Argument(help="Its value, with a unit where it has one: 0.8, or 0.8,0.8,0.9,0.9,1.")],
+    name: Annotated[str, Argument(help="Parameter that may change in flight: tau (feedback.tau).")],
+    value: Annotated[str, Argument(help="Its value, with a unit where it has one: 0.8, or 0.8,0.8,0.9,0.9,1.")],
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
@@ -91,12 +89,10 @@ def set_(
 
 
 def command(
-    altitude: Annotated[str, typer.Argument(help="Altitude to fly to, e.g. '86000 ft'.")],
-    velocity: Annotated[str, typer.Argument(help="Velocity to fly at, e.g. '8100 ft/s'.")],
-    duration: Annotated[str, typer.Option(help="Least length of the ramp; default: as short as possible.")] = "0 s",
-    blend: Annotated[
-        str, typer.Option(help="Half the time in which climb rate and acceleration change at a corner.")
-    ] = "2 s",
+    altitude: Annotated[str, Argument(help="Altitude to fly to, e.g. '86000 ft'.")],
+    velocity: Annotated[str, Argument(help="Velocity to fly at, e.g. '8100 ft/s'.")],
+    duration: Annotated[str, Option(help="Least length of the ramp; default: as short as possible.")] = "0 s",
+    blend: Annotated[str, Option(help="Half the time of a change of climb rate and acceleration.")] = "2 s",
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
@@ -130,9 +126,9 @@ def watch(
 
 
 def topic(
-    name: Annotated[str, typer.Argument(help="Topic, e.g. /hsv/state; default: list the topics.")] = "",
-    once: Annotated[bool, typer.Option("--once", help="Print one message only.")] = False,
-    every: Annotated[int, typer.Option(min=1, help="Print every N-th message.")] = 1,
+    name: Annotated[str, Argument(help="Topic, e.g. /hsv/state; default: list the topics.")] = "",
+    once: Annotated[bool, Option("--once", help="Print one message only.")] = False,
+    every: Annotated[int, Option(min=1, help="Print every N-th message.")] = 1,
     namespace: GraphNamespaceOption = "",
     json: JsonOption = False,
 ) -> None:
@@ -162,15 +158,10 @@ def _si(text: str, unit: str, name: str) -> str:
 def _become(
     node: NodeDescription, command: str, options: Sequence[str], values: Iterable[str], namespace: str, json: bool
 ) -> NoReturn:
-    """Run the client ``node`` in place of this process.
+    """Run the client ``node`` of ``hsv COMMAND`` in place of this process.
 
-    Args:
-        node: The client.
-        command: Name of the command, which error messages have.
-        options: Options of the client, after a command of its own if it has several.
-        values: Positional arguments; they may begin with a dash, like negative numbers.
-        namespace: Namespace of the graph, or empty.
-        json: Whether to print JSON.
+    A client with commands of its own has them at the head of ``options``. The positional ``values`` follow a double
+    dash, because some begin with a dash themselves, as negative numbers do.
     """
     from hsv.graph.launcher import become
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
+from typer import Argument, Option
 
 from hsv.base.errors import HsvError, ParameterError, QuantityError, RunError, did_you_mean
 from hsv.base.units import UnitSystem, in_system, significant
@@ -45,10 +46,8 @@ class Kind(StrEnum):
 
 
 def list_(
-    kind: Annotated[Kind, typer.Argument(help="What to list.", metavar="|".join(Kind))],
-    name: Annotated[
-        str, typer.Argument(help="Print this one: a whole scenario or vehicle, shipped or a file; numbers of others.")
-    ] = "",
+    kind: Annotated[Kind, Argument(help="What to list.", metavar="|".join(Kind))],
+    name: Annotated[str, Argument(help="Print this one; scenarios and vehicles may be files.")] = "",
     units: UnitsOption = UnitSystem.metric,
     json: ListJsonOption = False,
 ) -> None:
@@ -224,12 +223,7 @@ def _equipment_sets(units: UnitSystem) -> dict[str, dict[str, Any]]:
 
 
 def check(
-    flown: Annotated[
-        str,
-        typer.Argument(
-            metavar="CONTROLLER|SCENARIO", help="A controller as a scenario names it, flown in case1, or a scenario."
-        ),
-    ],
+    flown: Annotated[str, Argument(metavar="CONTROLLER|SCENARIO", help="A controller, flown in case1, or a scenario.")],
     json: JsonOption = False,
 ) -> None:
     """Check that a controller is reproducible: fly it twice, after a reset, from a copied state and under load.
@@ -263,12 +257,10 @@ def check(
 
 
 def bench(
-    only: Annotated[list[str] | None, typer.Option(help="Measure only this group; can be repeated.")] = None,
-    scale: Annotated[float, typer.Option(help="Factor on the number of repetitions.")] = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Page whose table to replace, e.g. docs/benchmarks.md.")] = None,
-    compare: Annotated[
-        Path | None, typer.Option(help="Report what became slower or faster since this run, saved with --json > FILE.")
-    ] = None,
+    only: Annotated[list[str] | None, Option(help="Measure only this group; can be repeated.")] = None,
+    scale: Annotated[float, Option(help="Factor on the number of repetitions.")] = 1.0,
+    out: Annotated[Path | None, Option(help="Page whose table to replace.")] = None,
+    compare: Annotated[Path | None, Option(help="Report changes since this run, saved with --json > FILE.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Measure the performance of this machine, as ratios whose two sides are measured alternately.

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from hsv.base.units import UnitSystem, in_words, significant
 from hsv.cli.options import BagArgument, JsonOption, SuppliedDesignOption, SuppliedScenarioOption, UnitsOption
@@ -42,8 +42,8 @@ class Program(StrEnum):
 
 
 def report(
-    bags: Annotated[list[Path], typer.Argument(help="Bags to report on; several are compared in the same plots.")],
-    out: Annotated[Path, typer.Option(help="HTML file to write.")] = Path("report.html"),
+    bags: Annotated[list[Path], Argument(help="Bags to report on; several are compared in the same plots.")],
+    out: Annotated[Path, Option(help="HTML file to write.")] = Path("report.html"),
     design: SuppliedDesignOption = None,
     scenario: SuppliedScenarioOption = None,
     units: UnitsOption = UnitSystem.metric,
@@ -71,8 +71,8 @@ def report(
 
 
 def plot(
-    bags: Annotated[list[Path], typer.Argument(help="Bags to plot together.")],
-    out: Annotated[Path, typer.Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
+    bags: Annotated[list[Path], Argument(help="Bags to plot together.")],
+    out: Annotated[Path, Option(help="File to write: .png, .svg or .pdf.")] = Path("flight.png"),
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:
@@ -98,9 +98,7 @@ def plot(
 
 def view(
     bag: BagArgument,
-    program: Annotated[
-        Program | None, typer.Option("--with", help="Viewer; default: the first that is installed.")
-    ] = None,
+    program: Annotated[Program | None, Option("--with", help="Viewer; default: the first installed.")] = None,
     json: JsonOption = False,
 ) -> None:
     """Open a bag in Foxglove, Lichtblick, PlotJuggler or Rerun, whichever is installed.
@@ -144,7 +142,7 @@ def view(
 
 
 def info(
-    bags: Annotated[list[Path], typer.Argument(help="Bag directories, or their .mcap files.")],
+    bags: Annotated[list[Path], Argument(help="Bag directories, or their .mcap files.")],
     units: UnitsOption = UnitSystem.metric,
     json: JsonOption = False,
 ) -> None:

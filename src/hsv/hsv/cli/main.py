@@ -13,6 +13,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Option
 from typer.completion import completion_init
 from typer.core import TyperCommand
 
@@ -115,11 +116,10 @@ def _version(wanted: bool) -> None:
 
 def options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+        bool, Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
     traceback: Annotated[
-        bool,
-        typer.Option("--traceback", envvar="HSV_TRACEBACK", help="Of any command: print the Python traceback, too."),
+        bool, Option("--traceback", envvar="HSV_TRACEBACK", help="Print the traceback of errors, too.")
     ] = False,
 ) -> None:
     """Declare the options of the command line itself; its description is given to :func:`run`."""
