@@ -42,6 +42,14 @@ def test_links_lead_somewhere(page):
             assert anchor in anchors(file), f"{target}: no such heading"
 
 
+def test_what_is_where_is_there():
+    section = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where is what")[2].partition("\n## ")[0]
+    named = [word for word in re.findall(r"`([^`\s]+)`", section) if "/" in word]
+    assert len(named) > 10
+    folders = (ROOT, ROOT / "src" / "hsv" / "hsv")
+    assert [name for name in named if not any((folder / name).exists() for folder in folders)] == []
+
+
 def test_every_page_of_the_documentation_is_in_a_table_of_contents():
     listed = {"index.md"}
     for index in (ROOT / "docs").rglob("index.md"):
