@@ -41,7 +41,6 @@ setup(
         "hsv": [
             "py.typed",
             "**/*.toml",
-            "base/known_units.json",
             "bench/*.c",
             "control/*.c",
             "control/include/*.h",

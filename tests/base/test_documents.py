@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hsv.base.errors import DocumentError
-from hsv.base.files import MOST_BYTES, MOST_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
+from hsv.base.files import MAX_BYTES, MAX_LEVELS, parse_json, parse_toml, parse_yaml, read_bytes, read_text
 
 
 def test_a_text_is_read_whole(tmp_path):
@@ -31,7 +31,7 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path):
         (".", None, "Is a directory"),
         ("\0", None, "a zero byte in its name"),
         ("latin", b"\xe4", "not text"),
-        ("large", b"x" * (MOST_BYTES + 1), f"more than {MOST_BYTES} bytes"),
+        ("large", b"x" * (MAX_BYTES + 1), f"more than {MAX_BYTES} bytes"),
     ],
 )
 def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
@@ -49,7 +49,7 @@ def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
         (parse_toml, "a = " + "{b = " * 1200, "1" + "}" * 1200),
         (parse_toml, "a." * 100_000, "b = 1"),
         (parse_toml, "['a' . " + '"b". ' * 100_000, "b]"),
-        (parse_toml, "a = " + "[" * (MOST_LEVELS + 1), "]" * (MOST_LEVELS + 1)),
+        (parse_toml, "a = " + "[" * (MAX_LEVELS + 1), "]" * (MAX_LEVELS + 1)),
         (parse_json, "[" * 100_000, "]" * 100_000),
         (parse_json, '{"a": ' * 200, "1" + "}" * 200),
         (parse_yaml, "[" * 100_000, "]" * 100_000),
@@ -58,7 +58,7 @@ def test_what_cannot_be_read_says_why(tmp_path, name, content, why):
     ],
 )
 def test_deep_nesting_is_refused(parse, opening, closing):
-    with pytest.raises(DocumentError, match=f"nested more than {MOST_LEVELS} levels deep"):
+    with pytest.raises(DocumentError, match=f"nested more than {MAX_LEVELS} levels deep"):
         parse(opening + closing)
 
 
@@ -94,7 +94,7 @@ def test_aliases_that_multiply_are_refused_and_others_taken():
         (parse_yaml, f"a: [-0x{'f' * 5000}]", "a whole number of more than 4000 digits"),
         (parse_json, "[1, 2", "Expecting"),
         (parse_json, b"\xff", "can't decode"),
-        (parse_toml, " " * (MOST_BYTES + 1), f"more than {MOST_BYTES} bytes"),
+        (parse_toml, " " * (MAX_BYTES + 1), f"more than {MAX_BYTES} bytes"),
     ],
 )
 def test_a_text_that_is_none_is_one_line_of_why(parse, text, why):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import DESIGN_PARAMETERS
 from hsv.control.nominal_trajectory import NOMINAL_PARAMETERS
@@ -88,12 +88,12 @@ def test_long_values_are_cut_in_messages():
 
 
 def test_a_table_fills_in_defaults_and_ignores_foreign_names():
-    assert check_all((PERIOD, ARRAY), {"period": 0.5, "foreign": "x"}) == {"period": 0.5, "gains": [1.0]}
+    assert validate((PERIOD, ARRAY), {"period": 0.5, "foreign": "x"}) == {"period": 0.5, "gains": [1.0]}
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table[0].name)
 def test_every_default_is_admissible_described_and_of_one_name(table):
-    check_all(table, {})
+    validate(table, {})
     assert all(parameter.description for parameter in table)
     assert len({parameter.name for parameter in table}) == len(table)
 

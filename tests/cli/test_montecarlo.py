@@ -3,7 +3,7 @@ import json
 import pytest
 from node_processes import short_scenario
 
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.design import find_design
 
 
@@ -130,7 +130,7 @@ class Failing:
     @classmethod
     def from_parameters(cls, values, design):
         made = cls()
-        made.above = check_all(cls.PARAMETERS, values)["failing.above"]
+        made.above = validate(cls.PARAMETERS, values)["failing.above"]
         return made
 
     def reset(self):

@@ -11,8 +11,8 @@ from hsv.control.controller import (
     CONTROLLER_INPUTS,
     STEP_FUNCTION,
     ControllerInput,
-    ElsewhereController,
-    ForeignController,
+    ExternalController,
+    NodeController,
     StepKernel,
     flat_input,
 )
@@ -62,7 +62,7 @@ class Compiled:
 
 @pytest.mark.parametrize(("own", "elevator"), [(Counting(0.066), 0.066), (Compiled(), 0.066)])
 def test_it_is_stepped_copied_and_reset(own, elevator):
-    controller = ForeignController("own", own, VEHICLE)
+    controller = ExternalController("own", own, VEHICLE)
     first = controller.step(INPUTS)
     np.testing.assert_allclose(first.input, [0.1, elevator], rtol=1e-15)
     other = controller.copied()
@@ -75,7 +75,7 @@ def test_it_is_stepped_copied_and_reset(own, elevator):
 
 def test_what_it_wants_is_limited():
     for wanted in (-5.0, 5.0):
-        result = ForeignController("own", Counting(wanted), VEHICLE).step(INPUTS)
+        result = ExternalController("own", Counting(wanted), VEHICLE).step(INPUTS)
         assert result.input[1] == (HIGH[1] if wanted > 0.0 else LOW[1])
         assert_array_equal(result.u_unsaturated, [0.1, wanted])
         assert_array_equal(result.saturated, [False, True])
@@ -108,7 +108,7 @@ class Answering:
     ],
 )
 def test_what_is_no_answer_is_an_error_with_its_step(answer, message):
-    controller = ForeignController("own", Answering(answer), VEHICLE)
+    controller = ExternalController("own", Answering(answer), VEHICLE)
     with pytest.raises(ControllerError, match=message):
         controller.step(INPUTS)
     if isinstance(answer, BaseException):
@@ -117,7 +117,7 @@ def test_what_is_no_answer_is_an_error_with_its_step(answer, message):
 
 
 def test_a_compiled_controller_that_returns_another_code_ends_the_flight():
-    controller = ForeignController("own", Compiled(), VEHICLE)
+    controller = ExternalController("own", Compiled(), VEHICLE)
     with pytest.raises(ControllerError, match=r"^own, step -1: RunError: returned 3$"):
         controller.step(INPUTS._replace(step=-1))
 
@@ -129,7 +129,7 @@ def test_inputs_are_in_the_order_in_which_they_are_declared():
 
 
 def test_a_node_of_its_own_is_not_stepped_here():
-    controller = ElsewhereController("node")
+    controller = NodeController("node")
     controller.reset()
     for use in (lambda: controller.step(INPUTS), lambda: controller.kernel):
         with pytest.raises(ParameterError, match="controller = 'node': a node of its own, expected hsv run to fly it"):

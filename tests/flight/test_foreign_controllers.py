@@ -7,7 +7,7 @@ import pytest
 from c_libraries import step_function
 
 from hsv.base.errors import RunError, ScenarioError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import ControllerInput, StepKernel
 from hsv.flight.assembly import assemble_flight, scenario_parameters
 from hsv.flight.closed_loop import fly
@@ -51,7 +51,7 @@ class Leaky:
     @classmethod
     def from_parameters(cls, values, design):
         made = cls()
-        made.own = check_all(cls.PARAMETERS, values)
+        made.own = validate(cls.PARAMETERS, values)
         made.design = design
         return made
 

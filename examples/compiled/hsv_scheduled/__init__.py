@@ -4,7 +4,7 @@ import numpy as np
 from numba import cfunc
 from scipy.linalg import solve_discrete_are
 
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import StepKernel
 from hsv.model.dynamics import jacobian
 from hsv.model.lpv.linearisation import zero_order_hold
@@ -48,7 +48,7 @@ class Scheduled:
     @classmethod
     def from_parameters(cls, values, design):
         """Compute the gains for the nominal rigid vehicle; no design of the bench is used."""
-        own = check_all(cls.PARAMETERS, values)
+        own = validate(cls.PARAMETERS, values)
         speeds = [own[f"scheduled.{end}_velocity"] for end in ("low", "high")]
         if not speeds[0] < speeds[1]:
             raise ValueError(f"scheduled.high_velocity = {speeds[1]:g} m/s: expected more than low_velocity")

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.model.dynamics import jacobian
 from hsv.model.lpv.linearisation import zero_order_hold
 from hsv.model.signals import PITCH_RATE
@@ -26,7 +26,7 @@ class Lqr:
     @classmethod
     def from_parameters(cls, values, design):
         """Compute the gain for the nominal rigid vehicle; no design of the bench is used."""
-        own = check_all(cls.PARAMETERS, values)
+        own = validate(cls.PARAMETERS, values)
         period = values.get("period", 0.02)
         vehicle = Vehicle.from_parameters(values).decoupled
         point = trim(vehicle, values["initial.altitude"], values["initial.velocity"])

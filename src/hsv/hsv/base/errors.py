@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 
 class HsvError(Exception):
-    """Base of everything this library raises on purpose; the message names the field, its value and the expectation."""
+    """Base of all errors of this library; the message names the field, its value and the expectation."""
 
 
 class QuantityError(HsvError, ValueError):
@@ -50,7 +50,7 @@ class ControllerError(RunError):
 
 
 class SignalError(RunError):
-    """A signal that no block can take as it was sent; the message begins with the field, and ``signal`` names it."""
+    """A signal with wrong contents; the message begins with the field, and ``signal`` names it."""
 
     def __init__(self, signal: str, wrong: str) -> None:
         super().__init__(signal, wrong)
@@ -73,12 +73,12 @@ class ParameterError(HsvError, ValueError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message on an unknown ``name``, which asks for the nearest known one; empty if none is."""
+    """Return a hint for the message about an unknown ``name``: the nearest known one, or an empty text."""
     names = list(known)
     near = difflib.get_close_matches(name, names, 1) or [other for other in names if name and other.startswith(name)]
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def reason(error: OSError) -> str:
-    """Return why the system refused, in its own words; libraries add theirs, some on several lines."""
+    """Return the reason of a system error on one line, without what libraries add."""
     return os.strerror(error.errno) if error.errno else " ".join(str(error).split())

@@ -40,30 +40,30 @@ else:
             Parser.__init__(self)
 
 
-MOST_BYTES = 2**22
+MAX_BYTES = 2**22
 """Size of the largest text that is read; designs and certificates have less than a thirtieth of it."""
 
-MOST_LEVELS = 64
-"""Tables and lists in each other."""
+MAX_LEVELS = 64
+"""Depth of tables and lists."""
 
-MOST_NODES = 10**6
-"""Values of a YAML text, those of aliases counted wherever they stand."""
+MAX_NODES = 10**6
+"""Values of a YAML text; an alias counts as all values that it stands for."""
 
-_MOST_DIGITS = 4000
-_LARGEST = 10**_MOST_DIGITS
+_MAX_DIGITS = 4000
+_LARGEST = 10**_MAX_DIGITS
 
-_LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_LEVELS}}}""")
-"""A dotted key that nests too deep: the parser takes a time that is the square of its length."""
+_LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MAX_LEVELS}}}""")
+"""A dotted key that nests too deep: the parser needs a time quadratic in its length."""
 
 
 def open_regular(path: Path) -> BufferedReader:
     """Return the file ``path``, open for reading.
 
     Raises:
-        DocumentError: The system refuses, or it is no regular file, such as a pipe, from which reading need not end.
+        DocumentError: The system refuses, or the file is not a regular one: reading a pipe need not end.
     """
     try:
-        # Of a pipe, opening alone would wait for somebody to write to it.
+        # Without O_NONBLOCK, opening a pipe would wait for a writer.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
         raise DocumentError(f"cannot be read ({reason(error)})") from error
@@ -77,15 +77,15 @@ def open_regular(path: Path) -> BufferedReader:
     return os.fdopen(descriptor, "rb")
 
 
-def read_bytes(path: Path, most: int | None = None) -> bytes:
-    """Return the contents of the file ``path``, which may be larger than ``most`` bytes only if that is ``None``.
+def read_bytes(path: Path, max_bytes: int | None = None) -> bytes:
+    """Return the contents of the file ``path``; a file larger than ``max_bytes`` is refused.
 
     Raises:
         DocumentError: See :func:`open_regular`; or the file is larger.
     """
     with open_regular(path) as stream:
-        if most is not None and os.fstat(stream.fileno()).st_size > most:
-            raise DocumentError(f"cannot be read (more than {most} bytes)")
+        if max_bytes is not None and os.fstat(stream.fileno()).st_size > max_bytes:
+            raise DocumentError(f"cannot be read (more than {max_bytes} bytes)")
         try:
             return stream.read()
         except OSError as error:
@@ -99,7 +99,7 @@ def read_text(path: Path) -> str:
         DocumentError: See :func:`read_bytes`; or the file is not UTF-8.
     """
     try:
-        return read_bytes(path, MOST_BYTES).decode().replace("\r\n", "\n")
+        return read_bytes(path, MAX_BYTES).decode().replace("\r\n", "\n")
     except UnicodeDecodeError as error:
         raise DocumentError("cannot be read (not text)") from error
 
@@ -108,12 +108,12 @@ def parse_toml(text: str) -> dict[str, Any]:
     """Return the tables in a TOML text.
 
     Raises:
-        DocumentError: It is none, too long or nested too deep.
+        DocumentError: The text is not TOML, too long or nested too deep.
     """
     _check_length(text)
     if found := _LONG_KEY.search(text):
         line = text.count("\n", 0, found.start()) + 1
-        raise DocumentError(f"a key nested more than {MOST_LEVELS} levels deep (at line {line})")
+        raise DocumentError(f"a key nested more than {MAX_LEVELS} levels deep (at line {line})")
     return _parsed(text, tomllib.loads)
 
 
@@ -121,18 +121,18 @@ def parse_json(text: str | bytes) -> Any:
     """Return the value in a JSON text.
 
     Raises:
-        DocumentError: It is none, too long or nested too deep, or a key stands twice in an object.
+        DocumentError: The text is not JSON, too long or nested too deep, or a key occurs twice in an object.
     """
     _check_length(text)
-    return _parsed(text, partial(json.loads, object_pairs_hook=_without_doubles))
+    return _parsed(text, partial(json.loads, object_pairs_hook=_without_duplicates))
 
 
 def parse_yaml(text: str) -> Any:
     """Return the value in a YAML text, of plain types.
 
     Raises:
-        DocumentError: It is none, too long or nested too deep, a key stands twice in a mapping, or aliases make it grow
-            beyond all bounds.
+        DocumentError: The text is not YAML, too long or nested too deep, a key occurs twice in a mapping, or aliases
+            expand to too many values.
     """
     _check_length(text)
     try:
@@ -144,7 +144,7 @@ def parse_yaml(text: str) -> Any:
 
 
 class _Loader(Composer, _Parser, SafeConstructor, Resolver):
-    """The safe loader on the events of the C library, whose own composer ends the process where nesting is deep."""
+    """The safe loader on the parser of the C library, whose own composer overflows the stack on deep nesting."""
 
     def __init__(self, stream: str) -> None:
         _Parser.__init__(self, stream)
@@ -155,11 +155,11 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
         self._sizes: dict[Any, int] = {}
 
     def compose_node(self, parent: Any, index: Any) -> Any:
-        """Return the next node, as of the base class; keep count of levels, and of nodes with those of aliases."""
+        """Return the next node; count levels, and nodes including those of aliases."""
         event, before = self.peek_event(), self._nodes
         self._levels += 1
-        if self._levels > MOST_LEVELS:
-            raise _refused(f"nested more than {MOST_LEVELS} levels deep", event)
+        if self._levels > MAX_LEVELS:
+            raise _refused(f"nested more than {MAX_LEVELS} levels deep", event)
         node = super().compose_node(parent, index)
         self._levels -= 1
         if not isinstance(event, yaml.AliasEvent):
@@ -169,12 +169,12 @@ class _Loader(Composer, _Parser, SafeConstructor, Resolver):
             self._nodes += self._sizes[node]
         else:
             raise _refused(f"the alias {event.anchor!r} stands inside of what it is for", event)
-        if self._nodes > MOST_NODES:
-            raise _refused(f"more than {MOST_NODES} values", event)
+        if self._nodes > MAX_NODES:
+            raise _refused(f"more than {MAX_NODES} values", event)
         return node
 
     def compose_mapping_node(self, anchor: Any) -> Any:
-        """Return the next mapping, like the base class, and check that its keys differ."""
+        """Return the next mapping; its keys must differ."""
         node = super().compose_mapping_node(anchor)
         seen: set[tuple[str, str]] = set()
         for key, _ in node.value:
@@ -200,7 +200,7 @@ def _refused(why: str, where: Any) -> yaml.MarkedYAMLError:
     return yaml.MarkedYAMLError(problem=why, problem_mark=where.start_mark)
 
 
-def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _without_duplicates(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     values = dict(pairs)
     if len(values) < len(pairs):
         names = [name for name, _ in pairs]
@@ -209,16 +209,16 @@ def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _check_length(text: str | bytes) -> None:
-    if len(text) > MOST_BYTES:
-        raise DocumentError(f"more than {MOST_BYTES} bytes")
+    if len(text) > MAX_BYTES:
+        raise DocumentError(f"more than {MAX_BYTES} bytes")
 
 
 def _check(value: object) -> None:
-    """Refuse what is nested too deep for those who walk through it, and numbers that Python refuses to print."""
+    """Refuse values that are nested too deep, and numbers that Python refuses to print."""
     level = [value]
-    for _ in range(MOST_LEVELS + 1):
+    for _ in range(MAX_LEVELS + 1):
         if any(isinstance(one, int) and abs(one) >= _LARGEST for one in level):
-            raise DocumentError(f"a whole number of more than {_MOST_DIGITS} digits")
+            raise DocumentError(f"a whole number of more than {_MAX_DIGITS} digits")
         level = [
             entry
             for one in level
@@ -231,11 +231,11 @@ def _check(value: object) -> None:
 
 
 def _too_deep() -> DocumentError:
-    return DocumentError(f"nested more than {MOST_LEVELS} levels deep")
+    return DocumentError(f"nested more than {MAX_LEVELS} levels deep")
 
 
 EXTENDS = "extends"
-"""The key that names the file before it, by name or by path; a path is relative to the folder of the file it is in."""
+"""The key that names the extended file, by name or by path relative to the folder of the extending file."""
 
 Tables = dict[str, Any]
 
@@ -247,7 +247,7 @@ def follow_extends(
     replaced: Collection[str] = (),
     values: Collection[str] = (),
 ) -> Tables:
-    """Return the contents of a file with those of the files that it extends, one by one, under it.
+    """Return the contents of a file merged over those of the files that it extends.
 
     Tables are merged key by key; everything else, lists of tables too, is replaced.
 
@@ -255,8 +255,8 @@ def follow_extends(
         name: Name or path of the file.
         read: Returns the contents of a file by name or path.
         refuse: Returns the error for a file, by name or path, and what is wrong with it.
-        replaced: Tables at the top that are replaced whole.
-        values: Keys of tables that stand for one value, and are replaced whole wherever they are.
+        replaced: Top-level tables that are replaced, not merged.
+        values: Keys that mark a table as one value, which is replaced, not merged.
 
     Raises:
         HsvError: Error of ``refuse``: ``extends`` is not the name of a file, or the files extend each other.

@@ -1,4 +1,4 @@
-"""Parameters of the components: one table a component, from which nodes declare and files are checked."""
+"""Parameters of the components: one table for each, from which nodes declare them and files are checked."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Parameter:
     name: str
     """Dotted name, as in ROS 2."""
     default: Value
-    """Value where nothing else is given; an empty list of floats stands for an array that a design must bring."""
+    """Default value; an empty list is an array of doubles that a design or a flight must provide."""
     description: str
     """Short description."""
     unit: str = ""
@@ -34,7 +34,7 @@ class Parameter:
     read_only: bool = True
     """Whether it is fixed once the node has started."""
     whole: bool = False
-    """Whether only whole numbers are admissible, of steps or of an order, though they are written as doubles."""
+    """Whether the doubles must be integer-valued, as numbers of steps are."""
 
     @property
     def kind(self) -> str:
@@ -83,7 +83,7 @@ class Parameter:
         return value
 
     def refusal(self, value: object) -> ParameterError:
-        """Return the error for an invalid ``value``, with a hint how to write a whole number."""
+        """Return the error for an invalid ``value``, with a hint how to write an integer as a double."""
         hint = ""
         if self.kind == "double" and _is_whole(value):
             hint = f" (write {float(cast(int, value))})"
@@ -95,7 +95,7 @@ class Parameter:
         return ParameterError(f"parameter {self.name} = {_shown(shown)}: expected {self.constraint}{hint}")
 
     def admits(self, value: object) -> bool:
-        """Tell whether a number is finite, within the range, and whole where it has to be."""
+        """Return whether a number is finite, within the range, and integer-valued if that is required."""
         if not isinstance(value, int | float) or not is_finite(value):
             return False
         return self.minimum <= value <= self.maximum and (not self.whole or float(value).is_integer())
@@ -119,8 +119,8 @@ def _shown(value: object) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[str, Any]:
-    """Return the values of a whole table, defaults filled in; names that are not in the table are left out.
+def validate(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[str, Any]:
+    """Return the values of all parameters of a table, with defaults filled in; other names are ignored.
 
     Raises:
         ParameterError: A value that its parameter does not admit.
@@ -129,14 +129,14 @@ def check_all(table: Iterable[Parameter], values: Mapping[str, object]) -> dict[
 
 
 def read_number(parameter: Parameter, text: object, field: str) -> float:
-    """Return the number that a file has in ``text`` for a ``parameter``, or for an element of it, SI.
+    """Return the number (SI) written in ``text`` in a file, for a ``parameter`` or one of its elements.
 
     Raises:
-        ParameterError, QuantityError: No quantity in its unit, not whole, or out of its range, which is told in the
-            unit given.
+        ParameterError, QuantityError: Not a quantity in its unit, not integer-valued, or out of its range, which the
+            message states in the unit given.
     """
     whole = " a whole number" if parameter.whole else ""
-    # To Python a truth value is a number.
+    # A bool is an int to Python.
     value = math.nan if whole and isinstance(text, bool) else parse_quantity(text, parameter.unit or "1", field)
     if not parameter.admits(value):
         raise ParameterError(f"{field} = {_shown(text)}: expected{whole}{limits_in_words(parameter, text)}")
@@ -152,13 +152,13 @@ def limits_in_words(parameter: Parameter, text: object) -> str:
 def table_values(
     parameters: Iterable[Parameter], tables: Mapping[str, Any], read: Callable[..., float] = read_number
 ) -> dict[str, Any]:
-    """Return the flat values, SI, that ``tables``, as a file has them, give to the ``parameters`` named after them.
+    """Return the flat values (SI) of the ``parameters`` that the ``tables`` of a file set.
 
-    One value stands for a list of it.
+    A single value is accepted for an array of one.
 
     Args:
         parameters: Known parameters.
-        tables: One in the other; their keys, with dots between, are names of parameters.
+        tables: Nested tables; their keys, joined by dots, are names of parameters.
         read: Reads a number, with the arguments of :func:`read_number`.
 
     Raises:
@@ -191,10 +191,10 @@ def table_values(
 
 
 def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, Any]:
-    """Return the entries of what is called ``name`` and is no parameter, if it is a table of them.
+    """Return the entries of the table ``name`` of parameters.
 
     Raises:
-        ParameterError: There is no such table, or it is none.
+        ParameterError: There is no such table, or ``entry`` is not one.
     """
     depth = name.count(".") + 1
     within, _, own = name.rpartition(".")
@@ -203,6 +203,6 @@ def _entries_of(name: str, entry: object, known: Iterable[str]) -> Mapping[str, 
         return entry
     if inside:
         raise ParameterError(f"{name} = {_shown(entry)}: expected a table of {', '.join(dict.fromkeys(inside))}")
-    beside = [other.split(".")[depth - 1] for other in known if other.startswith(f"{within}." if within else "")]
-    expected = ", ".join(dict.fromkeys(beside)) or "no table"
-    raise ParameterError(f"{name}: unknown key, expected one of {expected}{did_you_mean(own, beside)}")
+    siblings = [other.split(".")[depth - 1] for other in known if other.startswith(f"{within}." if within else "")]
+    expected = ", ".join(dict.fromkeys(siblings)) or "no table"
+    raise ParameterError(f"{name}: unknown key, expected one of {expected}{did_you_mean(own, siblings)}")

@@ -18,31 +18,29 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 _LATER = 0.02
-"""Seconds after which it is tried once more where nothing could be raised, or what was raised was swallowed."""
+"""Seconds after which an interruption that could not be raised, or was swallowed, is raised again."""
 
 _PR_SET_PDEATHSIG = 1
 
 _WHOLE: set[CodeType] = set()
-"""What is not interrupted before it is finished."""
+"""Code of functions that are not interrupted."""
 
 
 def uninterrupted(function: Callable[P, R]) -> Callable[P, R]:
-    """Let an interruption of ``function``, a short one, come when it has returned.
+    """Delay an interruption of ``function``, a short one, until it has returned.
 
-    A process that is started is then known to who is to end it, whenever Ctrl-C comes. It takes effect where
-    :func:`take_interrupts` was called. What takes longer, or starts processes that are never to receive Ctrl-C, is done
-    within :func:`hsv.base.processes.ctrl_c_held_back`.
+    So a started process is always recorded before Ctrl-C takes effect. Effective after :func:`take_interrupts`. Longer
+    work, and processes that must never receive Ctrl-C, use :func:`ctrl_c_held_back`.
     """
     _WHOLE.add(function.__code__)
     return function
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise ``KeyboardInterrupt``, at once or as soon as the current import or uninterrupted function is finished.
+    """Handle a signal: raise ``KeyboardInterrupt`` at once, or after the current import or uninterrupted function.
 
-    A compiled module that is interrupted fails to load with an error of its own, and a callback of the import system
-    swallows the exception. A handler of signals. The timer lives on in a program in the place of this one:
-    :func:`hsv.graph.launcher.become`.
+    An interrupted import of a compiled module fails with another error, and callbacks of the import system swallow the
+    exception. The timer survives an ``exec`` of another program.
 
     Raises:
         KeyboardInterrupt: Always, now or later.
@@ -65,17 +63,17 @@ def take_interrupts() -> None:
 
 
 def ignore_ctrl_c_at_end() -> None:
-    """Keep the exit code of a process that is interrupted when everything but the end of Python is done.
+    """Keep the exit code of a process that is interrupted while Python shuts down.
 
-    Python gives signals their own effect back first, and then still takes some tens of milliseconds to let go of
-    compiled libraries. The timer of an interruption that was to come later may run down in that time as well.
+    At shutdown Python restores the default effect of signals and then needs some tens of milliseconds to unload
+    compiled libraries; a pending timer may expire in that time.
     """
     for number in (signal.SIGINT, signal.SIGALRM):
         atexit.register(signal.signal, number, signal.SIG_IGN)
 
 
 def end_with_parent(parent: int) -> None:
-    """Have Linux terminate this process, a child of ``parent``, when the thread that started it ends."""
+    """Let Linux terminate this process when the thread of ``parent`` that started it ends."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
         if os.getppid() != parent:  # it has ended already
@@ -83,7 +81,7 @@ def end_with_parent(parent: int) -> None:
 
 
 def _interrupt_again(unraisable: Any) -> None:
-    """Raise ``KeyboardInterrupt`` once more where a finaliser, or what a compiled library has called, swallowed it."""
+    """Raise ``KeyboardInterrupt`` again if a finaliser or a callback of a compiled library swallowed it."""
     if issubclass(unraisable.exc_type, KeyboardInterrupt) and not sys.is_finalizing():
         signal.setitimer(signal.ITIMER_REAL, _LATER)
     else:
@@ -97,9 +95,9 @@ Result = TypeVar("Result")
 def over_threads(
     job: Callable[[Item], Result], items: Iterable[Item], progress: Callable[[int], None] = lambda done: None
 ) -> list[Result]:
-    """Return ``job`` of every item, in order, from as many threads as there are processors.
+    """Return ``job(item)`` for every item, in order, computed by one thread for each processor.
 
-    ``progress`` is called with the number of items done.
+    ``progress`` receives the number of finished items.
     """
     results = []
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
@@ -111,11 +109,11 @@ def over_threads(
 
 @contextmanager
 def ctrl_c_held_back() -> Iterator[None]:
-    """Let Ctrl-C take effect at the end only; threads and processes that begin meanwhile never receive it.
+    """Delay Ctrl-C to the end of the block; threads and processes started in it never receive it.
 
-    A cluster that is interrupted half started does not close. Such processes are ended by the command.
+    A pool that is interrupted while it starts does not close. The command ends such processes itself.
     """
-    resource_tracker.ensure_running()  # where it is started, it lets Ctrl-C in
+    resource_tracker.ensure_running()  # its start would unblock SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

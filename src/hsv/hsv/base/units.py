@@ -6,7 +6,6 @@ numbers on every machine and under every version of the units library.
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import sys
@@ -15,7 +14,6 @@ from decimal import Decimal
 from enum import StrEnum
 from fractions import Fraction
 from functools import cache, lru_cache
-from importlib import resources
 from typing import TYPE_CHECKING
 
 from hsv.base.errors import QuantityError
@@ -254,17 +252,62 @@ The literature gives elastic modes in roots of a mass: squares have whole expone
 """
 
 
+_PI = Fraction("3.1415926535897932384626433832795028841971693993751")
+_FORCE, _PRESSURE = {"kg": 2, "m": 2, "s": -4}, {"kg": 2, "m": -2, "s": -4}
+_KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
+    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"m": 1, "km": 1000, "mm": "1/1000"}.items()},
+    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"ft": "0.3048", "kft": "304.8"}.items()},
+    **{unit: (Fraction(size) ** 2, {"s": 2}) for unit, size in {"s": 1, "ms": "1/1000", "min": 60, "h": 3600}.items()},
+    **{unit: (size**2, {"rad": 2}) for unit, size in {"deg": _PI / 180, "arcsec": _PI / 648000}.items()},
+    **{unit: (Fraction(size) ** 2, {"rad": 2}) for unit, size in {"rad": 1, "mrad": "1/1000"}.items()},
+    "": (Fraction(1), {}),
+    "1": (Fraction(1), {}),
+    "percent": (Fraction(1, 10**4), {}),
+    "Hz": (Fraction(1), {"s": -2}),
+    "rpm": ((_PI / 30) ** 2, {"rad": 2, "s": -2}),
+    "kg": (Fraction(1), {"kg": 2}),
+    "kg^0.5": (Fraction(1), {"kg": 1}),
+    "N": (Fraction(1), _FORCE),
+    "kN": (Fraction(10**6), _FORCE),
+    "Pa": (Fraction(1), _PRESSURE),
+    "kPa": (Fraction(10**6), _PRESSURE),
+    # pint rounds these, and their products again, to 16 digits.
+    "slug": (Fraction("212.98200294060055"), {"kg": 2}),
+    "slug ft^2": (Fraction("1.838242309017568"), {"kg": 2, "m": 4}),
+    "slug/ft": (Fraction("2292.519200024031"), {"kg": 2, "m": -2}),
+    "slug/ft^3": (Fraction("265615.3264483671"), {"kg": 2, "m": -6}),
+    "slug^0.5 ft": (Fraction("1.3558179483314006"), {"kg": 1, "m": 2}),
+    "lbf": (Fraction("19.78667553847073"), _FORCE),
+    "lbf ft": (Fraction("1.838242309017568"), {"kg": 2, "m": 4, "s": -4}),
+    "lbf/ft^2": (Fraction("2292.519200024031"), _PRESSURE),
+    "lbf/slug^0.5": (Fraction("1.3558179483314006"), {"kg": 1, "m": 2, "s": -4}),
+}
+"""Squares of the units that shipped files are written in: to import pint takes longer than a flight."""
+
+
 @cache
 def _squared(unit: str) -> Square:
-    known = _known()
-    return known[unit] if unit in known else square_by_pint(unit)
+    try:
+        square, base = _composed(unit)
+    except KeyError:
+        return square_by_pint(unit)
+    return square, tuple(sorted((name, exponent) for name, exponent in base.items() if exponent))
 
 
-@cache
-def _known() -> dict[str, Square]:
-    """Return the units that scenarios and tables are written in: to import pint takes longer than a flight."""
-    rows = json.loads((resources.files("hsv.base") / "known_units.json").read_text(encoding="utf-8"))
-    return {unit: (Fraction(factor), tuple(map(tuple, base))) for unit, (factor, base) in rows.items()}
+def _composed(unit: str) -> tuple[Fraction, dict[str, int]]:
+    """Return the square of a product or quotient of known units; a KeyError names one that is not known."""
+    if unit in _KNOWN:
+        return _KNOWN[unit]
+    if product := re.fullmatch(r"(.*)([*/ ])([^*/ ]+)", unit):
+        (square, base), (other, more) = _composed(product[1]), _composed(product[3])
+        sign = -1 if product[2] == "/" else 1
+        exponents = {name: base.get(name, 0) + sign * more.get(name, 0) for name in {**base, **more}}
+        return square * other**sign, exponents
+    symbol, _, power = unit.partition("^")
+    if not power.isdigit():
+        raise KeyError(unit)
+    square, base = _composed(symbol)
+    return square ** int(power), {name: int(power) * exponent for name, exponent in base.items()}
 
 
 def square_by_pint(unit: str) -> Square:

@@ -17,7 +17,7 @@ import numpy as np
 
 from hsv.bench.c_build import compiled
 from hsv.bench.figure import Figure, interleaved
-from hsv.control.controller import ControllerInput, ForeignController, StepKernel
+from hsv.control.controller import ControllerInput, ExternalController, StepKernel
 from hsv.control.export import SOURCE, controller_files
 from hsv.control.library import LibraryController, load_block
 from hsv.control.tube_law import TubeLaw
@@ -120,7 +120,7 @@ def laws_in_c(repeats: int) -> list[Figure]:
 
 
 def _flown_by(flight: Components, controller: Any) -> Components:
-    return replace(flight, controller=ForeignController("holding", controller, flight.plant.data.vehicle))
+    return replace(flight, controller=ExternalController("holding", controller, flight.plant.data.vehicle))
 
 
 def _several(flight: Components, count: int) -> Callable[[], object]:

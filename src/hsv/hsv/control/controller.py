@@ -1,6 +1,6 @@
 """Interface of a controller: its inputs and outputs in a step.
 
-A controller of one's own is a class with four names, here the whole of one that flies::
+A custom controller is a class with four attributes; this one flies::
 
     class Open:
         PARAMETERS = (Parameter("open.trim_share", 1.0, "times the input of the trim", "", 0.0, 2.0),)
@@ -8,7 +8,7 @@ A controller of one's own is a class with four names, here the whole of one that
         @classmethod
         def from_parameters(cls, values, design):
             controller = cls()
-            controller.share = check_all(cls.PARAMETERS, values)["open.trim_share"]
+            controller.share = validate(cls.PARAMETERS, values)["open.trim_share"]
             return controller
 
         def reset(self):
@@ -49,7 +49,7 @@ class ControllerInput(NamedTuple):
     step: int
     """k, from 0 on; t = k T"""
     estimate: np.ndarray
-    """x (9) with the unfiltered pitch rate: the measurement, or what an estimator makes of it where one flies"""
+    """x (9) with the unfiltered pitch rate: the estimate if an estimator flies, else the measurement"""
     filtered_pitch_rate: float
     """q_f, rad/s"""
     reference: np.ndarray
@@ -61,7 +61,7 @@ class ControllerInput(NamedTuple):
     nominal_input: np.ndarray
     """u_n (2)"""
     filter_state: np.ndarray
-    """s (2 s) of the notch filter before its update, two a section; empty without a notch filter"""
+    """States (2 per section) of the notch filter before its update; empty without a notch filter"""
 
 
 CONTROLLER_INPUTS = (
@@ -73,15 +73,15 @@ CONTROLLER_INPUTS = (
     signals.NOMINAL_INPUT,
     signals.FILTER_STATE,
 )
-"""Inputs in the order in which a compiled controller receives them; ``hsv_block.h`` has the same order."""
+"""Inputs in the order in which a compiled controller receives them, see ``hsv_block.h``."""
 
-CONTROLLER_OUTPUTS = (signals.WANTED_INPUT,)
+CONTROLLER_OUTPUTS = (signals.UNSATURATED_INPUT,)
 """Outputs of a compiled controller, before the bench limits them."""
 
 
 @dataclass(frozen=True)
 class ControllerResult:
-    """Result of a controller's step; one with diagnostics returns more, see :mod:`hsv.control.tube_law`."""
+    """Result of a controller's step; :class:`hsv.control.tube_law.TubeResult` adds diagnostics."""
 
     input: np.ndarray
     """u (2), within the limits"""
@@ -95,11 +95,11 @@ class ControllerResult:
 
 
 class StepKernel(NamedTuple):
-    """A step function by its address, as a compiler of C or of Python makes it, with its arrays.
+    """A compiled step function, by its address, with its arrays.
 
-    The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; what is
-    not 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` one after the other, ``out`` takes the wanted
-    input (2). Everything that is kept from step to step is in ``state``.
+    The signature is ``int32 step(int64 k, const double *in, double *out, double *state, const double *par)``; a result
+    other than 0 ends the flight. ``in`` holds :data:`CONTROLLER_INPUTS` one after the other, ``out`` receives the
+    unsaturated input (2), and ``state`` holds everything that is kept from step to step.
     """
 
     address: int
@@ -113,13 +113,12 @@ class Controller(ABC):
 
     name = ""
     """Name in error messages."""
-    compiled_with_loop = False
-    """Whether it is a tube law, whose step the compiled loop has in itself; its ``kernel`` is the data of that."""
+    in_core = False
+    """Whether the core contains this law; ``kernel`` is then its data"""
     kernel: Any = None
-    """For other controllers: the :class:`StepKernel` that the compiled loop calls; ``None``: it calls :meth:`wanted`.
-    """
+    """Of other controllers, the :class:`StepKernel` to call; None: call :meth:`unsaturated_input`"""
     library: Any = None
-    """The user of the shared library with its function, see :mod:`hsv.control.library_process`, where it is in one"""
+    """The process of the shared library that holds the function, or None, see :mod:`hsv.control.library_process`"""
 
     @abstractmethod
     def reset(self) -> None:
@@ -129,7 +128,7 @@ class Controller(ABC):
     def step(self, inputs: ControllerInput) -> ControllerResult:
         """Return the input of this step; called once per step, in order."""
 
-    def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
+    def unsaturated_input(self, inputs: ControllerInput) -> tuple[float, float]:
         """Return the input of this step before the limits; called in place of :meth:`step`."""
         fuel, elevator = self.step(inputs).u_unsaturated
         return float(fuel), float(elevator)
@@ -139,35 +138,35 @@ class Controller(ABC):
         return copy.deepcopy(self)
 
     def failure(self, step: int, what: str) -> ControllerError:
-        """Return the error for a step whose output cannot be flown, with ``what`` the controller did."""
+        """Return the error for an invalid output in ``step``; ``what`` describes the output."""
         expected = f"expected {len(INPUT_NAMES)} finite numbers: {' and '.join(INPUT_NAMES)}"
         return ControllerError(f"{self.name}, step {step}: {what}, {expected}")
 
 
 class ControllerClass(Protocol):
-    """The class of a controller: its parameters, and how it is built from them.
+    """The class of a controller: its parameters and its constructor.
 
-    What it builds has a :meth:`Controller.reset` and a ``step`` that returns the wanted input, fuel equivalence ratio
-    and elevator deflection (rad), which the bench limits; or, in place of a ``step``, a :class:`StepKernel` ``kernel``.
+    An instance has a ``reset`` and a ``step`` that returns the unsaturated input, fuel equivalence ratio and elevator
+    deflection (rad), or, in place of a ``step``, a :class:`StepKernel` ``kernel``. The bench limits the input.
     """
 
     PARAMETERS: tuple[Parameter, ...]
-    """Parameters of the controller alone, named ``table.parameter``; a scenario has them in that table."""
+    """Parameters of the controller, named ``table.parameter``; a scenario sets them in that table."""
 
     def from_parameters(self, values: Mapping[str, Any], design: ControlDesign | None) -> Any:
-        """Return a controller from all flat parameters of a flight and its design, ``None`` where it has none."""
+        """Return a controller from all flat parameters of a flight and its design, or ``None`` without a design."""
 
 
-class ElsewhereController(Controller):
+class NodeController(Controller):
     """Placeholder for a controller that is a separate ROS 2 node and cannot be stepped here."""
 
     def __init__(self, name: str) -> None:
-        """Call it by its ``name`` in errors."""
+        """Take the ``name`` for error messages."""
         self.name = name
 
     @property
     def kernel(self) -> Any:
-        """Refuse.
+        """Raise an error.
 
         Raises:
             ParameterError: Always.
@@ -175,10 +174,10 @@ class ElsewhereController(Controller):
         raise self.refusal()
 
     def reset(self) -> None:
-        """Nothing is here to be reset."""
+        """Do nothing."""
 
     def step(self, inputs: ControllerInput) -> ControllerResult:
-        """Refuse.
+        """Raise an error.
 
         Raises:
             ParameterError: Always.
@@ -190,11 +189,11 @@ class ElsewhereController(Controller):
         return ParameterError(f"controller = {self.name!r}: a node of its own, expected hsv run to fly it")
 
 
-class ForeignController(Controller):
+class ExternalController(Controller):
     """A custom controller, in Python or compiled, whose outputs are checked and limited."""
 
     def __init__(self, name: str, controller: Any, vehicle: VehicleParameters) -> None:
-        """Call the ``controller`` by its ``name`` in errors, and keep to the input limits of ``vehicle``."""
+        """Take a ``controller``, its ``name`` for error messages, and the ``vehicle`` with the input limits."""
         self.name = name
         self.vehicle = vehicle
         self._minimum, self._maximum = vehicle.input_minimum, vehicle.input_maximum
@@ -214,27 +213,27 @@ class ForeignController(Controller):
             return
         try:
             self._controller.reset()
-        # Foreign code may fail in any way, and may even want to end the process.
+        # External code may raise anything, even SystemExit.
         except (Exception, SystemExit) as error:
             words = " ".join(str(error).split())
             raise ControllerError(f"{self.name}, reset: {type(error).__name__}: {words}") from error
 
-    def copied(self) -> ForeignController:
-        """Return a separate controller that continues from the state of this one, copied completely if compiled."""
+    def copied(self) -> ExternalController:
+        """Return a separate controller that continues from the state of this one."""
         if self.kernel is None:
             return copy.deepcopy(self)
         made = copy.copy(self)
         made._state = self._state.copy()
         return made
 
-    def wanted(self, inputs: ControllerInput) -> tuple[float, float]:
-        """Return the input of this step as the controller wants it, not limited, finite or not.
+    def unsaturated_input(self, inputs: ControllerInput) -> tuple[float, float]:
+        """Return the unsaturated input of this step, finite or not.
 
         Raises:
-            ControllerError: The controller failed, or did not answer with two numbers.
+            ControllerError: The controller failed, or did not return two numbers.
         """
         try:
-            given = self._answer(inputs)
+            given = self._call(inputs)
         except ControllerError:
             raise
         except (Exception, SystemExit) as error:
@@ -250,14 +249,14 @@ class ForeignController(Controller):
         """Return the limited input of this step.
 
         Raises:
-            ControllerError: The controller failed, or did not answer with two finite numbers.
+            ControllerError: The controller failed, or did not return two finite numbers.
         """
-        wanted = np.array(self.wanted(inputs))
-        if not np.all(np.isfinite(wanted)):
-            raise self.failure(inputs.step, f"answered {wanted.tolist()}")
-        return ControllerResult(np.minimum(np.maximum(wanted, self._minimum), self._maximum), wanted)
+        unsaturated = np.array(self.unsaturated_input(inputs))
+        if not np.all(np.isfinite(unsaturated)):
+            raise self.failure(inputs.step, f"answered {unsaturated.tolist()}")
+        return ControllerResult(np.clip(unsaturated, self._minimum, self._maximum), unsaturated)
 
-    def _answer(self, inputs: ControllerInput) -> Any:
+    def _call(self, inputs: ControllerInput) -> Any:
         if self.kernel is None:
             return self._controller.step(inputs)
         return call_step_function(
@@ -273,12 +272,12 @@ def flat_input(inputs: ControllerInput) -> np.ndarray:
 def call_step_function(
     address: int, step: int, given: np.ndarray, state: np.ndarray, parameters: np.ndarray
 ) -> np.ndarray:
-    """Call the function of a compiled controller and return the wanted input (2); ``state`` is changed in place.
+    """Call the function of a compiled controller and return the unsaturated input (2); ``state`` changes in place.
 
     Raises:
         RunError: It returned anything but 0.
     """
-    wanted = np.full(N_INPUTS, np.nan)  # what is not answered is no number
-    if code := STEP_FUNCTION(address)(step, *(a.ctypes.data for a in (given, wanted, state, parameters))):
+    out = np.full(N_INPUTS, np.nan)  # an output that the controller does not set is noticed
+    if code := STEP_FUNCTION(address)(step, *(a.ctypes.data for a in (given, out, state, parameters))):
         raise RunError(f"returned {code}")
-    return wanted
+    return out

@@ -1,4 +1,4 @@
-"""The controllers that can close the loop: registered by packages under a name, or named by their class.
+"""Look up and build controllers: registered by packages under a name, or named by their class.
 
 A package registers its controllers as entry points of the group ``hsv.controllers``; in ``pyproject.toml``::
 
@@ -6,7 +6,7 @@ A package registers its controllers as entry points of the group ``hsv.controlle
     lqr = "hsv_lqr:Lqr"
 
 A scenario then says ``controller = "lqr"``; where nothing is registered, ``controller = "package.module:Class"``.
-What such a class must have is in :mod:`hsv.control.controller`. One in C is ``controller = "path/lib.so:symbol"``, see
+The class is described in :mod:`hsv.control.controller`. A controller in C is ``controller = "path/lib.so:symbol"``, see
 :mod:`hsv.control.library`.
 """
 
@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from hsv.base.errors import HsvError, ParameterError, did_you_mean
-from hsv.base.parameters import Parameter, check_all
-from hsv.control.controller import Controller, ControllerClass, ElsewhereController, ForeignController
+from hsv.base.parameters import Parameter, validate
+from hsv.control.controller import Controller, ControllerClass, ExternalController, NodeController
 from hsv.control.library import LibraryClass, library_place
 from hsv.model.vehicle import Vehicle
 
@@ -29,13 +29,13 @@ GROUP = "hsv.controllers"
 """The entry points of controllers."""
 
 SHIPPED_CONTROLLERS = {"tube_mpc": "hsv.control.tube_law:TubeLaw", "robust_mpc": "hsv.control.robust_mpc:RobustMpc"}
-"""The classes of this library's by name, which a source tree knows as well; others are entry points."""
+"""Classes of this library by name; others are entry points."""
 
-NOT_TOLD = (
+HIDDEN_PARAMETERS = (
     *("vehicle.perturbation.", "fault.", "seed"),
     *("actuator.", "wind.", "turbulence.", "gust.", "density.", "sensors.", "link."),
 )
-"""Beginnings of parameters that a controller of one's own is not told: how the vehicle really is, what will fail."""
+"""Prefixes of parameters that custom controllers do not receive: perturbations, faults and equipment."""
 
 _DEFAULT = "tube_mpc"
 
@@ -60,7 +60,7 @@ def controller_names() -> list[str]:
 
 
 def names_code(controller: str) -> bool:
-    """Return whether a controller is named by its code, rather than registered here under a name, or a node."""
+    """Return whether a controller is named by its class or library: neither registered nor a node."""
     return ":" in controller and not controller.startswith(NODE)
 
 
@@ -76,7 +76,7 @@ def controller_class(name: str) -> ControllerClass:
     module, _, attribute = place.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute)
-    # Foreign code may fail in any way while it is imported.
+    # External code may raise anything while it is imported.
     except Exception as error:
         words = " ".join(str(error).split())
         raise ParameterError(f"controller = {name!r}: cannot be loaded, {type(error).__name__}: {words}") from error
@@ -89,7 +89,7 @@ def controller_class(name: str) -> ControllerClass:
 
 
 def class_place(name: str) -> str:
-    """Return where the class of a controller is, ``package.module:Class``, without loading it.
+    """Return the place of the class of a controller, ``package.module:Class``, without loading it.
 
     Raises:
         ParameterError: There is none of that name.
@@ -121,20 +121,22 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
 
     Args:
         values: Parameters of the flight; the controller uses its own.
-        design: The design in ``values``, where it is known already.
+        design: The design in ``values`` if already built.
 
     Raises:
         ParameterError, DesignError: A wrong value, named; or the controller cannot be built.
     """
-    name = str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+    name = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if name.startswith(NODE):
-        return ElsewhereController(name)
+        return NodeController(name)
     kind = controller_class(name)
     try:
-        told = values
+        own = values
         if name not in SHIPPED_CONTROLLERS:
-            told = {parameter: value for parameter, value in values.items() if not parameter.startswith(NOT_TOLD)}
-        built = kind.from_parameters(told, design)
+            own = {
+                parameter: value for parameter, value in values.items() if not parameter.startswith(HIDDEN_PARAMETERS)
+            }
+        built = kind.from_parameters(own, design)
     except HsvError:
         raise
     except Exception as error:
@@ -145,4 +147,4 @@ def build_controller(values: Mapping[str, Any], design: ControlDesign | None = N
     due = () if getattr(built, "kernel", None) is not None else ("reset", "step")
     if lacking := [attribute for attribute in due if not hasattr(built, attribute)]:
         raise ParameterError(f"controller = {name!r}: has no {', '.join(lacking)}, expected a controller")
-    return ForeignController(name, built, Vehicle.from_parameters(values).decoupled)
+    return ExternalController(name, built, Vehicle.from_parameters(values).decoupled)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from hsv.base.errors import DesignError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.base.units import UnitSystem, to_paper
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import ControlDesign
@@ -61,7 +61,7 @@ def uncovered_hardware(values: Mapping[str, Any], design: ControlDesign) -> list
     Raises:
         ParameterError: A wrong value, named.
     """
-    v = check_all(HARDWARE_PARAMETERS, values)
+    v = validate(HARDWARE_PARAMETERS, values)
     found = [*_actuators(v, design), *_sensors(v, design.period), *_links(v), *_air(v, design.period)]
     if v[ESTIMATOR_ENABLED.name]:
         found.append("estimator: the certificate has none in the loop")
@@ -141,7 +141,7 @@ def uncovered(
         ParameterError: A wrong value, named.
         DesignError: The certificate does not say which loss of effectiveness it covers.
     """
-    controller = str(check_all(CONTROLLER_PARAMETERS, values)["controller"])
+    controller = str(validate(CONTROLLER_PARAMETERS, values)["controller"])
     if controller != _LAW or design is None or design.tube is None:
         which = "the design" if controller == _LAW else f"controller {controller}"
         return [f"all of it: {which} has no certified tube"]

@@ -15,7 +15,7 @@ import yaml
 
 from hsv.base.errors import DesignError, DocumentError, ParameterError, did_you_mean
 from hsv.base.files import parse_json, parse_yaml, read_text
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS, NotchSection, discretise, flown_sections
 from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.lpv.polytope import INTERPOLATIONS, Polytope, axis_weights
@@ -88,7 +88,7 @@ def scheduled_changes(values: Mapping[str, Any], minimum: np.ndarray, period: fl
     Raises:
         ParameterError: Arrays that do not match, times that decrease, or a factor that is not certified.
     """
-    v = check_all(TAU_CHANGE_PARAMETERS, values)
+    v = validate(TAU_CHANGE_PARAMETERS, values)
     starts, flat = v["tau_change.starts"], v["tau_change.values"]
     if len(flat) not in (len(starts), N_RIGID * len(starts)):
         raise ParameterError(
@@ -359,7 +359,7 @@ class ControlDesign:
             DesignError: Names the parameter that is wrong and what was expected.
         """
         try:
-            v = check_all(DESIGN_PARAMETERS, values)
+            v = validate(DESIGN_PARAMETERS, values)
             notch = flown_sections(v)
             discretise(notch, v["period"])  # refuses centres that the period has no room for
             tau_minimum = rigid_factors(v[TAU_MINIMUM.name], TAU_MINIMUM.name)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Data, doubles, dtype, lib, records, vector
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.trim import INITIAL_PARAMETERS, initial_trim
@@ -103,7 +103,7 @@ def effectiveness_data(values: Mapping[str, Any], period: float) -> Effectivenes
     Raises:
         ParameterError, TrimError: A wrong value, named.
     """
-    v = check_all(EFFECTIVENESS_PARAMETERS, values)
+    v = validate(EFFECTIVENESS_PARAMETERS, values)
     if not v[EFFECTIVENESS_ENABLED.name]:
         return None
     nominal, start = initial_trim(values)

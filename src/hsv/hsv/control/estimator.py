@@ -19,7 +19,7 @@ from typing import Self
 import numpy as np
 
 from hsv.base.errors import DesignError, ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Data, doubles, lib, vector
 from hsv.model.dynamics import VehicleParameters, jacobian
 from hsv.model.sensors import SENSOR_PARAMETERS, sensor_data
@@ -60,7 +60,7 @@ _SENSED = ("sensors.set", *(f"sensors.{name}.noise" for name in STATE_NAMES[:N_R
 
 _SETTLED = 1e-12
 """Relative change of the gain in an iteration, at most, where it is steady."""
-_MOST_ITERATIONS = 100_000
+_MAX_ITERATIONS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def estimator_data(
         ParameterError: A wrong value, or a sensor without noise.
         DesignError: No steady gain was found.
     """
-    v = check_all(ESTIMATOR_PARAMETERS, values)
+    v = validate(ESTIMATOR_PARAMETERS, values)
     deviations = np.array([v[p.name] or sensed for p, sensed in zip(NOISE_PARAMETERS, noise[:N_RIGID], strict=True)])
     lacking = [name for name, deviation in zip(STATE_NAMES[:N_RIGID], deviations, strict=True) if not deviation > 0.0]
     if lacking:
@@ -102,7 +102,7 @@ def estimator_data(
     process = np.array([v[p.name] for p in PROCESS_PARAMETERS])
     A, B = jacobian(start.state, start.input, vehicle)
     gain, iterations = steady_gain(A, B, period, process * np.sqrt(period), deviations)
-    if iterations >= _MOST_ITERATIONS or not np.isfinite(gain).all():
+    if iterations >= _MAX_ITERATIONS or not np.isfinite(gain).all():
         raise DesignError(f"estimator: no steady gain after {iterations} iterations, expected other noise")
     return EstimatorData(gain, start.state.copy(), vehicle, period, 2)
 
@@ -121,7 +121,7 @@ def steady_gain(
     """
     gain = np.empty((N_ESTIMATED, N_RIGID))
     given = [doubles(vector(each)) for each in (A, B, process, noise)]
-    iterations = lib.hsv_steady_gain(*given[:2], period, *given[2:], _MOST_ITERATIONS, _SETTLED, doubles(gain))
+    iterations = lib.hsv_steady_gain(*given[:2], period, *given[2:], _MAX_ITERATIONS, _SETTLED, doubles(gain))
     return gain, int(iterations)
 
 

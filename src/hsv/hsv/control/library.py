@@ -21,13 +21,13 @@ import numpy as np
 
 from hsv.base.errors import ControllerError, DocumentError, HsvError, ParameterError, ProcessError, reason
 from hsv.base.files import read_bytes
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.base.units import parse_quantity
 from hsv.control.controller import (
     CONTROLLER_INPUTS,
     CONTROLLER_OUTPUTS,
     ControllerInput,
-    ForeignController,
+    ExternalController,
     StepKernel,
     flat_input,
 )
@@ -38,10 +38,10 @@ from hsv.model.signals import SignalType
 from hsv.model.vehicle import Vehicle
 
 ABI_VERSION = 1
-"""``HSV_BLOCK_ABI_VERSION`` of the header."""
+"""``HSV_BLOCK_ABI_VERSION`` of the header"""
 
 _MOST = 10_000_000
-"""Numbers that a signal, a parameter or the state has at most: more are no sizes."""
+"""Maximum size of a signal, a parameter or the state"""
 
 
 class _Signal(Structure):
@@ -76,11 +76,11 @@ class _Block(Structure):
 
 @dataclass(frozen=True)
 class CBlock:
-    """The description of a block that a library exports, checked."""
+    """The checked description of a block that a library exports."""
 
     name: str
     source: str
-    """Path from the library's folder, empty where none is given"""
+    """Path relative to the library's folder, or empty"""
     address: int
     """Address of the step function in the process that loaded the library."""
     state_size: int
@@ -99,7 +99,7 @@ def load_block(path: Path, symbol: str) -> CBlock:
     """Load a library and return the block that it exports under a symbol.
 
     Raises:
-        ParameterError: It is no library, has no such symbol, or describes no block; the field that is wrong is named.
+        ParameterError: Not a library, no such symbol, or a wrong field of the block, which is named.
     """
     try:
         library = ctypes.CDLL(str(path))
@@ -192,7 +192,7 @@ def _text(value: bytes | None, field: str) -> str:
 
 
 def library_place(controller: str) -> tuple[Path, str] | None:
-    """Return path and symbol of a controller in a shared library, nothing where it is another one."""
+    """Return path and symbol of a controller in a shared library, or None for other controllers."""
     path, _, symbol = controller.rpartition(":")
     return (Path(path), symbol) if "/" in path or path.endswith(".so") else None
 
@@ -201,7 +201,7 @@ def inside(controller: str, folder: Path) -> str:
     """Return the ``controller`` of a scenario in ``folder``, the path of a library absolute.
 
     Raises:
-        ParameterError: The path leads out of the folder: a scenario names nothing but what comes with it.
+        ParameterError: The path leads out of the folder of the scenario.
     """
     place = library_place(controller)
     if place is None:
@@ -233,7 +233,7 @@ class LibraryRecord:
 
 
 def library_record(controller: str) -> LibraryRecord | None:
-    """Return the data to store for a scenario's ``controller``; nothing if it is not in a library.
+    """Return the data to store for a scenario's ``controller``, or None if it is not in a library.
 
     Raises:
         ParameterError: The library cannot be read.
@@ -247,12 +247,12 @@ def library_record(controller: str) -> LibraryRecord | None:
         try:
             source = (path.parent / name).read_bytes()
         except OSError:
-            name = ""  # A library flies without its source, wherever it is flown.
+            name = ""  # a library flies without its source
     return LibraryRecord(library_digest(controller), name, source)
 
 
 def library_digest(controller: str) -> str:
-    """Return the SHA-256 of the library of a scenario's ``controller``, hexadecimal; empty where it is in none.
+    """Return the hexadecimal SHA-256 of the library of a scenario's ``controller``; empty if it is not in a library.
 
     Raises:
         ParameterError: It cannot be read.
@@ -267,18 +267,18 @@ def library_digest(controller: str) -> str:
 
 
 class LibraryClass:
-    """The class of a controller in a shared library, see :class:`hsv.control.controller.ControllerClass`."""
+    """A controller in a shared library, as a :class:`hsv.control.controller.ControllerClass`."""
 
     def __init__(self, name: str, path: Path, symbol: str) -> None:
-        """Describe the controller ``name``, which is the block under a ``symbol`` of the library.
+        """Describe the controller ``name``, the block under a ``symbol`` of the library.
 
         Raises:
-            ParameterError: There is no such library or block, or it is no controller; the field is named.
+            ParameterError: No such library or block, or the block is not a controller; the field is named.
         """
         self._name, self._path, self._symbol = name, path, symbol
         try:
             self.block: CBlock = library_user(path).describe(symbol)
-            # The size of the last one is that of the notch filter it is flown with.
+            # The size of the last input is that of the notch filter.
             size = self.block.inputs[-1].size if self.block.inputs else 0
             _check_signals("inputs", self.block.inputs, _inputs(size)[: len(self.block.inputs)])
             _check_signals("outputs", self.block.outputs, CONTROLLER_OUTPUTS)
@@ -296,9 +296,9 @@ class LibraryClass:
         """Return the controller.
 
         Raises:
-            ParameterError: A parameter has another size, or the notch filter has, that is flown.
+            ParameterError: A parameter or the notch filter has another size.
         """
-        own = check_all(self.PARAMETERS, values)
+        own = validate(self.PARAMETERS, values)
         for parameter in self.PARAMETERS:
             if np.size(own[parameter.name]) != np.size(parameter.default):
                 raise ParameterError(
@@ -313,7 +313,7 @@ class LibraryClass:
 
 
 def _inputs(filter_states: int) -> tuple[SignalType, ...]:
-    """Return what a controller is given beside a notch filter with so many states."""
+    """Return the inputs of a controller that flies with ``filter_states`` states of the notch filter."""
     return (*CONTROLLER_INPUTS[:-1], CONTROLLER_INPUTS[-1].of_size(filter_states))
 
 
@@ -329,8 +329,8 @@ def _words(signal: SignalType) -> str:
     return f"{signal.name}, {signal.size} in {signal.unit!r}"
 
 
-class LibraryController(ForeignController):
-    """A controller in a shared library. In flight as in single steps, its function is called by the child process."""
+class LibraryController(ExternalController):
+    """A controller in a shared library; the child process calls its function."""
 
     def __init__(
         self,
@@ -347,22 +347,22 @@ class LibraryController(ForeignController):
 
     @property
     def library(self) -> LibraryUser:
-        """The user of the library."""
+        """The process of the library."""
         return library_user(self.path)
 
-    def loaded(self, address: int) -> ForeignController:
-        """Return the same where the library is loaded, with its function at an address."""
+    def loaded(self, address: int) -> ExternalController:
+        """Return the controller for the process that has loaded the library, with its function at an ``address``."""
         kernel = StepKernel(address, np.zeros_like(self._state), self.parameters)
-        return ForeignController(self.name, SimpleNamespace(kernel=kernel), self.vehicle)
+        return ExternalController(self.name, SimpleNamespace(kernel=kernel), self.vehicle)
 
     def reset(self) -> None:
         """Start a new run."""
         self._state = np.zeros_like(self._state)
 
-    def _answer(self, inputs: ControllerInput) -> Any:
+    def _call(self, inputs: ControllerInput) -> Any:
         call = self.symbol, inputs.step, flat_input(inputs), self._state, self.parameters
         try:
-            wanted, self._state = self.library.request("step", *call)
+            unsaturated, self._state = self.library.request("step", *call)
         except ProcessError as error:
             raise ControllerError(f"{self.name}, step {inputs.step}: {error}") from error
-        return wanted
+        return unsaturated

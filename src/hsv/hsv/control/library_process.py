@@ -1,8 +1,7 @@
-"""The child process that a shared library is loaded and flown in: its crash is only its own.
+"""The child process that loads and steps a shared library, so that a crash of the library is contained.
 
-One child serves one library file and many flights; it is started when it is first asked, and anew where the file has
-changed. After a crash it goes on as if it had just been started. What it runs is :mod:`hsv.flight.library_child`,
-where a library is used in the same way, without another child.
+One child serves one library file and many flights; the first request starts it, and a changed file or a crash starts
+a new one. The child runs :mod:`hsv.flight.library_child`, which uses the library directly.
 """
 
 from __future__ import annotations
@@ -29,22 +28,22 @@ if TYPE_CHECKING:
     from hsv.control.library import CBlock
 
 NO_PROGRESS = 20.0
-"""Time, s, after which a step, or loading, that does not come to its end is given up."""
+"""Time (s) after which a step, or loading, is given up."""
 
 _POLL = 0.5
-"""Time, s, after which progress is looked at."""
+"""Interval (s) at which progress is checked."""
 
 
 class SharedMemory:
-    """Memory behind a file descriptor, which two processes have."""
+    """Memory behind a file descriptor that two processes share."""
 
     def __init__(self, descriptor: int | None = None) -> None:
-        """Take the memory behind a ``descriptor``, new memory where none is given."""
+        """Take the memory behind a ``descriptor``, by default new memory."""
         self.descriptor = os.memfd_create("hsv_library") if descriptor is None else descriptor
         self._mapped = np.empty(0)
 
     def numbers(self, count: int) -> np.ndarray:
-        """Return the first ``count`` numbers of it; it grows where there are fewer."""
+        """Return the first ``count`` numbers; the memory grows as needed."""
         if len(self._mapped) < count:
             if os.fstat(self.descriptor).st_size < 8 * count:
                 os.truncate(self.descriptor, 8 * count)
@@ -87,19 +86,19 @@ class LibraryProcess:
         Args:
             name: Name of the request.
             arguments: Arguments of the request.
-            kept: More of them, by name, that the child keeps: what is the same object as the last time is not sent.
-            begun: Returns how many steps are begun, 0 before there is anything that could hang.
+            kept: Named arguments that the child keeps; an object that was sent before is not sent again.
+            begun: Returns the number of steps begun, 0 before anything could hang.
 
         Raises:
             ProcessError: The child crashed or hangs.
-            HsvError: The child's own answer.
+            HsvError: Raised in the child.
         """
         with self._lock:
             self._renew()
             if self._child is None:
                 self._start()
             while self._connection.poll():
-                self._receive()  # It crashed meanwhile, for no reason of a request.
+                self._receive()  # it crashed between requests
             news = None
             if kept is not None:
                 news = {key: value for key, value in kept.items() if value is not self._kept.get(key)}
@@ -109,7 +108,7 @@ class LibraryProcess:
                 self._wait(begun)
                 answer = self._receive()
             except BaseException:
-                # What it answers to this would be taken for the answer to the next request.
+                # A late answer would be mistaken for that to the next request.
                 self.end()
                 raise
         if isinstance(answer, Exception):
@@ -132,7 +131,7 @@ class LibraryProcess:
             self._child = None
 
     def _renew(self) -> None:
-        """Forget everything of a file that has changed."""
+        """End the child of a file that has changed."""
         status = self._path.stat()
         file = (status.st_dev, status.st_ino, status.st_mtime_ns, status.st_size)
         if file != self._file:
@@ -142,7 +141,7 @@ class LibraryProcess:
     def _start(self) -> None:
         self._connection, theirs = Pipe()
         descriptors = (theirs.fileno(), self._memory.descriptor)
-        # What the library prints must not get between the numbers of a command.
+        # Output of the library goes to stderr, not into the output of a command.
         self._child = subprocess.Popen(
             [sys.executable, "-P", "-m", "hsv.flight.library_child", self._path, *map(str, descriptors)],
             stdin=subprocess.DEVNULL,
@@ -151,7 +150,7 @@ class LibraryProcess:
             process_group=0,
         )
         theirs.close()
-        # Its imports take as long as they take on a busy machine.
+        # No time limit: the imports may be slow on a busy machine.
         self._receive()
 
     def _receive(self) -> Any:
@@ -199,20 +198,20 @@ def _end_children() -> None:
         child.end()
 
 
-# A forked process has the connections to its parent's children, but no children.
+# A forked process inherits the connections, but not the children.
 os.register_at_fork(after_in_child=_children.clear)
 
 _in_this_process: Callable[[Path], LibraryUser] | None = None
 
 
 def use_in_this_process(user: Callable[[Path], LibraryUser]) -> None:
-    """Let ``user``, by the path of a library, use libraries from now on: this process is the child."""
+    """Use libraries in this process, a child, through ``user``, which takes the path of a library."""
     global _in_this_process
     _in_this_process = user
 
 
 def library_user(path: Path) -> LibraryUser:
-    """Return what uses the library at a path: this process's child, or this process where it is the child."""
+    """Return the user of the library at ``path``: a child of this process, or this process if it is the child."""
     if _in_this_process:
         return _in_this_process(path)
     return _children.get(path) or _children.setdefault(path, LibraryProcess(path))

@@ -10,7 +10,7 @@ gain of the next one inside, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -266,21 +266,20 @@ def _solve(
     K = white.gain(np.linalg.solve(G.T, (bound[:, None] * Y).T).T)
     K = rounded(K, problem.input_scale[:, None] / problem.state_scale, GAIN_DIGITS)
     Q_si = rounded_matrix(white.covariance(Q * size**2))
-    bounded = gamma[0, 0] * size**2 * problem.period
-    return _verified(problem, state, outside, interpolated, K, Q_si, bounded, solver, name)
+    gain = _verified(problem, K, Q_si, gamma[0, 0] * size**2 * problem.period, state, solver, name)
+    return gain if outside is None else _nested(problem, gain, outside, interpolated, name)
 
 
 def _verified(
     problem: NominalProblem,
-    state: np.ndarray,
-    outside: np.ndarray | None,
-    interpolated: bool,
     K: np.ndarray,
     Q: np.ndarray,
     gamma: float,
+    state: np.ndarray,
     solver: SolverReport,
     name: str,
 ) -> NominalGain:
+    """Return the gain with the residuals of (33) to (35), recomputed from the rounded matrices."""
     certified, decrease = certified_cost(problem, K, Q, name)
     if not decrease.min() > -1e-9:
         raise DesignError(f"{name}: smallest eigenvalue of (34) = {decrease.min():.3g}, expected not below zero")
@@ -290,18 +289,22 @@ def _verified(
     inputs = 1.0 - np.einsum("ij,jk,ik->i", K, Q, K) / problem.input_bound**2
     if inputs.min() < 0.0:
         raise DesignError(f"{name}: largest input over its bound = {np.sqrt(1.0 - inputs)}, expected at most 1")
-    nesting = between = None
-    if outside is not None:
-        factor = np.linalg.inv(np.linalg.cholesky(outside))
-        nesting = float(smallest_eigenvalues(np.eye(len(Q)) - factor @ Q @ factor.T))
-        if nesting < 0.0:
-            raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
-        if interpolated:
-            between = decrease_between(problem, K, outside)
-            if not between.min() > 0.0:
-                raise DesignError(
-                    f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above "
-                    "zero for interpolated gains; scales that are closer to each other help"
-                )
     radii = spectral_radii(problem.A + problem.B @ K)
-    return NominalGain(K, K @ Q, Q, gamma, certified, level, decrease, inputs, nesting, between, radii, solver)
+    return NominalGain(K, K @ Q, Q, gamma, certified, level, decrease, inputs, None, None, radii, solver)
+
+
+def _nested(
+    problem: NominalProblem, gain: NominalGain, outside: np.ndarray, interpolated: bool, name: str
+) -> NominalGain:
+    """Return the gain with the residuals of its nesting in the ellipsoid ``outside`` (n, n)."""
+    factor = np.linalg.inv(np.linalg.cholesky(outside))
+    nesting = float(smallest_eigenvalues(np.eye(len(gain.Q)) - factor @ gain.Q @ factor.T))
+    if nesting < 0.0:
+        raise DesignError(f"{name}: reaches {-nesting:.3g} outside the ellipsoid before it, expected inside")
+    between = decrease_between(problem, gain.K, outside) if interpolated else None
+    if between is not None and not between.min() > 0.0:
+        raise DesignError(
+            f"{name}: decrease of the level in the ellipsoid before it = {between.min():.3g}, expected above zero for "
+            "interpolated gains; scales that are closer to each other help"
+        )
+    return replace(gain, nesting=nesting, between=between)

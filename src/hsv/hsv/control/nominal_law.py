@@ -62,7 +62,7 @@ class LawResult:
 class NominalLaw(Protocol):
     """A nominal law: deterministic, stepped once a control period."""
 
-    compiled_with_loop: bool
+    in_core: bool
     """Whether it is the nested family, which the core has in its loop."""
 
     def reset(self) -> None:
@@ -84,7 +84,7 @@ class FamilyLaw:
     Or, interpolated, one between it and that of the next ellipsoid inside.
     """
 
-    compiled_with_loop = True
+    in_core = True
 
     def __init__(self, data: NominalData) -> None:
         self.data = data
@@ -124,7 +124,7 @@ class KothareLaw:
     and the status says so. Inside the family's innermost ellipsoid the last gain stays: there is nothing left to gain.
     """
 
-    compiled_with_loop = False
+    in_core = False
 
     def __init__(self, design: ControlDesign, data: NominalData) -> None:
         # Modelling and solver take a second to import: only this law pays for them.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.design import ControlDesign, design_of
 from hsv.control.nominal_law import NOT_IN_FAMILY, FamilyLaw, KothareLaw, NominalData, NominalLaw, NominalStatus
 from hsv.control.notch_filter import DESIGN_NOTCH_PARAMETERS
@@ -73,12 +73,12 @@ class NominalTrajectory:
         Raises:
             ParameterError, DesignError, TrimError: A wrong value, named.
         """
-        v = check_all(NOMINAL_PARAMETERS, values)
+        v = validate(NOMINAL_PARAMETERS, values)
         design = design or design_of(values)
         if design is None:
             if v["nominal.law"] != LAWS[0]:
                 raise ParameterError(f"parameter nominal.law = {v['nominal.law']!r}: expected a design that it is for")
-            period = check_all(DESIGN_NOTCH_PARAMETERS, values)["period"]
+            period = validate(DESIGN_NOTCH_PARAMETERS, values)["period"]
             return cls(None, ReferenceTrajectory.from_parameters(values, period))
         reference = ReferenceTrajectory.from_parameters(values, design.period)
         return cls(design, reference, _law(v, design, reference))

@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.estimator import ESTIMATOR_ENABLED, Estimator
 from hsv.core import Data, doubles, lib
 from hsv.core.arithmetic import solve, tangent
@@ -178,7 +178,7 @@ def flown_sections(values: Mapping[str, object]) -> tuple[NotchSection, ...]:
     Raises:
         ParameterError: A wrong value, or arrays of different lengths.
     """
-    v = check_all((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
+    v = validate((*DESIGN_NOTCH_PARAMETERS, *FLOWN_NOTCH_PARAMETERS), values)
     pairs = zip(DESIGN_NOTCH_PARAMETERS[1:], FLOWN_NOTCH_PARAMETERS, strict=True)
     chosen = [flown if v[flown.name] else designed for designed, flown in pairs]
     columns = [v[parameter.name] for parameter in chosen]
@@ -223,7 +223,7 @@ class NotchFilter:
             ParameterError: A wrong value, or arrays of different lengths.
             DesignError, TrimError: As :meth:`hsv.control.estimator.Estimator.from_parameters`.
         """
-        v = check_all((*NOTCH_PARAMETERS, ESTIMATOR_ENABLED), values)
+        v = validate((*NOTCH_PARAMETERS, ESTIMATOR_ENABLED), values)
         sections = flown_sections(values)
         period = v["period"]
         estimator = Estimator.from_parameters(values, period) if v[ESTIMATOR_ENABLED.name] else None

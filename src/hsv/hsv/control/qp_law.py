@@ -41,7 +41,7 @@ class QpLaw:
     depends on x_n alone. Where it fails, the plan before goes on, shifted; where there is none, the family flies.
     """
 
-    compiled_with_loop = False
+    in_core = False
 
     def __init__(self, design: ControlDesign, data: NominalData, reference: ReferenceTrajectory) -> None:
         """Prepare the programme for the design's plan bounds, less the reference inputs of the whole flight.

@@ -28,7 +28,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Data, doubles, lib, vector
 from hsv.model.dynamics import VehicleParameters, vehicle_struct
 from hsv.model.signals import N_INPUTS, N_STATES
@@ -154,7 +154,7 @@ class ReferenceTrajectory:
     @classmethod
     def from_parameters(cls, values: Mapping[str, object], period: float) -> Self:
         """Build from :data:`REFERENCE_PARAMETERS` and the vehicle's for a control ``period`` (s); errors as above."""
-        v = check_all(REFERENCE_PARAMETERS, values)
+        v = validate(REFERENCE_PARAMETERS, values)
         vehicle = Vehicle.from_parameters(values)
         vehicle.check_envelope(REFERENCE_PARAMETERS, v)
         times, altitudes, velocities = (v[f"reference.{name}"] for name in ("times", "altitudes", "velocities"))

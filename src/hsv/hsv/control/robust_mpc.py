@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput
 from hsv.control.design import ControlDesign
 from hsv.control.notch_filter import discretise
@@ -25,7 +25,7 @@ class RobustMpc(Controller):
     """One of the nominal gains K acts on the whole deviation from the reference; it has no memory."""
 
     PARAMETERS = ROBUST_MPC_PARAMETERS
-    compiled_with_loop = True
+    in_core = True
     kernel: TubeData
 
     def __init__(self, design: ControlDesign, gain_index: int = 0) -> None:
@@ -52,7 +52,7 @@ class RobustMpc(Controller):
 
         ``design``: the one in ``values``, where it is known already.
         """
-        v = check_all(ROBUST_MPC_PARAMETERS, values)
+        v = validate(ROBUST_MPC_PARAMETERS, values)
         return cls(design or ControlDesign.from_parameters(values), v["robust_mpc.gain_index"])
 
     def reset(self) -> None:

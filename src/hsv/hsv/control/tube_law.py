@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import SignalError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.control.controller import Controller, ControllerInput, ControllerResult
 from hsv.control.coverage import HARDWARE_PARAMETERS, uncovered_hardware
 from hsv.control.design import TAU, TAU_CHANGE_PARAMETERS, ControlDesign, certified, compact, scheduled_changes
@@ -128,7 +128,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         inputs: Those of the controller.
         monitored: Whether the filter of the plan is stepped even where the law does not need it.
     """
-    k, estimate, q_f, *others = inputs
+    k, feedback_state, q_f, *others = inputs
     sizes = (N_STATES, N_INPUTS, N_STATES, N_INPUTS, len(inputs.filter_state))
     given = [doubles(vector(each), size) for each, size in zip(others, sizes, strict=True)]
     feedback, unsaturated, limited = (np.empty(N_INPUTS) for _ in range(3))
@@ -138,7 +138,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         k,
         monitored,
         len(inputs.filter_state),
-        doubles(vector(estimate), N_STATES),
+        doubles(vector(feedback_state), N_STATES),
         q_f,
         *given,
         *map(doubles, (feedback, unsaturated, limited)),
@@ -178,7 +178,7 @@ class TubeLaw(Controller):
     """The controller's last stage."""
 
     PARAMETERS = (*TUBE_PARAMETERS, *(p for p in WATCHED_PARAMETERS if p is not COUPLING_PARAMETER))
-    compiled_with_loop = True
+    in_core = True
     kernel: TubeData
     design: ControlDesign
     factors: list[tuple[int, np.ndarray]]
@@ -220,7 +220,7 @@ class TubeLaw(Controller):
 
         ``design``: the one in ``values``, where it is known already.
         """
-        v = check_all(TUBE_PARAMETERS, values)
+        v = validate(TUBE_PARAMETERS, values)
         design = design or ControlDesign.from_parameters(values)
         changes = scheduled_changes(values, design.tau_minimum, design.period)
         vehicle = v["vehicle.digest"]

@@ -89,7 +89,7 @@ static inline void begin(hsv_flight *const *flights, Loop *f)
 
 #if LANES == 1
 /* Call the external nominal law and controller, if any; return 1 if the controller answered, -1 on failure, else 0. */
-static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const double *estimate, double q_f,
+static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const double *feedback_state, double q_f,
                               const double *s, double *u_unsaturated)
 {
     const hsv_call *law = &flight->nominal_law, *controller = &flight->controller;
@@ -101,7 +101,7 @@ static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const doub
         nominal_input(flight->nominal, f->x_n, f->u_n, &f->gain_index);
     if (!controller->function) return 0;
     double in[3 * STATES + 1 + 2 * INPUTS + 2 * MAX_SECTIONS], *next = in; /* the order of hsv_block.h */
-    memcpy(next, estimate, sizeof f->x), next += STATES;
+    memcpy(next, feedback_state, sizeof f->x), next += STATES;
     *next++ = q_f;
     memcpy(next, f->x_r, sizeof f->x_r), next += STATES;
     memcpy(next, f->u_r, sizeof f->u_r), next += INPUTS;
@@ -116,8 +116,8 @@ static inline int call_blocks(hsv_flight *flight, Loop *f, int64_t k, const doub
 #endif
 
 /* Write row "line" of the histories of all lanes. */
-static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t line, const real *estimate, real q_f,
-                              const real *x_n, const real *u_unsaturated)
+static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t line, const real *feedback_state,
+                              real q_f, const real *x_n, const real *u_unsaturated)
 {
     for (int i = 0; i < LANES; i++) {
         double *row = flights[i]->history + HISTORY * line, *auxiliary = flights[i]->auxiliary + AUXILIARY * line;
@@ -129,7 +129,7 @@ static inline void write_rows(hsv_flight *const *flights, const Loop *f, int64_t
         read_lane(f->actuator, INPUTS, i, row);
         auxiliary[0] = lane(f->gain_index, i);
         read_lane(u_unsaturated, INPUTS, i, auxiliary + 1);
-        if (flights[i]->estimated) read_lane(estimate, STATES, i, flights[i]->estimated + STATES * line);
+        if (flights[i]->estimated) read_lane(feedback_state, STATES, i, flights[i]->estimated + STATES * line);
     }
 }
 
@@ -159,7 +159,7 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
     const hsv_plant *plant = first->plant;
     if (start == 0) begin(flights, f);
     for (int64_t k = start; k < stop; k++) {
-        real estimate[STATES], s[2 * MAX_SECTIONS], x_n[STATES], u_feedback[INPUTS], u_unsaturated[INPUTS];
+        real feedback_state[STATES], s[2 * MAX_SECTIONS], x_n[STATES], u_feedback[INPUTS], u_unsaturated[INPUTS];
         if (k > 0) {
             if (f->equipped)
                 advance_plants(flights, &f->vehicle, k - 1, f->actuator, f->x);
@@ -172,18 +172,19 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
             measure_lanes(flights, f, k);
             schedule_lanes(flights, f, k);
         }
-        memcpy(estimate, f->measurement, sizeof estimate);
+        memcpy(feedback_state, f->measurement, sizeof feedback_state);
         if (first->estimator) {
-            estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u, estimate);
-            if (k == 0) notch_rest(notch, estimate[PITCH_RATE], f->notch);
+            estimate_step(first->estimator, &f->estimator_vehicle, f->estimator, k, f->measurement, f->u,
+                          feedback_state);
+            if (k == 0) notch_rest(notch, feedback_state[PITCH_RATE], f->notch);
         }
         memcpy(s, f->notch, sizeof s);
-        const real q_f = notch_step(notch, f->notch, estimate[PITCH_RATE]);
+        const real q_f = notch_step(notch, f->notch, feedback_state[PITCH_RATE]);
         int answered = 0;
 #if LANES == 1
         flights[0]->history[HISTORY * (k - start) + STATES] =
             q_f; /* tells a watching process which step is under way */
-        answered = call_blocks(flights[0], f, k, estimate, q_f, s, u_unsaturated);
+        answered = call_blocks(flights[0], f, k, feedback_state, q_f, s, u_unsaturated);
         if (answered < 0) return -1 - k;
 #else
         if (first->nominal->count > 0) nominal_input(first->nominal, f->x_n, f->u_n, &f->gain_index);
@@ -195,9 +196,9 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
             real effectiveness = all(1.0);
             if (first->tube->effectiveness)
                 effectiveness = effectiveness_step(first->tube->effectiveness, &f->tube_vehicle, f->predicted, f->u,
-                                                   f->known, k, estimate);
-            tube_step(first->tube, &f->tube, f->gain, effectiveness, k, 0, 2 * notch->sections, estimate, q_f, f->x_r,
-                      f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
+                                                   f->known, k, feedback_state);
+            tube_step(first->tube, &f->tube, f->gain, effectiveness, k, 0, 2 * notch->sections, feedback_state, q_f,
+                      f->x_r, f->u_r, f->x_n, f->u_n, s, u_feedback, u_unsaturated, f->u);
         }
         memcpy(x_n, f->x_n, sizeof x_n);
         if (first->set) level_step(first->set, &f->levels, k, f->x, f->x_r, x_n);
@@ -214,7 +215,7 @@ static int64_t fly(hsv_flight *const *flights, Loop *f, int64_t start, int64_t s
             hsv_apply_command_faults(own->faults, k, own->plant->seed, actuator);
             write_lane(actuator, INPUTS, i, f->actuator);
         }
-        write_rows(flights, f, k - start, estimate, q_f, x_n, u_unsaturated);
+        write_rows(flights, f, k - start, feedback_state, q_f, x_n, u_unsaturated);
         if (first->set)
             for (int i = 0; i < LANES; i++)
                 if (flights[i]->ended > k) flights[i]->worst = lane(f->levels.worst, i);

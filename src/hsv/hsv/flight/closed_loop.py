@@ -104,10 +104,10 @@ def fly_into(history: History, components: Components) -> int:
     """
     law, controller = components.nominal_trajectory.law, components.controller
     callbacks, calls = [], {}
-    if not law.compiled_with_loop:
+    if not law.in_core:
         callbacks.append(_solving(law))
         calls["nominal_law"] = callbacks[-1].call
-    if not controller.compiled_with_loop:
+    if not controller.in_core:
         if controller.kernel is None:
             callbacks.append(_controlling(controller, 2 * len(components.notch_filter.data.D)))
             calls["controller"] = callbacks[-1].call
@@ -144,7 +144,7 @@ def flight_struct(components: Components, history: History, **others: Any) -> St
     """
     plant, notch, injector = components.plant, components.notch_filter, components.fault_injector
     nominal, controller = components.nominal_trajectory, components.controller
-    tube = controller.kernel if controller.compiled_with_loop else no_tube(plant.vehicle)
+    tube = controller.kernel if controller.in_core else no_tube(plant.vehicle)
     fields = {
         "x": plant.initial.state,
         "plant": plant.data.struct,
@@ -190,6 +190,6 @@ def _controlling(controller: Controller, filter_states: int) -> Callback:
         now = np.array(ffi.unpack(given, ends[-1]))
         estimate, filtered_pitch_rate, *others = [now[cut] for cut in cuts]
         inputs = ControllerInput(step, estimate, float(filtered_pitch_rate[0]), *others)
-        out[0], out[1] = controller.wanted(inputs)
+        out[0], out[1] = controller.unsaturated_input(inputs)
 
     return Callback(control)

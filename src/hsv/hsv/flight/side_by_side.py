@@ -111,7 +111,7 @@ def fly_perturbed(
 
 
 def _of_the_core(components: Components) -> bool:
-    return components.controller.compiled_with_loop and components.nominal_trajectory.law.compiled_with_loop
+    return components.controller.in_core and components.nominal_trajectory.law.in_core
 
 
 def _shared(components: Components) -> tuple[Any, ...]:

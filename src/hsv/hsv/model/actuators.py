@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import ffi, lib
 from hsv.model.dynamics import VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS
@@ -142,7 +142,7 @@ def actuator_data(values: Mapping[str, object], vehicle: VehicleParameters, peri
     Raises:
         ParameterError: A wrong value, named.
     """
-    v = check_all(ACTUATOR_PARAMETERS, values)
+    v = validate(ACTUATOR_PARAMETERS, values)
     h = period / SUBSTEPS
     order, map = np.zeros(N_INPUTS, np.int64), np.zeros((N_INPUTS, 4))
     frequency, damping, rate, acceleration = (np.full(N_INPUTS, np.inf) for _ in range(4))

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.base.units import FOOT
 from hsv.model.signals import first_step
 
@@ -75,7 +75,7 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereDa
     Raises:
         ParameterError: A wrong value, or arrays of different lengths.
     """
-    v = check_all(ATMOSPHERE_PARAMETERS, values)
+    v = validate(ATMOSPHERE_PARAMETERS, values)
     starts = v["gust.starts"]
     columns = {}
     for name, standard in (("forward", 0.0), ("up", 0.0), ("lengths", 0.0), ("stays", 0.0)):

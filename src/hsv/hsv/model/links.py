@@ -21,10 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Data, doubles, lib, vector
 
-LONGEST_DELAY = 50
+MAX_DELAY = 50
 """Steps."""
 
 LARGEST = 1e6
@@ -37,7 +37,7 @@ _CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
 
 
 def _parameters(link: str) -> tuple[Parameter, ...]:
-    where, longest = f"link.{link}", float(LONGEST_DELAY)
+    where, longest = f"link.{link}", float(MAX_DELAY)
     return (
         Parameter(f"{where}.delay", 0.0, "age of a payload, control periods", "", 0.0, longest, whole=True),
         Parameter(
@@ -85,7 +85,7 @@ def computation(values: Mapping[str, object], period: float) -> tuple[int, float
     Raises:
         ParameterError: A wrong value, named.
     """
-    time = check_all((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
+    time = validate((COMPUTATION_PARAMETER,), values)[COMPUTATION_PARAMETER.name]
     periods = round(time / period, 9)  # the rounding of the division allowed for
     whole = math.floor(periods)
     return whole, periods - whole
@@ -110,7 +110,7 @@ def command_link(values: Mapping[str, object], period: float) -> LinkData:
 
 
 def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
-    v = check_all(_parameters(name), values)
+    v = validate(_parameters(name), values)
     delay, jitter, loss, burst, corruption, checksum = v.values()
     # A two-state Gilbert channel with the given mean burst length and loss rate (Gilbert 1960).
     least = max(1.0, loss / (1.0 - loss)) if loss < 1.0 else 1.0

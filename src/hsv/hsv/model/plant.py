@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Data, Struct, doubles, lib, vector
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.model.actuators import ACTUATOR_PARAMETERS, SUBSTEPS, ActuatorData, actuator_data, actuators_at_rest
@@ -199,7 +199,7 @@ class Plant:
             sensor_data(values, period),
             measurement_link(values),
             SUBSTEPS * computation(values, period)[1],
-            check_all((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
+            validate((SEED_PARAMETER,), values)[SEED_PARAMETER.name],
         )
         self.reset()
 
@@ -210,7 +210,7 @@ class Plant:
         Raises:
             ParameterError, TrimError: A wrong value, named.
         """
-        v = check_all(PLANT_PARAMETERS, values)
+        v = validate(PLANT_PARAMETERS, values)
         nominal, initial = initial_trim(values)
         vehicle = nominal.perturbed({n: v[f"vehicle.perturbation.{n}"] for n in COEFFICIENT_UNITS})
         equipment = {p.name: values[p.name] for p in (*EQUIPMENT_PARAMETERS, SEED_PARAMETER) if p.name in values}

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.base.units import FOOT, readable
 from hsv.core import dtype
 from hsv.core.arithmetic import exponential
 from hsv.model.signals import N_STATES, STATE_NAMES, STATE_UNITS
 
-LONGEST_LATENCY = 50
+MAX_LATENCY = 50
 """Steps."""
 
 ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_angle")
@@ -49,7 +49,7 @@ FIELDS = (
     Field("scale", "relative error of the scale", "", -0.9, 10.0, 0.0),
     Field("scale_sigma", "standard deviation of a scale error drawn once per flight", "", 0.0, 1.0, 0.0),
     Field("lag", "bandwidth of a first-order lag; 0: none", "rad/s", 0.0, 1e4, 0.0),
-    Field("latency", "age of a sample, control periods", "", 0.0, float(LONGEST_LATENCY), 0.0, whole=True),
+    Field("latency", "age of a sample, control periods", "", 0.0, float(MAX_LATENCY), 0.0, whole=True),
     Field("drop_out", "probability that a sample is lost", "", 0.0, 1.0, 0.0),
     Field("quantum", "step of the quantisation; 0: none", "{}", 0.0, 1e6, 0.0),
     Field("minimum", "least measurement; none unless given", "{}", -1e6, 1e6, -math.inf),
@@ -154,7 +154,7 @@ def sensor_data(values: Mapping[str, object], period: float) -> SensorData:
     Raises:
         ParameterError: A wrong value, named.
     """
-    v = check_all(SENSOR_PARAMETERS, values)
+    v = validate(SENSOR_PARAMETERS, values)
     chosen = SENSOR_SETS[v["sensors.set"]]
     table = {field.name: np.full(N_STATES, field.standard) for field in FIELDS}
     for i, channel in enumerate(STATE_NAMES):

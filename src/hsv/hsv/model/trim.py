@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hsv.base.errors import ParameterError, QuantityError, TrimError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import doubles, lib
 from hsv.core.arithmetic import arcsine
 from hsv.model.dynamics import MODELS, VehicleParameters, derivative, vehicle_struct
@@ -123,7 +123,7 @@ def initial_trim(values: Mapping[str, object]) -> tuple[VehicleParameters, Trim]
     Raises:
         ParameterError, TrimError: A wrong value, named.
     """
-    v = check_all(INITIAL_PARAMETERS, values)
+    v = validate(INITIAL_PARAMETERS, values)
     vehicle = Vehicle.from_parameters(values)
     vehicle.check_envelope(INITIAL_PARAMETERS, v)
     try:

@@ -27,7 +27,7 @@ import tomli_w
 
 from hsv.base.errors import DocumentError, HsvError, ParameterError, QuantityError, VehicleError, did_you_mean
 from hsv.base.files import EXTENDS, Tables, follow_extends, is_path, parse_toml, read_text
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.base.units import parse_quantity
 from hsv.model.dynamics import COEFFICIENT_UNITS, COEFFICIENTS, POSITIVE, VehicleParameters
 from hsv.model.signals import INPUT_NAMES, INPUT_UNITS
@@ -44,13 +44,13 @@ DEFAULT_VEHICLE = "parker"
 DERIVED = "derived"
 """The set of inertial coupling that a number is a multiple of."""
 
-MOST_COUPLING = 2.0
+MAX_COUPLING = 2.0
 """Largest multiple of it: twice the coupling of a beam model is no vehicle of this structure any more."""
 
-MOST_UNCERTAIN = 12
+MAX_UNCERTAIN = 12
 """Uncertain parameters at most: a design flies every corner of their bounds."""
 
-LARGEST_UNCERTAINTY = 0.9
+MAX_UNCERTAINTY = 0.9
 """Relative bound at most."""
 
 _COUPLING_UNITS = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
@@ -114,7 +114,7 @@ class Vehicle:
             coupling: A name, a number or its text; empty: the first set.
 
         Raises:
-            QuantityError: No such set, or no number from 0 to :data:`MOST_COUPLING`.
+            QuantityError: No such set, or no number from 0 to :data:`MAX_COUPLING`.
         """
         if coupling == "":
             return next(iter(self.couplings))
@@ -124,10 +124,10 @@ class Vehicle:
             scale = float(coupling) if isinstance(coupling, str | float | int) else math.nan
         except (ValueError, OverflowError):
             scale = math.nan
-        if isinstance(coupling, bool) or not 0.0 <= scale <= MOST_COUPLING:
+        if isinstance(coupling, bool) or not 0.0 <= scale <= MAX_COUPLING:
             raise QuantityError(
                 f"coupling = {coupling!r}: expected one of {', '.join(self.couplings)}, or a multiple of {DERIVED} "
-                f"from 0 to {MOST_COUPLING:g}, such as 0.65"
+                f"from 0 to {MAX_COUPLING:g}, such as 0.65"
             )
         return repr(scale)
 
@@ -190,7 +190,7 @@ class Vehicle:
             if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
                 raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
             values = {**named_parameters(values), **values}
-        v = {name.removeprefix("vehicle."): value for name, value in check_all(VEHICLE_PARAMETERS, values).items()}
+        v = {name.removeprefix("vehicle."): value for name, value in validate(VEHICLE_PARAMETERS, values).items()}
         for name in POSITIVE:
             if not v[name] > 0.0:
                 raise ParameterError(f"parameter vehicle.{name} = {v[name]}: expected above zero")
@@ -348,14 +348,14 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
                 raise QuantityError(f"{field}.value = {row['value']!r}: expected above zero")
             if "uncertainty" in row:
                 bound = _quantity(row, field, "uncertainty", "1")
-                if not 0.0 <= bound <= LARGEST_UNCERTAINTY:
-                    most = f"{100 * LARGEST_UNCERTAINTY:g} %"
+                if not 0.0 <= bound <= MAX_UNCERTAINTY:
+                    most = f"{100 * MAX_UNCERTAINTY:g} %"
                     raise QuantityError(f"{field}.uncertainty = {row['uncertainty']!r}: expected 0 % to {most}")
                 if bound > 0.0:  # a vehicle that extends another says so of what it knows better
                     uncertainty[coefficient] = bound
-    if len(uncertainty) > MOST_UNCERTAIN:
+    if len(uncertainty) > MAX_UNCERTAIN:
         raise QuantityError(
-            f"uncertainty: of {len(uncertainty)} coefficients, expected at most {MOST_UNCERTAIN}: a design flies every "
+            f"uncertainty: of {len(uncertainty)} coefficients, expected at most {MAX_UNCERTAIN}: a design flies every "
             "corner of their bounds"
         )
     envelope = _table(tables, "envelope", (*_AXES, "angle"))

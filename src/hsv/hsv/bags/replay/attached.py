@@ -31,7 +31,7 @@ from hsv.bags.reader import Bag
 from hsv.bags.steps import cut_off, expected_stamps, joined
 from hsv.bags.track import expecting_fields
 from hsv.base.errors import DesignError, ParameterError, RecordingError
-from hsv.base.parameters import check_all
+from hsv.base.parameters import validate
 from hsv.control.controllers import CONTROLLER_PARAMETERS
 from hsv.control.design import (
     CERTIFICATE_PARAMETERS,
@@ -140,12 +140,12 @@ def _attached(bag: Bag, name: str) -> ParameterSections:
 
 def controller_of(values: ParameterSections) -> str:
     """Return the controller that these parameters choose, as a scenario names it; nothing is loaded."""
-    return str(check_all(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
+    return str(validate(CONTROLLER_PARAMETERS, values.of(PLANT.name))["controller"])
 
 
 def estimated(values: ParameterSections) -> bool:
     """Tell whether an estimator flies with these parameters."""
-    return bool(check_all((ESTIMATOR_ENABLED,), values.of(NOTCH_FILTER.name))[ESTIMATOR_ENABLED.name])
+    return bool(validate((ESTIMATOR_ENABLED,), values.of(NOTCH_FILTER.name))[ESTIMATOR_ENABLED.name])
 
 
 def complete_steps(bag: Bag, topics: Iterable[str] = ()) -> int:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from hsv.control.controllers import NOT_TOLD, SHIPPED_CONTROLLERS
+from hsv.control.controllers import HIDDEN_PARAMETERS, SHIPPED_CONTROLLERS
 from hsv.control.design import design_of
 from hsv.control.nominal_trajectory import NominalTrajectory
 from hsv.core.arithmetic import SEED_PARAMETER
@@ -17,7 +17,7 @@ from hsv.model.faults.injector import FaultInjector
 from hsv.model.plant import PLANT_PARAMETERS, Plant
 from hsv.model.trim import initial_trim
 
-_NOT_OF_SHIPPED = (*NOT_TOLD, "initial.", "reference.")
+_NOT_OF_SHIPPED = (*HIDDEN_PARAMETERS, "initial.", "reference.")
 """Beginnings of parameters on which the bench's own controllers do not depend."""
 
 _PERTURBATION = "vehicle.perturbation."
@@ -42,7 +42,7 @@ class FlightVariants:
         self._parameters = dict(design)
         self._design = design_of(design)
         self._nominal = {**design, **scenario_parameters(scenario)}
-        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else NOT_TOLD
+        self._kept_for = _NOT_OF_SHIPPED if scenario.controller in SHIPPED_CONTROLLERS else HIDDEN_PARAMETERS
         self.unchanged: Components = assemble_flight(scenario, self._design)
         """Components of the flight itself"""
         self._vehicle, _ = initial_trim(self._nominal)

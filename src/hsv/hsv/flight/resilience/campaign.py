@@ -160,7 +160,7 @@ def _subject(name: str) -> Subject:
     law = FlightVariants(scenario, design).unchanged.nominal_trajectory.law
     corners = screening_corners(scenario.vehicle.described.uncertainty)[::_EVERY]
     # What is solved in every step takes a hundred times the time.
-    vehicles = corners if law.compiled_with_loop else corners[:1]
+    vehicles = corners if law.in_core else corners[:1]
     subject = Subject(Path(name).stem, scenario_text(name), design, library, tuple(vehicles))
     for moment in Moment:
         parse_scenario(subject.file(moment, 0), subject.name)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from hsv.base.errors import ParameterError
-from hsv.base.parameters import Parameter, check_all
+from hsv.base.parameters import Parameter, validate
 from hsv.core import Struct, doubles, lib
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.model.faults.schedule import ActiveFault, FaultRows, ScheduledFault, fault_rows
@@ -88,7 +88,7 @@ class FaultInjector:
         Raises:
             ParameterError, TrimError: A wrong value, named, or arrays of different lengths.
         """
-        v = check_all(FAULT_PARAMETERS, values)
+        v = validate(FAULT_PARAMETERS, values)
         period, seed = v["period"], v[SEED_PARAMETER.name]
         link = command_link(values, period)
         flown = (period, seed, link, None if link.ideal else initial_trim(values)[1].input)

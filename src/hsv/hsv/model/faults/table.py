@@ -54,7 +54,7 @@ COMMAND, DYNAMICS, EFFECTOR, ENGINE_SIDE, SENSOR = "command", "dynamics", "effec
 REPLACING = (lib.LOCK, lib.LOCK_AT, lib.FLOAT, lib.HARD_OVER, lib.SOLID_OSCILLATION)
 """Types that replace the position of an effector; the most recent one applies."""
 
-LONGEST_DELAY = lib.MAX_DELAY
+MAX_DELAY = lib.MAX_DELAY
 """Steps."""
 
 
@@ -161,7 +161,7 @@ FAULT_KINDS = {
         COMMAND,
         INPUT_NAMES,
         "the actuator receives the command with a delay; at first it receives the one at the start of the fault",
-        (_P("steps", "delay in control periods", "", 1.0, float(LONGEST_DELAY), whole=True),),
+        (_P("steps", "delay in control periods", "", 1.0, float(MAX_DELAY), whole=True),),
     ),
     "dead_zone": FaultKind(
         lib.DEAD_ZONE,
