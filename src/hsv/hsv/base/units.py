@@ -255,11 +255,14 @@ The literature gives elastic modes in roots of a mass: squares have whole expone
 _PI = Fraction("3.1415926535897932384626433832795028841971693993751")
 _FORCE, _PRESSURE = {"kg": 2, "m": 2, "s": -4}, {"kg": 2, "m": -2, "s": -4}
 _KNOWN: dict[str, tuple[Fraction, dict[str, int]]] = {
-    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"m": 1, "km": 1000, "mm": "1/1000"}.items()},
+    **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"m": "1", "km": "1000", "mm": "1/1000"}.items()},
     **{unit: (Fraction(size) ** 2, {"m": 2}) for unit, size in {"ft": "0.3048", "kft": "304.8"}.items()},
-    **{unit: (Fraction(size) ** 2, {"s": 2}) for unit, size in {"s": 1, "ms": "1/1000", "min": 60, "h": 3600}.items()},
+    **{
+        unit: (Fraction(size) ** 2, {"s": 2})
+        for unit, size in {"s": "1", "ms": "1/1000", "min": "60", "h": "3600"}.items()
+    },
     **{unit: (size**2, {"rad": 2}) for unit, size in {"deg": _PI / 180, "arcsec": _PI / 648000}.items()},
-    **{unit: (Fraction(size) ** 2, {"rad": 2}) for unit, size in {"rad": 1, "mrad": "1/1000"}.items()},
+    **{unit: (Fraction(size) ** 2, {"rad": 2}) for unit, size in {"rad": "1", "mrad": "1/1000"}.items()},
     "": (Fraction(1), {}),
     "1": (Fraction(1), {}),
     "percent": (Fraction(1, 10**4), {}),

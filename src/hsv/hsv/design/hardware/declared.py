@@ -1,7 +1,8 @@
 """Models of hardware and air that a scenario declares or that options of the command line describe.
 
-Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.core.noise` pass one
-time in 370: their own bound is :data:`hsv.core.noise.LARGEST`. What has no bound is named, and certifies nothing.
+Of noise as many standard deviations count as :data:`REACH` says, which the numbers of :mod:`hsv.core.arithmetic` pass
+one time in 370: their own bound is :data:`hsv.core.arithmetic.LARGEST`. What has no bound is named, and certifies
+nothing.
 """
 
 from __future__ import annotations
