@@ -19,7 +19,7 @@ from typing import NoReturn
 import psutil
 
 from hsv.base.errors import HsvError
-from hsv.flight.campaign.campaign import MOST_SAMPLES, Campaign, plan
+from hsv.flight.campaign.campaign import MAX_SAMPLES, Campaign, plan
 from hsv.flight.campaign.executors import make_executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
@@ -57,12 +57,12 @@ class Arguments(argparse.ArgumentParser):
 def main() -> int:
     """Fly the campaign and print the table; return the exit code."""
     parser = Arguments(description=__doc__.partition("\n")[0])
-    parser.add_argument("flights", type=whole, help=f"number of flights, 10 to {MOST_SAMPLES}")
+    parser.add_argument("flights", type=whole, help=f"number of flights, 10 to {MAX_SAMPLES}")
     parser.add_argument("--scenario", default="case1", help="shipped scenario or path of a TOML file")
     parser.add_argument("--workers", type=whole, default=0, help="number of processes; 0: one per processor")
     arguments = parser.parse_args()
-    if not 10 <= arguments.flights <= MOST_SAMPLES:
-        parser.error(f"flights = {arguments.flights}: expected 10 to {MOST_SAMPLES}")
+    if not 10 <= arguments.flights <= MAX_SAMPLES:
+        parser.error(f"flights = {arguments.flights}: expected 10 to {MAX_SAMPLES}")
     try:
         fly(plan(arguments.scenario, samples=arguments.flights), arguments.workers)
     except HsvError as error:

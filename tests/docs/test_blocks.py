@@ -87,10 +87,6 @@ ELSEWHERE = {
 }
 """Blocks that another file runs, in some form."""
 
-HELM = (
-    "helm install --repo https://helm.dask.org --create-namespace -n dask-operator --generate-name "
-    "dask-kubernetes-operator"
-)
 NPM = "npm install --prefix tests/viewers/npm --save-exact plotly.js-basic-dist-min@VERSION"
 
 NOT_RUN = {
@@ -102,10 +98,9 @@ NOT_RUN = {
     ("src/hsv/hsv/pages/report/plotly/README.md", NPM): "how a file of the repository was fetched",
     (
         "docs/montecarlo.md",
-        "hsv cluster worker-1 me@worker-2*8",
-    ): "needs other machines; tests/flight/campaign/test_cluster.py",
+        ".venv/bin/dask ssh --nthreads 1 --nworkers 8 scheduler-host worker-1 worker-2",
+    ): "needs other machines",
     ("docs/montecarlo.md", ".venv/bin/dask scheduler"): "needs other machines",
-    ("docs/montecarlo.md", HELM): "needs Kubernetes",
 }
 """Blocks that no test can run here, and why."""
 

@@ -122,7 +122,7 @@ def test_a_campaign_flies_its_samples_as_each_alone():
     campaign = plan("case2", method="sobol", samples=2 * WIDTH, factors={"tube.tau": (0.9, 1.0)})
     runner = SampleRunner(campaign)
     flights = range(2 * WIDTH)
-    samples, _ = runner.sampler.draw(flights)
+    samples, _ = runner.campaign.draw(flights)
     for flight, sample, flown in zip(flights, samples, runner.fly_all(flights, samples), strict=True):
         alone = runner.fly(flight, sample)
         assert flown.fingerprint == alone.fingerprint

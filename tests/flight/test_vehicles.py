@@ -1,17 +1,15 @@
 """Flights of other vehicles: named in a scenario, read from beside it, taken along, not taken for certified."""
 
 import shutil
-import tomllib
 
 import numpy as np
 import pytest
-import tomli_w
 
 from hsv.base.errors import ScenarioError
 from hsv.control.tube_law import TubeStatusCode
 from hsv.flight.assembly import assemble, assemble_flight, flight_parameters
 from hsv.flight.blocks import steps
-from hsv.flight.campaign.factors import factors_of, flown_table
+from hsv.flight.campaign.campaign import plan
 from hsv.flight.closed_loop import fly
 from hsv.flight.scenario import load_scenario, parse_scenario, scenario_text
 from hsv.model.vehicle import load_vehicle
@@ -93,17 +91,15 @@ def test_envelope_and_uncertainty_are_those_of_the_vehicle(folder):
         load_scenario(path, {"vehicle.perturbation.gravity": "4 %"})
     with pytest.raises(ScenarioError, match=r"vehicle.perturbation.lift_alpha = 0.04: no such parameter"):
         load_scenario("case1", {"vehicle.perturbation.lift_alpha": "4 %"})
-    bounds = {factor.name: factor.high for factor in factors_of(tomllib.loads(scenario_text(path)), "flight", 1.0)}
+    bounds = {factor.name: factor.high for factor in plan(path).factors}
     assert bounds["mass"] == 0.05 and bounds["thrust_moment_arm"] == 0.02 and bounds["lift_alpha"] == 0.04
 
 
 def test_a_sampled_scenario_takes_its_vehicle_along(folder):
-    table = tomllib.loads(scenario_text(str(folder / "flight.toml")))
-    table["vehicle"]["coupling"] = {"uniform": [0.2, 0.65]}
+    campaign = plan(str(folder / "flight.toml"), factors={"vehicle.coupling": (0.2, 0.65)})
     (folder / "mine.toml").unlink()
-    factors = factors_of(table, "flight", 1.0)
     for end, coupling in (("low", "0.2"), ("high", "0.65")):
-        text = tomli_w.dumps(flown_table(table, "flight", factors, [getattr(factor, end) for factor in factors], 0))
+        text = campaign.file(0, [getattr(factor, end) for factor in campaign.factors])
         sampled = parse_scenario(text, "sampled").vehicle
         assert sampled.described.decoupled.mass == 4600.0 and sampled.coupling == coupling
         assert abs(sampled.perturbation["mass"]) == 0.05

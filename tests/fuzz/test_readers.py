@@ -28,7 +28,7 @@ from hsv.base.units import parse_quantity
 from hsv.control.design import certificate_path, find_design, read_design
 from hsv.control.verification import preflight
 from hsv.flight.campaign.campaign import plan
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
@@ -88,7 +88,7 @@ def small_bag(bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def campaign(tmp_path_factory: pytest.TempPathFactory) -> Results:
     folder = tmp_path_factory.mktemp("campaign")
     planned = plan(str(short_scenario(folder, duration=1, fault=0)), samples=2, commit="test")
-    run_campaign(planned, ResultStore(folder / "flown.parquet", planned), SerialExecutor())
+    run_campaign(planned, ResultStore(folder / "flown.parquet", planned), Executor())
     return Results(folder / "flown.parquet")
 
 

@@ -10,7 +10,7 @@ import pytest
 from node_processes import short_scenario
 
 from hsv.flight.campaign.campaign import Campaign, plan
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results
@@ -39,7 +39,7 @@ def planned(short: str) -> Callable[..., Campaign]:
 def results(planned: Callable[..., Campaign], tmp_path_factory: pytest.TempPathFactory) -> Results:
     """Return the results of a campaign that nothing disturbed."""
     out = tmp_path_factory.mktemp("campaign") / "short.parquet"
-    run_campaign(planned(), ResultStore(out, planned()), SerialExecutor())
+    run_campaign(planned(), ResultStore(out, planned()), Executor())
     return Results(out)
 
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from hsv.base.processes import Progress
 from hsv.flight.assembly import assemble, flight_parameters
-from hsv.flight.campaign.tube_levels import TubeLevels
 from hsv.flight.corners import Corner
 from hsv.flight.flight import Flight
 from hsv.flight.scenario import load_scenario
-from hsv.flight.side_by_side import fly_perturbed
+from hsv.flight.side_by_side import TubeLevels, fly_perturbed
 from hsv.flight.sources import DIGITS, digest_of, flight_digest, kept, measuring_code
 from hsv.model.plant import FlightStatus
 from hsv_paper.measures import flight_measures

@@ -8,7 +8,7 @@ from pyarrow import parquet
 from hsv.base.errors import CampaignError
 from hsv.control.library import library_place
 from hsv.flight.campaign.campaign import plan
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.sample_runner import SampleRunner
 from hsv.flight.campaign.store import ResultStore
@@ -40,7 +40,7 @@ def fly(tmp_path_factory):
         altitudes = {"initial.altitude": ("25950 m", "26350 m")}
         campaign = plan(str(folder / f"{name}.toml"), samples=samples, scale=0.0, factors=altitudes)
         out = folder / f"{name}.parquet"
-        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+        run_campaign(campaign, ResultStore(out, campaign), Executor())
         return Results(out, trust=True)
 
     return fly

@@ -6,9 +6,8 @@ import pytest
 from hsv.base.errors import ScenarioError
 from hsv.flight.assembly import assemble_flight
 from hsv.flight.campaign.campaign import METHODS, Campaign, plan
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
-from hsv.flight.campaign.sampling import Sampler
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results
 from hsv.flight.closed_loop import fly
@@ -49,7 +48,7 @@ def scenario(tmp_path_factory):
 def flown(scenario, tmp_path_factory):
     campaign = plan(scenario, samples=20, seed=5, scale=0.0)
     out = tmp_path_factory.mktemp("campaign") / "drawn.parquet"
-    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+    run_campaign(campaign, ResultStore(out, campaign), Executor())
     return Results(out)
 
 
@@ -87,11 +86,11 @@ def test_every_number_drawn_is_flown(flown):
 @pytest.mark.parametrize("method", METHODS)
 def test_samples_lie_within_the_ends_and_can_be_drawn_alone(scenario, method):
     campaign = plan(scenario, samples=64, seed=2, scale=0.0, method=method)
-    samples, _ = Sampler(campaign).draw(range(campaign.samples))
+    samples, _ = campaign.draw(range(campaign.samples))
     assert np.all(samples >= [f.low for f in campaign.factors]) and np.all(
         samples <= [f.high for f in campaign.factors]
     )
-    one, _ = Sampler(campaign).draw(range(40, 41))
+    one, _ = campaign.draw(range(40, 41))
     assert np.array_equal(one[0], samples[40])
     if method != "corners":
         # Two thirds of a normal distribution lie within a standard deviation, a third of a uniform one as long.
@@ -143,14 +142,14 @@ def test_of_numbers_of_steps_whole_ones_are_drawn(tmp_path):
     path.write_text(WHOLE)
     ranges = {"sensors.altitude.latency": ("0", "2")}
     campaign = plan(str(path), samples=40, scale=0.0, factors=ranges)
-    drawn = Sampler(campaign).draw(range(40))[0]
+    drawn = campaign.draw(range(40))[0]
     flown = [campaign.flown(flight, sample) for flight, sample in enumerate(drawn)]
     assert {scenario.equipment["link.command.delay"] for scenario in flown} == {0.0, 1.0, 2.0}
     assert {scenario.equipment["sensors.altitude.latency"][0] for scenario in flown} == {0.0, 1.0, 2.0}
     assert {scenario.fault[0].parameters["steps"] for scenario in flown} == {1.0, 2.0, 3.0}
     assert Campaign.from_text(campaign.text) == campaign
     corners = plan(str(path), method="corners", scale=0.0, factors=ranges)
-    assert set(Sampler(corners).draw(range(8))[0].ravel().tolist()) == {0.0, 1.0, 2.0, 3.0}
+    assert set(corners.draw(range(8))[0].ravel().tolist()) == {0.0, 1.0, 2.0, 3.0}
 
 
 def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out):
@@ -159,7 +158,7 @@ def test_values_that_do_not_go_together_are_told_with_their_flight(tmp_path, out
     path.write_text(SCENARIO.replace("altitude_change", ends, 1))
     campaign = plan(str(path), samples=40, scale=0.0)
     with pytest.raises(ScenarioError, match=r"^flight \d+: scenario 'drawn': command\[0\].end = .*before start"):
-        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+        run_campaign(campaign, ResultStore(out, campaign), Executor())
 
 
 def test_a_vehicle_by_its_name_alone_is_drawn_like_a_table(tmp_path):

@@ -1,10 +1,10 @@
 import logging
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -30,7 +30,9 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
                 killed.append(pids[0])
                 os.kill(killed[0], signal.SIGKILL)
 
-        assert run_campaign(campaign, ResultStore(out, campaign), workers, progress=progress) == campaign.samples
+        assert (
+            run_campaign(campaign, ResultStore(out, campaign), workers, progress=progress).flights == campaign.samples
+        )
     assert killed
     assert out.read_bytes() == results.path.read_bytes()
 
@@ -38,7 +40,7 @@ def test_a_worker_killed_in_mid_campaign_loses_and_doubles_nothing(planned, resu
 @pytest.mark.parametrize("address", ["nonsense", "nowhere://x", "tcp://127.0.0.1", "tcp://h:99999", "inproc://x"])
 def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
     # Without asking anybody: it would take until the end of the tests.
-    monkeypatch.setattr("hsv.flight.campaign.scheduler.ANSWER", 1e6)
+    monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 1e6)
     with (
         pytest.raises(CampaignError, match=f"^scheduler = '{address}': .*expected an address"),
         make_executor(0, address),
@@ -47,7 +49,7 @@ def test_an_address_that_is_none_is_refused_at_once(monkeypatch, address):
 
 
 def test_a_scheduler_that_does_not_answer_is_named_once(monkeypatch, capfd):
-    monkeypatch.setattr("hsv.flight.campaign.scheduler.ANSWER", 0.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.ANSWER", 0.5)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         address = f"127.0.0.1:{silent.getsockname()[1]}"
@@ -66,14 +68,14 @@ def cluster():
 
 
 def test_workers_that_do_not_come_are_waited_for_a_while_and_not_silently(monkeypatch, cluster):
-    monkeypatch.setattr("hsv.flight.campaign.scheduler.WORKERS", 0.5)
+    monkeypatch.setattr("hsv.flight.campaign.executors.WORKERS", 0.5)
     waited = []
     with (
         pytest.raises(CampaignError, match=r"no workers after 0\.5 s"),
-        make_executor(0, cluster.scheduler_address, lambda: waited.append(True)),
+        make_executor(0, cluster.scheduler_address, waited.append),
     ):
         pass
-    assert waited
+    assert waited == ["waiting for the scheduler's workers"]
 
 
 def test_a_lost_scheduler_is_a_failed_run_that_goes_on_later(planned, cluster, out):
@@ -108,10 +110,9 @@ def dask_worker(address, folder, environment, *flags):
 
 def test_a_worker_without_the_program_or_with_another_one_is_refused_by_its_address(cluster, tmp_path):
     other = tmp_path / "other" / "hsv"
-    (other / "campaign").mkdir(parents=True)
-    (other / "__init__.py").write_text("")
-    (other / "campaign" / "__init__.py").write_text("")
-    (other / "campaign" / "program.py").write_text("def program():\n    return 'hsv 0.0.1, sources 0'\n")
+    (other / "flight" / "campaign").mkdir(parents=True)
+    (other / "flight" / "campaign" / "executors.py").write_text("def program():\n    return 'hsv 0.0.1, sources 0'\n")
+    (other / "__init__.py").touch()
     path = os.pathsep.join((str(other.parent), os.environ.get("PYTHONPATH", "")))
     address = cluster.scheduler_address
     # Isolated, Python does not look where the workspace is.
@@ -144,26 +145,48 @@ def length_of(text, batch):
     return str(len(text)).encode()
 
 
-def test_a_batch_that_ends_every_worker_ends_the_campaign_and_not_the_executor():
+def test_a_batch_that_ends_its_worker_is_named_and_ends_the_campaign_and_not_the_executor():
     with make_executor(2) as workers:
-        with pytest.raises(RunError, match="several workers died of the same batch"):
-            list(workers.fly(end_of_the_third, "", range(8)))
+        with pytest.raises(RunError, match=r"^campaign: flight 3: the worker process ended; what is finished is kept$"):
+            list(workers.fly(end_of_the_third, "", range(8), "flight {}".format))
         assert dict(workers.fly(length_of, "text", range(8))) == dict.fromkeys(range(8), b"4")
+
+
+def test_a_stopped_worker_is_reported_and_waited_for(monkeypatch):
+    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 0.5)
+    notices = []
+
+    def go_on(words):
+        notices.append(words)
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGCONT)
+
+    with make_executor(2, notice=go_on) as workers:
+        for pid in workers.pids():
+            os.kill(pid, signal.SIGSTOP)
+        assert dict(workers.fly(length_of, "text", range(3))) == dict.fromkeys(range(3), b"4")
+    assert re.fullmatch(r"waiting for batch 0 and 2 more: stopped worker process \d+, \d+", notices[0])
+
+
+def test_a_campaign_without_dask_workers_says_so_and_goes_on(monkeypatch, cluster):
+    monkeypatch.setattr("hsv.flight.campaign.executors.NOTICE", 1.0)
+    notices = []
+
+    def go_on(words):
+        notices.append(words)
+        cluster.scale(1)
+
+    cluster.scale(1)
+    with make_executor(0, cluster.scheduler_address, go_on) as workers:
+        cluster.scale(0)
+        wait_until(lambda: not cluster.scheduler.workers)
+        assert dict(workers.fly(length_of, "text", range(2))) == dict.fromkeys(range(2), b"4")
+    assert "waiting for batch 0 and 1 more: the scheduler has no workers" in notices
 
 
 def a_large_answer(text, batch):
     """Fly a batch whose content is far more than a pipe holds."""
     return bytes(3_000_000)
-
-
-def test_workers_killed_in_the_middle_of_an_answer_are_replaced():
-    with make_executor(2) as workers:
-        answers = workers.fly(a_large_answer, "", range(6))
-        next(answers)
-        time.sleep(0.3)  # nobody reads: both are in the middle of the next answer
-        for pid in workers.pids():
-            os.kill(pid, signal.SIGKILL)
-        assert sum(len(content) == 3_000_000 for _, content in answers) == 5
 
 
 class UnportableError(Exception):

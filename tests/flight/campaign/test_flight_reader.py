@@ -5,11 +5,10 @@ import pytest
 from flights import components
 
 from hsv.core import lanes
-from hsv.flight.campaign.flight_reader import PIECE, FlightReader
-from hsv.flight.campaign.tube_levels import TubeLevels
+from hsv.flight.campaign.sample_runner import PIECE, FlightReader
 from hsv.flight.closed_loop import fly
 from hsv.flight.metrics import flight_metrics
-from hsv.flight.side_by_side import FlightGroup
+from hsv.flight.side_by_side import FlightGroup, TubeLevels
 
 WIDTH = lanes()
 
@@ -78,9 +77,3 @@ def test_a_flight_that_ends_with_a_piece(lane):
     flights[lane] = diverging(loss)
     assert check(reader_of(parts), flights) == [PIECE if i == lane else 1001 for i in range(WIDTH)]
     assert check(reader_of(parts), [diverging(loss)] * WIDTH) == [PIECE] * WIDTH
-
-
-def test_flights_of_another_length_are_an_error():
-    first = components("case1", duration=1.0)
-    with pytest.raises(ValueError, match="50 steps: expected 100"):
-        reader_of(components("case1", duration=2.0)).read([first, first])

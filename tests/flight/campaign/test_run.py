@@ -12,22 +12,21 @@ from pyarrow import parquet
 from waiting import wait_until
 
 from hsv.base.errors import CampaignError
-from hsv.flight.campaign import run, table
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import capacity, run_campaign
-from hsv.flight.campaign.sample_runner import SampleRunner
+from hsv.flight.campaign.sample_runner import SampleRunner, fly_batch
 from hsv.flight.campaign.store import ResultStore, read_result
 from hsv.flight.campaign.summary import Results
-from hsv.flight.campaign.table import CAMPAIGN, DIGEST, fly_batch
+from hsv.flight.campaign.table import CAMPAIGN, DIGEST
 
 
-class Counting(SerialExecutor):
+class Counting(Executor):
     """Flies here and notes what."""
 
     def __init__(self):
         self.flown = []
 
-    def fly(self, job, text, batches):
+    def fly(self, job, text, batches, *label):
         for batch, content in super().fly(job, text, batches):
             if job is fly_batch:
                 self.flown.append(batch)
@@ -49,7 +48,7 @@ def test_interrupted_twice_and_resumed_gives_the_same_file_and_flies_nothing_twi
             run_campaign(campaign, ResultStore(out, campaign), executor, progress=interrupted_at(flights))
         assert not out.exists()
     run_campaign(campaign, ResultStore(out, campaign), executor)
-    assert executor.flown == list(range(campaign.batches))
+    assert executor.flown == list(range(len(campaign.batches)))
     assert out.read_bytes() == results.path.read_bytes()
     assert sorted(path.name for path in out.parent.iterdir()) == [out.name]
 
@@ -59,12 +58,12 @@ import sys
 from pathlib import Path
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.run import run_campaign
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.store import ResultStore
 campaign = Campaign.from_text(Path(sys.argv[1]).read_text())
 print("ready", flush=True)
 sys.stdin.readline()
-run_campaign(campaign, ResultStore(Path(sys.argv[2]), campaign), SerialExecutor())
+run_campaign(campaign, ResultStore(Path(sys.argv[2]), campaign), Executor())
 """
 
 
@@ -93,13 +92,13 @@ def test_a_killed_process_loses_no_finished_batch(planned, tmp_path, out):
         assert finished
     executor = Counting()
     run_campaign(campaign, store, executor)
-    assert set(executor.flown) == set(range(campaign.batches)) - finished
+    assert set(executor.flown) == set(range(len(campaign.batches))) - finished
     assert np.array_equal(Results(out).column("flight"), np.arange(800))
 
 
 def test_a_finished_campaign_is_not_flown_again(planned, results):
     executor = Counting()
-    assert run_campaign(planned(), ResultStore(results.path, planned()), executor) == 0
+    assert run_campaign(planned(), ResultStore(results.path, planned()), executor).flights == 0
     assert executor.flown == []
 
 
@@ -107,12 +106,12 @@ def test_a_finished_campaign_is_not_flown_again(planned, results):
 def test_another_campaign_does_not_mix_with_one_that_is_there(planned, results, out, change):
     other = planned(**change)
     with pytest.raises(CampaignError, match="holds another campaign"):
-        run_campaign(other, ResultStore(results.path, other), SerialExecutor())
+        run_campaign(other, ResultStore(results.path, other), Executor())
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(planned(), ResultStore(out, planned()), SerialExecutor(), progress=interrupted_at(8))
+        run_campaign(planned(), ResultStore(out, planned()), Executor(), progress=interrupted_at(8))
     with pytest.raises(CampaignError, match="holds another campaign"):
-        run_campaign(other, ResultStore(out, other), SerialExecutor())
-    assert run_campaign(other, ResultStore(out, other), SerialExecutor(), restart=True) == other.samples
+        run_campaign(other, ResultStore(out, other), Executor())
+    assert run_campaign(other, ResultStore(out, other), Executor(), restart=True).flights == other.samples
 
 
 def test_two_processes_do_not_fly_the_same_campaign(planned, out):
@@ -133,7 +132,7 @@ def test_restart_leaves_a_campaign_alone_that_is_being_flown(planned, results, o
                 pass
             refused.append(error)
 
-    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=restart_from_elsewhere)
+    run_campaign(campaign, ResultStore(out, campaign), Executor(), progress=restart_from_elsewhere)
     assert refused
     assert out.read_bytes() == results.path.read_bytes()
     assert list(out.parent.iterdir()) == [out]
@@ -159,7 +158,7 @@ def damage(path, how):
 def test_a_damaged_batch_is_flown_again_and_strangers_are_left_out(planned, results, out, how):
     campaign = planned(samples=44)
     with pytest.raises(KeyboardInterrupt):
-        run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=interrupted_at(32))
+        run_campaign(campaign, ResultStore(out, campaign), Executor(), progress=interrupted_at(32))
     store = ResultStore(out, campaign)
     first = store.folder / "00000000.parquet"
     (store.folder / "foo.parquet").write_text("nothing")
@@ -181,8 +180,8 @@ def test_a_batch_damaged_inside_is_named_and_flown_the_next_time(planned, result
             path.write_bytes(content)
 
     with pytest.raises(CampaignError, match=r"00000001\.parquet: damaged"):
-        run_campaign(campaign, store, SerialExecutor(), progress=spoil)
-    assert run_campaign(campaign, store, SerialExecutor()) == len(campaign.flights(1))
+        run_campaign(campaign, store, Executor(), progress=spoil)
+    assert run_campaign(campaign, store, Executor()).flights == len(campaign.flights(1))
     assert out.read_bytes() == results.path.read_bytes()
 
 
@@ -196,9 +195,9 @@ def test_a_full_disk_is_one_error_and_what_is_finished_is_kept(planned, results,
                 disk.enter_context(files_no_larger_than(20_000))
 
         with pytest.raises(CampaignError, match=r"cannot be written \(File too large\); finished batches are kept"):
-            run_campaign(campaign, ResultStore(out, campaign), SerialExecutor(), progress=fill_the_disk)
+            run_campaign(campaign, ResultStore(out, campaign), Executor(), progress=fill_the_disk)
     assert not list(out.parent.rglob("*.unfinished"))
-    assert run_campaign(campaign, ResultStore(out, campaign), SerialExecutor()) == campaign.samples - flights
+    assert run_campaign(campaign, ResultStore(out, campaign), Executor()).flights == campaign.samples - flights
     assert out.read_bytes() == results.path.read_bytes()
 
 
@@ -248,87 +247,39 @@ def test_what_is_no_result_of_a_campaign_is_refused(tmp_path):
             read_result(tmp_path / name)
 
 
-def test_what_is_to_come_is_expected_from_the_first_batches_which_are_kept(planned, results, out):
-    flown, told = [], []
-
-    class Watched(SerialExecutor):
-        cores = 2
-
-        def fly(self, job, text, batches):
-            flown.append((job.__name__, list(batches)))
-            return super().fly(job, text, flown[-1][1])
-
-    def stop(needed):
-        told.append(needed)
-        raise KeyboardInterrupt
-
-    campaign = planned(samples=132)
-    with pytest.raises(KeyboardInterrupt):
-        run_campaign(campaign, ResultStore(out, campaign), Watched(), expect=stop)
-    run_campaign(campaign, ResultStore(out, campaign), Watched(), expect=told.append)
-    # One batch a core from all over the campaign; both are there when it is told, and are not flown again.
-    assert flown == [
-        *(("time_flight", [0, 1]), ("fly_batch", [0, 2, 1, 3, 4])),
-        *(("time_flight", [0, 1]), ("fly_batch", [1, 3, 4])),
-    ]
-    all_, rest = told
-    assert (all_.flights, all_.cores, rest.flights) == (132, 2, 68)
-    assert all_.wall_time > 0.0 and rest.wall_time > 0.0
-    assert all_.bytes > 132 * 8 * 30
-
-
-def test_what_takes_is_told_by_whole_batches_in_turn(planned):
-    campaign = planned(samples=100)
-    one, all_ = (capacity(campaign, missing, 1, 0.5) for missing in ([3], range(4)))
-    assert (one.flights, one.wall_time, all_.flights, all_.wall_time) == (4, 2.0, 100, 50.0)
-    # A batch is not divided, but the last one is smaller.
-    assert capacity(campaign, range(4), 2, 0.5).wall_time == 32.0
-
-
-def test_the_space_that_is_told_holds_the_batches_and_the_result(planned, out):
-    campaign, told, kept = planned(samples=132), [], []
-    store = ResultStore(out, campaign)
-
-    def weigh(done):
-        kept.append(sum(file.stat().st_size for file in store.folder.glob("*.parquet")))
-
-    run_campaign(campaign, store, SerialExecutor(), expect=told.append, progress=weigh)
-    needed = kept[-1] + out.stat().st_size
-    assert told[0].bytes == pytest.approx(needed, rel=0.1)
-    # As it is told before the first batch.
-    assert capacity(campaign, range(campaign.batches), 1, 0.5).bytes == pytest.approx(needed, rel=0.1)
-
-
-def test_where_batches_take_long_what_is_to_come_is_told_before(planned, out, monkeypatch):
-    monkeypatch.setattr(run, "_LATE", 0.0)
-    campaign, told = planned(), []
+def test_the_capacity_is_announced_once_before_the_first_batch(planned, out):
+    campaign, events = planned(), []
     run_campaign(
         campaign,
         ResultStore(out, campaign),
-        SerialExecutor(),
-        expect=lambda needed: told.append(("expected", needed.flights)),
-        progress=lambda done: told.append(("done", done)),
+        Executor(),
+        expect=lambda needed: events.append(("expected", needed.flights)),
+        progress=lambda done: events.append(("done", done)),
     )
-    assert told == [("expected", 44), ("done", 0), ("done", 32), ("done", 44)]
+    assert events == [("expected", 44), ("done", 0), ("done", 32), ("done", 44)]
 
 
-def test_a_flight_that_takes_long_is_timed_by_a_piece_of_it(planned, monkeypatch):
-    flown = []
-    fly_piece = SampleRunner.fly_piece
+def test_the_expected_time_and_space_are_of_the_missing_batches_and_the_result(planned, results, out):
+    campaign, store = planned(samples=132), ResultStore(out, planned(samples=132))
+    whole, rest = (capacity(campaign, store, Executor(), missing) for missing in (range(5), [3, 4]))
+    assert (whole.flights, whole.cores, rest.flights) == (132, 1, 36)
+    assert whole.wall_time > 0.0 and rest.wall_time > 0.0 and rest.bytes < whole.bytes
+    run_campaign(campaign, store, Executor())
+    kept = sum(len(fly_batch(campaign.text, batch)) for batch in range(5))
+    assert whole.bytes == pytest.approx(kept + out.stat().st_size, rel=0.1)
 
-    def watched(runner, steps):
+
+def test_a_long_flight_is_timed_by_its_first_steps(planned, monkeypatch):
+    flown, measured = [], SampleRunner._time
+
+    def timed(runner, steps):
         flown.append(steps)
-        return fly_piece(runner, steps)
+        return measured(runner, steps)
 
-    monkeypatch.setattr(SampleRunner, "fly_piece", watched)
-    campaign = planned(samples=4)
-    for slow, very_slow, pieces in ((1e9, 1e9, [1, 50]), (1e-9, 1e9, [1, 50, 150]), (1e-9, 1e-9, [1, 50])):
-        monkeypatch.setattr(table, "_SLOW", slow)
-        monkeypatch.setattr(table, "_VERY_SLOW", very_slow)
-        monkeypatch.setattr(table, "_PIECE", 50)
-        table._flight_time.cache_clear()
+    monkeypatch.setattr(SampleRunner, "_time", timed)
+    monkeypatch.setattr("hsv.flight.campaign.sample_runner._FIRST_STEPS", 50)
+    runner = SampleRunner(planned(samples=4))
+    for limit, steps in ((1e9, [1, 50, 150]), (0.0, [1, 50])):
+        monkeypatch.setattr("hsv.flight.campaign.sample_runner._LONG", limit)
         flown.clear()
-        first, second = (float(table.time_flight(campaign.text, core)) for core in (0, 1))
-        assert first == second > 0.0
-        assert flown == pieces
-    table._flight_time.cache_clear()
+        assert runner.flight_time() > 0.0 and flown == steps

@@ -7,12 +7,11 @@ from scipy.stats import qmc
 
 from hsv.base.errors import CampaignError
 from hsv.flight.campaign.campaign import METHODS, plan
-from hsv.flight.campaign.sampling import Sampler
 from hsv.model.vehicle import load_vehicle
 
 
 def draw(campaign):
-    return Sampler(campaign).draw(range(campaign.samples))
+    return campaign.draw(range(campaign.samples))
 
 
 BOUNDS = np.array(list(load_vehicle().uncertainty.values()))
@@ -39,7 +38,7 @@ def test_any_flights_can_be_drawn_without_the_others(planned, method):
     campaign = planned(samples=128, method=method)
     samples, seeds = draw(campaign)
     for flights in (range(32), range(32, 64), range(127, 128), range(1)):
-        some, their_seeds = Sampler(campaign).draw(flights)
+        some, their_seeds = campaign.draw(flights)
         assert np.array_equal(some, samples[flights.start : flights.stop])
         assert np.array_equal(their_seeds, seeds[flights.start : flights.stop])
 
@@ -64,7 +63,7 @@ def test_the_largest_campaign_starts_at_once(planned):
     campaign = planned(samples=10**7)
     tracemalloc.start()
     try:
-        Sampler(campaign).draw(campaign.flights(campaign.batches - 1))
+        campaign.draw(campaign.flights(len(campaign.batches) - 1))
         _, most = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -7,7 +7,7 @@ from flights import components
 
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.envelope import Envelope, signals, window_starts
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, clopper_pearson, distributions, shares, worst_flights
@@ -51,7 +51,7 @@ def lost(tmp_path_factory):
     """A campaign in which flights diverge."""
     campaign = plan("case1_derived_no_notch", samples=10, commit="test")
     out = tmp_path_factory.mktemp("lost") / "lost.parquet"
-    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+    run_campaign(campaign, ResultStore(out, campaign), Executor())
     return Results(out)
 
 
@@ -72,7 +72,7 @@ def test_envelopes_hold_every_flight(results, planned):
     runner, envelope = SampleRunner(planned()), results.envelope
     curves = [
         signals(runner.fly(flight, sample).data().flight_curves)
-        for flight, sample in enumerate(runner.sampler.draw(range(44))[0])
+        for flight, sample in enumerate(runner.campaign.draw(range(44))[0])
     ]
     assert np.array_equal(np.nanmin(envelope.low[:151], axis=0), np.min([c.min(axis=1) for c in curves], axis=0))
     assert np.array_equal(np.nanmax(envelope.high[:151], axis=0), np.max([c.max(axis=1) for c in curves], axis=0))

@@ -3,8 +3,8 @@ import pytest
 from flights import components
 
 from hsv.control.controller import ControllerInput
-from hsv.flight.campaign.tube_levels import TubeLevels
 from hsv.flight.closed_loop import fly
+from hsv.flight.side_by_side import TubeLevels
 
 
 def published_levels(parts, flight):

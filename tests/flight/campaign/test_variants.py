@@ -25,7 +25,7 @@ def test_a_perturbed_flight_has_the_components_of_its_scenario(scenario):
     campaign = plan(scenario, samples=8, seed=5)
     assert campaign.perturbed == tuple(factor.name for factor in campaign.factors)
     runner = SampleRunner(campaign)
-    for flight, sample in enumerate(runner.sampler.draw(range(8))[0]):
+    for flight, sample in enumerate(runner.campaign.draw(range(8))[0]):
         found = runner._components(flight, sample)
         expected = assemble({**campaign.design, **scenario_parameters(campaign.flown(flight, sample))})
         assert same(found.plant.data, expected.plant.data)

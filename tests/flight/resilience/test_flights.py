@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hsv.flight.metrics import FlightData
-from hsv.flight.resilience.campaign import Case, plan
+from hsv.flight.resilience.campaign import plan
 from hsv.flight.resilience.faults import TRIED, Moment
-from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND, Boundary, boundary, distances, runner_of
+from hsv.flight.resilience.flights import ALTITUDE_BAND, ATTITUDE_BAND, Boundary, SubjectRunner, boundary, distances
 
 
 def as_it_is(severity):
@@ -73,7 +73,7 @@ def test_a_flight_that_ends_early_is_compared_as_far_as_it_goes():
 
 def test_the_baseline_is_lost_between_0_525_and_0_55_of_the_elevator():
     campaign, fault = plan(("case1",), ("elevator_loss",)), TRIED["elevator_loss"]
-    runner = runner_of(campaign.text, Case(campaign.subjects[0], "elevator_loss", Moment.after))
+    runner = SubjectRunner(campaign.subjects[0], Moment.after)
     known = {fault.severity(value): runner.survives(fault, fault.severity(value)) for value in (0.9, 0.4)}
     found = boundary(lambda severity: runner.survives(fault, severity), known, 0.02, as_it_is)
     assert 0.525 - 0.02 <= fault.value(found.lost) < fault.value(found.survived) <= 0.55 + 0.02
@@ -82,7 +82,7 @@ def test_the_baseline_is_lost_between_0_525_and_0_55_of_the_elevator():
 
 def test_a_fault_without_effect_leaves_the_flight_where_it_is():
     campaign, fault = plan(("case1",), ("elevator_loss",)), TRIED["elevator_loss"]
-    runner = runner_of(campaign.text, Case(campaign.subjects[0], "elevator_loss", Moment.during))
+    runner = SubjectRunner(campaign.subjects[0], Moment.during)
     flown = runner.outcome("mild", 2, fault, 1.0)
     assert (flown.survived, flown.attitude, flown.altitude, flown.recovery_time) == (True, 0.0, 0.0, 0.0)
     lost = runner.outcome("severe", 0, fault, 0.0)

@@ -4,7 +4,7 @@ import pytest
 from page_checks import PageChecks
 
 from hsv.flight.campaign.campaign import plan
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, within_all
@@ -90,7 +90,7 @@ def test_the_address_says_what_is_shown_and_shows_it(opened):
 def test_what_a_campaign_of_whole_flights_opens_with(browser, screen, tmp_path, pictures):
     campaign = plan("case1", samples=100, seed=1, commit="test")
     out = tmp_path / "case1.parquet"
-    run_campaign(campaign, ResultStore(out, campaign), SerialExecutor())
+    run_campaign(campaign, ResultStore(out, campaign), Executor())
     results, page = Results(out), tmp_path / "case1.html"
     write_page(results, page)
     screen(1280)

@@ -4,9 +4,10 @@ import pytest
 from node_processes import short_scenario
 from page_checks import PageChecks
 
-from hsv.flight.campaign.executors import SerialExecutor
+from hsv.flight.campaign.executors import Executor
+from hsv.flight.campaign.run import run_campaign
 from hsv.flight.resilience.campaign import plan
-from hsv.flight.resilience.run import CaseStore, run_resilience
+from hsv.flight.resilience.store import CaseStore
 from hsv.flight.resilience.summary import ResilienceResults
 from hsv.pages.resilience.page import write_results
 
@@ -17,8 +18,8 @@ pytestmark = pytest.mark.viewer
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("resilience")
     campaign = plan((str(short_scenario(folder, duration=6, fault=2)),), ("elevator_loss", "fuel_loss"))
-    store = CaseStore(folder / "out")
-    run_resilience(campaign, store, SerialExecutor())
+    store = CaseStore(folder / "out", campaign)
+    run_campaign(campaign, store, Executor())
     return write_results(ResilienceResults.read(campaign, store), folder / "out", "hsv resilience")[0]
 
 

@@ -74,7 +74,7 @@ def corners(repeats: int, workers: int) -> list[Figure]:
                 fly_corners(f"{repeat}.parquet")
                 ours.append(time.perf_counter() - started)
                 started = time.perf_counter()
-                list(flying.fly(_fly_c, campaign.text, range(campaign.batches)))
+                list(flying.fly(_fly_c, campaign.text, range(len(campaign.batches))))
                 theirs.append(time.perf_counter() - started)
     what = f"1024 corners of Case 1, {workers} workers"
     against = f"as many flights of the C build, {' '.join(FLAGS)}, alone on as many workers"
@@ -118,7 +118,7 @@ def _pace_c(workers: int, samples: int) -> float:
     with make_executor(workers) as flying:
         list(flying.fly(_build_c, campaign.text, range(workers)))
         started = time.perf_counter()
-        list(flying.fly(_fly_c, campaign.text, range(campaign.batches)))
+        list(flying.fly(_fly_c, campaign.text, range(len(campaign.batches))))
         return samples / (time.perf_counter() - started)
 
 

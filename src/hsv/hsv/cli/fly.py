@@ -397,7 +397,6 @@ def fly(
     """
     from hsv.cli.summary import announce, show_campaign
     from hsv.flight.campaign.campaign import plan
-    from hsv.flight.campaign.capacity import Capacity
     from hsv.flight.campaign.executors import make_executor
     from hsv.flight.campaign.run import run_campaign
     from hsv.flight.campaign.store import ResultStore
@@ -417,29 +416,17 @@ def fly(
         out = Path("campaigns", f"{campaign.scenario_name}_{method}{counted}.parquet")
     check_target(out, "out", ".parquet")
     store = ResultStore(out, campaign)
-    begun: dict[str, float] = {}
-
-    def expect(needed: Capacity) -> None:
-        announce(needed)
-        begun["expected"] = needed.wall_time
-
     with (
         resumable(store.folder),
-        make_executor(workers, scheduler, _waiting) as flying,
-        flights(campaign.scenario_name, campaign.samples) as shown,
+        make_executor(workers, scheduler, errors.print) as flying,
+        flights(campaign.scenario_name, campaign.samples) as progress,
     ):
-
-        def progress(done: int) -> None:
-            begun.setdefault("at", time.perf_counter())
-            shown(done)
-
-        flown = run_campaign(campaign, store, flying, restart=restart, expect=expect, progress=progress)
-        taken = time.perf_counter() - begun.get("at", time.perf_counter())
+        flown = run_campaign(campaign, store, flying, restart=restart, expect=announce, progress=progress)
     # The results are trusted: their code is that of the user's own scenario.
     results = Results(out, trust=True)
-    show_campaign(results, units, json, page, flown)
-    if flown and not json:
-        say(f"flown in {significant(taken)} s, expected: {significant(begun['expected'])} s")
+    show_campaign(results, units, json, page, flown.flights)
+    if flown.flights and not json:
+        say(f"flown in {significant(flown.wall_time)} s, expected: {significant(flown.expected)} s")
     if results.crashed.all():
         raise RunError(f"all {campaign.samples} flights crashed, the first: {results.row(0)['crashed']}")
 
@@ -562,10 +549,6 @@ def _factor(text: str) -> tuple[str, tuple[str, str]]:
     return field.strip(), (low.strip(), high.strip())
 
 
-def _waiting() -> None:
-    errors.print("waiting for the scheduler's workers")
-
-
 def resilience(
     controllers: Annotated[str, Option(help="Scenarios, separated by commas; default: Tube-MPC, robust MPC.")] = "",
     faults: Annotated[str, Option(help="Faults to try, separated by commas; default: all (see --list).")] = "",
@@ -584,9 +567,10 @@ def resilience(
     """
     from hsv.cli.summary import announce
     from hsv.flight.campaign.executors import make_executor
+    from hsv.flight.campaign.run import run_campaign
     from hsv.flight.resilience.campaign import CONTROLLERS, plan
     from hsv.flight.resilience.faults import TRIED
-    from hsv.flight.resilience.run import CaseStore, run_resilience
+    from hsv.flight.resilience.store import CaseStore
     from hsv.flight.resilience.summary import ResilienceResults, parameter_words
     from hsv.pages.resilience.page import write_results
 
@@ -595,25 +579,25 @@ def resilience(
         return
     campaign = plan(_names(controllers) or CONTROLLERS, _names(faults) or tuple(TRIED))
     check_folder(out, "out")
-    store = CaseStore(out)
+    store = CaseStore(out, campaign)
     with (
         resumable(store.folder),
-        make_executor(workers, scheduler, _waiting) as flying,
-        flights("resilience", sum(case.flights for case in campaign.cases)) as progress,
+        make_executor(workers, scheduler, errors.print) as flying,
+        flights("resilience", sum(case.flights for case in campaign.batches)) as progress,
     ):
-        flown = run_resilience(campaign, store, flying, expect=announce, progress=progress)
+        flown = run_campaign(campaign, store, flying, expect=announce, progress=progress)
     results = ResilienceResults.read(campaign, store)
     options = [word for pair in (("--controllers", controllers), ("--faults", faults)) if pair[1] for word in pair]
     written = write_results(results, out, shlex.join(["hsv", "resilience", *options]))
     if json:
-        values = {"cases_flown_now": flown.cases, "flown_in_s": flown.wall_time, "expected_s": flown.expected}
+        values = {"cases_flown_now": flown.batches, "flown_in_s": flown.wall_time, "expected_s": flown.expected}
         print_json({"written": list(map(str, written)), **values, "cells": _cells(results)})
     else:
         names = [subject.name for subject in results.campaign.subjects]
         rows = results.campaign.faults
         cells = [["{} of {}".format(*results.squares[fault, name].survived) for name in names] for fault in rows]
         print_matrix("flights survived", [fault.replace("_", " ") for fault in rows], names, cells)
-        if flown.cases:
+        if flown.batches:
             say(f"flown in {flown.wall_time:.0f} s, expected: {flown.expected:.0f} s")
         say(f"written {', '.join(map(str, written))}")
     crashes = [flight.crashed for flight in results.flights]

@@ -19,7 +19,7 @@ from hsv.flight.metrics import METRICS, Group, in_words, is_share
 from hsv.flight.scenario import Scenario
 
 if TYPE_CHECKING:
-    from hsv.flight.campaign.capacity import Capacity
+    from hsv.flight.campaign.run import Capacity
     from hsv.flight.campaign.summary import Results
 
 _LISTED = 5

@@ -1,11 +1,10 @@
-"""A flight to fly, as written in a TOML file with units, and as the parameters that the components take."""
+"""Scenarios: a flight as a TOML file with units, and as the flat parameters of the components."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any
@@ -23,22 +22,27 @@ from hsv.control.effectiveness import EFFECTIVENESS_PARAMETERS
 from hsv.control.estimator import ESTIMATOR_PARAMETERS
 from hsv.control.library import inside
 from hsv.core.arithmetic import SEED_PARAMETER
-from hsv.flight.commands import Breakpoints, CommandTable, breakpoints, check_envelope
 from hsv.flight.distribution import KINDS, Distribution
-from hsv.flight.fields import Reading, Table, Time
 from hsv.flight.metrics import METRICS
 from hsv.flight.tables import (
+    Breakpoints,
+    CommandTable,
     FaultTable,
     InitialTable,
     IntegralTable,
     NominalTable,
     NotchTable,
+    Reading,
     ReferenceTable,
     RobustMpcTable,
+    Table,
+    Time,
     TubeTable,
     VehicleTable,
+    breakpoints,
+    check_envelope,
+    tables_in,
 )
-from hsv.flight.values import fault_tables, number, own_value, tables_in
 from hsv.model.faults.injector import NEVER_TIME, written_parameters
 from hsv.model.faults.table import Fault
 from hsv.model.links import COMMAND_LINK_PARAMETERS
@@ -52,12 +56,12 @@ from hsv.model.vehicle import (
 
 
 class Scenario(Table):
-    """A flight: vehicle, initial point, commands, controller design, faults, and what is expected of it."""
+    """A flight: vehicle, initial point, commands, controller and its design, faults, and limits of metrics."""
 
     name: str
     title: str
     design: str = "baseline"
-    """Name or path; empty: none"""
+    """Name or path of the controller's design; empty: none"""
     controller: str = "tube_mpc"
     """A registered name, ``package.module:Class``, or ``path/lib.so:symbol``, the path absolute"""
     duration: Time
@@ -72,21 +76,21 @@ class Scenario(Table):
     robust_mpc: RobustMpcTable = RobustMpcTable()
     fault: tuple[FaultTable, ...] = ()
     seed: Annotated[StrictInt, Field(ge=0, le=SEED_PARAMETER.maximum)] = 0
-    """Key of all that is random"""
+    """Key of all random numbers"""
     equipment: dict[str, Any] = Field(default_factory=dict)
-    """Parameters of what is not ideal, SI; in a file, tables of actuators, air, sensors, links and estimators"""
+    """Parameters of real hardware, SI; in a file, the tables of actuators, air, sensors, links and estimators"""
     own: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Tables of a controller of one's own, as written: its class says what they mean, and reading loads no class"""
+    """Tables of a custom controller, as written; only its class, which is not loaded here, knows their meaning"""
     limits: dict[str, float] = Field(default_factory=dict)
-    """Largest magnitude expected of a metric, SI."""
+    """Largest admissible magnitude of a metric, SI"""
 
     @property
     def commands(self) -> Breakpoints:
-        """Altitudes (m) and velocities (m/s) that are commanded."""
+        """The commanded altitudes (m) and velocities (m/s)."""
         return breakpoints(self.initial.altitude, self.initial.velocity, self.command)
 
     def parameters(self) -> dict[str, Any]:
-        """Return the flat parameters of this scenario but those of a controller of one's own.
+        """Return the flat parameters of this scenario, without those of a custom controller.
 
         With those (:func:`hsv.flight.assembly.scenario_parameters`) and the design's they determine the flight.
         """
@@ -114,7 +118,7 @@ class Scenario(Table):
         if self.tube.tau:
             values["feedback.tau"] = list(self.tube.tau)
         if self.tube.change:
-            # Flat parameters are of one kind: five factors a change.
+            # A flat parameter is a list of one type: five factors per change.
             values["tau_change.starts"] = [change.start for change in self.tube.change]
             values["tau_change.values"] = [
                 tau for change in self.tube.change for tau in rigid_factors(change.tau, "tube.change.tau").tolist()
@@ -129,7 +133,7 @@ class Scenario(Table):
 
 
 PERIOD = 0.02
-"""Control period, s, until a design defines it; whether equipment is consistent does not depend on it."""
+"""Control period, s, with which equipment is checked before the design is known; the result does not depend on it."""
 
 _EQUIPMENT_PARAMETERS = (
     *EQUIPMENT_PARAMETERS,
@@ -139,16 +143,16 @@ _EQUIPMENT_PARAMETERS = (
 )
 
 EQUIPMENT = frozenset(parameter.name.partition(".")[0] for parameter in _EQUIPMENT_PARAMETERS)
-"""Tables of what is ideal unless they say otherwise, and of the estimators, of the state and of the effectiveness."""
+"""Tables of hardware, which is ideal by default, and of the estimators of the state and of the effectiveness."""
 
 _NO_KEYS = ("name", "own", "equipment")
-"""Fields that a file has not, or has otherwise."""
+"""Fields that are not keys of a file."""
 
-_OF_A_CONTROLLER = ("tube", "integral", "effectiveness", "robust_mpc")
-"""Tables of the bench's own controllers."""
+_CONTROLLER_TABLES = ("tube", "integral", "effectiveness", "robust_mpc")
+"""Tables of the shipped controllers."""
 
 REPLACED = ("limits",)
-"""Tables that a scenario does not share with the one it extends: what is expected of a flight is its own."""
+"""Tables that a scenario does not share with the one it extends."""
 
 
 def scenario_names() -> list[str]:
@@ -157,9 +161,9 @@ def scenario_names() -> list[str]:
 
 
 def scenario_text(name: str) -> str:
-    """Return the text of a shipped scenario (by name) or of a file (by path), which stands alone.
+    """Return the complete text of a shipped scenario (by name) or of a file (by path).
 
-    What it extends is written out, and a vehicle that is not a shipped one; the path of a library is absolute.
+    The scenarios that it extends are written out, and a vehicle that is not shipped; the path of a library is absolute.
 
     Raises:
         ScenarioError: No such scenario, file or vehicle, it cannot be read, or a path leads out of its folder.
@@ -174,9 +178,9 @@ def scenario_text(name: str) -> str:
 
 
 def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return the table of a file with the paths of library and vehicle from where we are, as those of a shipped one.
+    """Return the table of a file with the paths of library and vehicle relative to the working directory.
 
-    A vehicle that is named replaces the definition of the one that the scenario would take from another.
+    A named vehicle replaces the definition of the vehicle that the scenario would inherit.
     """
     folder = Path(name).parent if is_path(name) else Path()
     controller, vehicle = table.get("controller"), table.get("vehicle", {})
@@ -193,11 +197,7 @@ def _located(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a scenario with its vehicle written out, if it is not a shipped one.
-
-    Raises:
-        ScenarioError: There is no such vehicle.
-    """
+    """Return a scenario with its vehicle written out, unless it is a shipped one."""
     vehicle = {key: value for key, value in table.get("vehicle", {}).items() if value is not None}
     place = vehicle.get("name", DEFAULT_VEHICLE)
     if "definition" not in vehicle and place not in SHIPPED_VEHICLES:
@@ -209,7 +209,8 @@ def _with_definition(table: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _refused(name: str, why: object) -> ScenarioError:
-    return ScenarioError(f"scenario {Path(name).stem!r}: {why}")
+    """Return the error of a scenario, by name or path."""
+    return ScenarioError(f"scenario {(Path(name).stem if is_path(name) else name)!r}: {why}")
 
 
 def _own_text(name: str) -> str:
@@ -224,10 +225,10 @@ def _own_text(name: str) -> str:
 
 
 def scenario_table(text: str, name: str) -> dict[str, Any]:
-    """Return the table of a scenario's ``text``, its vehicle a table in it.
+    """Return the table of a scenario's ``text``; a vehicle given by its name becomes a table.
 
     Raises:
-        ScenarioError: It is no TOML, or the vehicle is none, or the controller no name.
+        ScenarioError: The text is not TOML, or vehicle or controller have a wrong type.
     """
     try:
         table = parse_toml(text)
@@ -239,7 +240,7 @@ def scenario_table(text: str, name: str) -> dict[str, Any]:
 
 
 def _with_named_vehicle(table: dict[str, Any], name: str) -> dict[str, Any]:
-    """Return a scenario with a vehicle that is given by its name alone as a table."""
+    """Return a scenario in which the vehicle is a table, even if it is given by its name alone."""
     vehicle = table.get("vehicle", {})
     if isinstance(vehicle, str):
         vehicle = {"name": vehicle}
@@ -257,10 +258,11 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
 
     Args:
         name: Name or path.
-        changes: Values as a file has them, with their units, by field, such as ``{"fault[0].effectiveness": 0.8}``.
+        changes: Values as written in a file, with units, by field, such as ``{"fault[0].effectiveness": 0.8}``.
 
     Raises:
-        ScenarioError: Missing, or a field is wrong; the message names it, its value and what was expected.
+        ScenarioError: There is no such scenario, or a field is wrong; the message names it, its value and the
+            expectation.
     """
     text = scenario_text(name)
     if changes:
@@ -277,10 +279,10 @@ def load_scenario(name: str, changes: Mapping[str, object] | None = None) -> Sce
 
 
 def set_field(table: dict[str, Any], field: str, value: object, name: str) -> None:
-    """Put a value, as a file has it, in the place of a ``field`` of the scenario in ``table``.
+    """Set a ``field`` of the scenario in ``table`` to a value as written in a file.
 
     Raises:
-        ScenarioError: There is no such place in the scenario, which is called ``name``.
+        ScenarioError: The scenario, which is called ``name``, has no such field.
     """
     *path, key = (int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", field))
     place: Any = table
@@ -297,14 +299,14 @@ def set_field(table: dict[str, Any], field: str, value: object, name: str) -> No
 
 
 def with_controller(text: str, controller: str, name: str) -> str:
-    """Return a scenario's ``text`` with another controller, without the tables of the controller that it had.
+    """Return a scenario's ``text`` with another controller, without the tables of the former one.
 
     Raises:
-        ScenarioError: ``text``, the scenario called ``name``, is no TOML.
+        ScenarioError: The text of the scenario called ``name`` is not TOML.
     """
     table = scenario_table(text, name)
-    left = {key: value for key, value in table.items() if key not in (*_OF_A_CONTROLLER, *_own_tables(table))}
-    return tomli_w.dumps(left | {"controller": controller})
+    kept = {key: value for key, value in table.items() if key not in (*_CONTROLLER_TABLES, *_custom_tables(table))}
+    return tomli_w.dumps(kept | {"controller": controller})
 
 
 def parse_scenario(text: str, name: str) -> Scenario:
@@ -312,60 +314,63 @@ def parse_scenario(text: str, name: str) -> Scenario:
     scenario, drawn = scenario_at_means(scenario_table(text, name), name)
     if drawn:
         field = next(iter(drawn))
-        raise ScenarioError(
-            f"scenario {name!r}: {field}: a distribution, which hsv montecarlo draws; expected a number"
-        )
+        raise _refused(name, f"{field}: a distribution, which hsv montecarlo draws; expected a number")
     return scenario
 
 
 def scenario_at_means(table: dict[str, Any], name: str) -> tuple[Scenario, dict[str, Distribution]]:
-    """Return the scenario in ``table`` with the mean of each distribution in its place, and these by field.
+    """Return the scenario in ``table`` with the mean of each distribution, and the distributions by field.
 
     Raises:
-        ScenarioError: As :func:`load_scenario`; or the vehicle is in another file: nothing is read from one.
+        ScenarioError: As :func:`load_scenario`; or the vehicle is in another file, which is not read.
     """
-    whole = table
+    complete = table
     vehicle = table.get("vehicle", {})
     if is_path(vehicle.get("name", "")) and "definition" not in vehicle:
-        raise ScenarioError(
-            f"scenario {name!r}: vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition"
-        )
+        raise _refused(name, f"vehicle.name = {vehicle['name']!r}: expected a registered name, or a definition")
     for key in _NO_KEYS:
         if key in table:
             why = ", a scenario is called by its file" if key == "name" else ""
-            raise ScenarioError(f"scenario {name!r}: {key}: unknown key{why}")
+            raise _refused(name, f"{key}: unknown key{why}")
     equipment = {key: value for key, value in table.items() if key in EQUIPMENT}
-    own = _own_tables(table)
+    own = _custom_tables(table)
     table = {key: value for key, value in _with_definition(table, name).items() if key not in (own | equipment)}
     vehicle = {"coupling": "", **table.get("vehicle", {})}
     try:
         reading = Reading(VehicleTable.model_construct(**vehicle).described)
-        found = reading.drawn
-        own = {key: {k: own_value(f"{key}.{k}", v, found) for k, v in entries.items()} for key, entries in own.items()}
+        faults = table.get("fault", ())
         given = {
             **table,
             "name": name,
-            "own": own,
-            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, partial(number, found)),
-            "fault": fault_tables(table.get("fault", ()), found),
+            "own": {
+                key: {k: reading.custom_value(f"{key}.{k}", value) for k, value in entries.items()}
+                for key, entries in own.items()
+            },
+            "equipment": table_values(_EQUIPMENT_PARAMETERS, equipment, reading.number),
+            "fault": [
+                reading.fault(f"fault[{i}]", row) if isinstance(row, dict) else row for i, row in enumerate(faults)
+            ]
+            if isinstance(faults, list | tuple)
+            else faults,
             "limits": _limits(table.get("limits", {})),
             "vehicle": vehicle,
         }
         scenario = Scenario.model_validate(given, context=reading)
         _check(scenario)
     except ValidationError as error:
-        raise ScenarioError(f"scenario {name!r}: {_first_problem(error)}") from error
+        raise _refused(name, _first_problem(error)) from error
     except HsvError as error:
-        raise ScenarioError(f"scenario {name!r}: {error}") from error
-    return scenario, {field: found[id(place)] for field, place in tables_in(whole) if id(place) in found}
+        raise _refused(name, error) from error
+    drawn = reading.drawn
+    return scenario, {field: drawn[id(place)] for field, place in tables_in(complete) if id(place) in drawn}
 
 
 def _shipped() -> Any:
     return files("hsv.flight").joinpath("scenarios")
 
 
-def _own_tables(table: dict[str, Any]) -> dict[str, Any]:
-    """Return the tables of a controller of one's own."""
+def _custom_tables(table: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a custom controller."""
     if table.get("controller", Scenario.model_fields["controller"].default) in SHIPPED_CONTROLLERS:
         return {}
     known = Scenario.model_fields.keys() | EQUIPMENT
@@ -420,7 +425,7 @@ def _check(scenario: Scenario) -> None:
 
 
 def _check_starts(scenario: Scenario) -> None:
-    """Refuse what the flight would never come to."""
+    """Refuse commands, changes and faults that begin after the end of the flight."""
     starts = {
         "command": [command.start for command in scenario.command],
         "tube.change": [change.start for change in scenario.tube.change],
@@ -448,7 +453,7 @@ _DUE = {
     "greater_than_equal": "at least {ge}",
     "less_than_equal": "at most {le}",
 }
-"""Expectations by the type of a problem that pydantic finds; other problems have a message of their own."""
+"""Expectations by pydantic's type of a problem; the other types have a message of their own."""
 
 
 def _first_problem(error: ValidationError) -> str:
@@ -461,7 +466,7 @@ def _first_problem(error: ValidationError) -> str:
     if problem["type"] == "missing":
         return f"{field}: missing"
     if problem["type"] == "value_error":
-        # The cause begins with the field's own name: the path of the field says more.
+        # The message begins with the name of the field; its path is clearer.
         _, equals, rest = str(problem["ctx"]["error"]).partition(" = ")
         return f"{field}{equals}{rest}"
     due = _DUE.get(problem["type"]) or problem["msg"].removeprefix("Input should be ")

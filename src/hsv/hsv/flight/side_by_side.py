@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from hsv import core
 from hsv.base.processes import over_threads
-from hsv.core import Struct, lanes
+from hsv.control.tube_law import TubeLaw
+from hsv.core import Struct, doubles, lanes, lib, vector
 from hsv.flight.closed_loop import Components, flight_struct, fly, is_ideal
 from hsv.flight.flight import Flight, flight_of
 from hsv.flight.history import History
+from hsv.flight.metrics import FlightData
 from hsv.model.faults.table import ENGINE_SIDE
 
 Result = TypeVar("Result")
@@ -69,6 +72,26 @@ class FlightGroup:
     def worst(self, i: int) -> float:
         """Return the greatest level so far of the flight in a lane."""
         return float(self._flights[i].pointer.worst)
+
+
+class TubeLevels:
+    """Levels in the invariant set of one design, for flights with its notch filter and a tube law."""
+
+    def __init__(self, parts: Components) -> None:
+        """Read the set from the tube law among the components of the flights, if it is one."""
+        law, notch = parts.controller, parts.notch_filter
+        tube = law.design.tube if isinstance(law, TubeLaw) and notch.sections == law.design.notch else None
+        self.set: Struct | None = None
+        """The set as the core takes it; None if no set holds for the flights"""
+        if tube:
+            self.set = Struct("hsv_tube_set", SimpleNamespace(notch=notch.data, shape=tube.shape, centre=tube.centre))
+
+    def worst(self, flight: FlightData) -> float | None:
+        """Return the largest level (e - c)' P (e - c) of the flight, None if no set holds for it."""
+        if not self.set:
+            return None
+        given = [doubles(vector(each)) for each in (flight.state, flight.deviation, flight.reference)]
+        return float(lib.hsv_worst_level(self.set.pointer, len(flight.state), *given))
 
 
 def fly_group(group: FlightGroup, components: Sequence[Components]) -> list[Flight]:

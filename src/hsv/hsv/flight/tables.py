@@ -1,26 +1,207 @@
-"""The tables of a scenario's file, each with its fields, their units and what they may be."""
+"""The tables of a scenario file: each field with its unit and range; quantities are read as SI numbers.
+
+A distribution may stand in place of a number. It is read as its mean, and recorded in the context of the validation.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, StrictBool, StrictInt
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StrictBool,
+    StrictInt,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
-from hsv.flight.fields import Coupling, Frequencies, Numbers, Table, Time, enveloped, quantity, relative_change
+from hsv.base.errors import ParameterError, QuantityError, ScenarioError, did_you_mean
+from hsv.base.parameters import Parameter, limits_in_words, read_number
+from hsv.base.units import has_unit, parse_quantity, rounded, si_unit_of, to_paper, written
+from hsv.flight.distribution import Distribution, read_distribution
+from hsv.model.faults.table import fault_parameters
 from hsv.model.vehicle import DEFAULT_VEHICLE, Vehicle, load_vehicle, parse_vehicle
 
-Change = Annotated[float, relative_change(-0.9, 10.0, shown="-90 % to +1000 %")]
+
+@dataclass(frozen=True)
+class Reading:
+    """The context in which a scenario is validated."""
+
+    vehicle: Vehicle
+    """The scenario's vehicle, with its flight envelope and its sets of inertial coupling"""
+    drawn: dict[int, Distribution] = field(default_factory=dict)
+    """Distributions, by the identity of the table in which they are written"""
+
+    def distribution(self, table: dict[str, Any], unit: str, name: str, *, whole: bool = False) -> Distribution:
+        """Return the distribution in ``table``, and record it.
+
+        Raises:
+            QuantityError: The table is no distribution of a quantity in ``unit``; the message begins with ``name``.
+        """
+        found = self.drawn[id(table)] = read_distribution(table, unit, name, whole=whole)
+        return found
+
+    def number(self, parameter: Parameter, value: object, name: str) -> float:
+        """Return a number in a file, or the mean of a distribution in its place.
+
+        Raises:
+            ScenarioError, ParameterError, QuantityError: The ``parameter`` does not admit it.
+        """
+        if not isinstance(value, dict):
+            return read_number(parameter, value, name)
+        drawn = self.distribution(value, parameter.unit or "1", name, whole=parameter.whole)
+        if not parameter.minimum <= drawn.low < drawn.high <= parameter.maximum:
+            limits = limits_in_words(parameter, next(iter(value.values()))[0])
+            raise ScenarioError(f"{name} = {value!r}: expected all values{limits}")
+        return drawn.middle
+
+    def custom_value(self, name: str, value: object) -> Any:
+        """Return an entry of a custom controller's table, with means in place of distributions.
+
+        Only the controller's class knows the unit; a distribution has that of its first value.
+        """
+        if isinstance(value, list):
+            return [self.custom_value(name, entry) for entry in value]
+        if not isinstance(value, dict):
+            return value
+        pair = next(iter(value.values()), None)
+        first = pair[0] if isinstance(pair, list) and pair else None
+        drawn = self.distribution(value, si_unit_of(first), name)
+        return written(drawn.middle, drawn.unit)
+
+    def fault(self, name: str, row: dict[str, Any]) -> dict[str, Any]:
+        """Return a fault in a file as :class:`FaultTable` has it, its parameters in a table of their own.
+
+        Raises:
+            ScenarioError, QuantityError: Names the field that is wrong.
+        """
+        common = {key: row[key] for key in FaultTable.model_fields if key in row and key != "parameters"}
+        channel, kind = (row.get(key) for key in ("channel", "type"))
+        if not (isinstance(channel, str) and isinstance(kind, str)):
+            return common  # the model refuses it
+        try:
+            known = {parameter.name: parameter.of(channel) for parameter in fault_parameters(channel, kind)}
+        except ParameterError as error:
+            raise ScenarioError(str(error).replace("fault.", f"{name}.", 1)) from error
+        parameters = {}
+        for key, value in row.items():
+            if key in common:
+                continue
+            if key not in known:
+                expected = (*known, *(each for each in FaultTable.model_fields if each != "parameters"))
+                raise ScenarioError(
+                    f"{name}.{key}: unknown key, expected one of {', '.join(expected)}{did_you_mean(key, expected)}"
+                )
+            parameters[key] = self.number(known[key], value, f"{name}.{key}")
+        return {**common, "parameters": parameters}
+
+
+def _reading(info: ValidationInfo) -> Reading:
+    assert isinstance(info.context, Reading)
+    return info.context
+
+
+def quantity(
+    unit: str, low: float | None = None, high: float | None = None, shown: str = "", *, bare: bool = True
+) -> BeforeValidator:
+    """Return a validator of a quantity in ``unit`` from ``low`` to ``high`` (SI).
+
+    Args:
+        unit: SI unit.
+        low: Least admissible value; None: any.
+        high: Largest admissible value; None: any.
+        shown: The range in words.
+        bare: Whether a number without a unit is admissible; 5 might mean 5 %, and would be read as 500 %.
+    """
+
+    def parse(text: object, info: ValidationInfo) -> float:
+        ends, value = _ends_and_mean(text, unit, info)
+        for given in next(iter(text.values())) if isinstance(text, dict) else (text,):
+            if not bare and not has_unit(given):
+                raise QuantityError(f"{info.field_name} = {given!r}: the unit is missing, expected one such as '+5 %'")
+        if (low is not None and ends[0] < low) or (high is not None and ends[1] > high):
+            raise QuantityError(f"{info.field_name} = {text!r}: expected {shown}")
+        return value
+
+    return BeforeValidator(parse)
+
+
+def enveloped(axis: str, unit: str) -> BeforeValidator:
+    """Return a validator of an altitude or a velocity inside the envelope of the scenario's vehicle."""
+
+    def parse(text: object, info: ValidationInfo) -> float:
+        ends, value = _ends_and_mean(text, unit, info)
+        low, high = getattr(_reading(info).vehicle, f"{axis}_range")
+        if not low <= ends[0] <= ends[1] <= high:
+            raise QuantityError(f"{axis} = {text!r}: expected {envelope((low, high), unit)}")
+        return value
+
+    return BeforeValidator(parse)
+
+
+def quantities(unit: str) -> BeforeValidator:
+    """Return a validator of one or several quantities in ``unit``."""
+
+    def parse(given: object, info: ValidationInfo) -> tuple[float, ...]:
+        texts = given if isinstance(given, list | tuple) else [given]
+        return tuple(_ends_and_mean(text, unit, info)[1] for text in texts)
+
+    return BeforeValidator(parse)
+
+
+def envelope(limits: tuple[float, float], unit: str) -> str:
+    """Return the limits (SI) of the flight envelope on an axis with this SI ``unit`` in words, in feet."""
+    low, high = (to_paper(limit, unit) for limit in limits)
+    return f"{low[0]:.0f} {low[1]} to {high[0]:.0f} {high[1]}, the flight envelope"
+
+
+def _ends_and_mean(text: object, unit: str, info: ValidationInfo) -> tuple[tuple[float, float], float]:
+    """Return the least and the largest value of a number or distribution, and the mean, in ``unit``."""
+    name = str(info.field_name)
+    if isinstance(text, dict):
+        drawn = _reading(info).distribution(text, unit, name)
+        return (drawn.low, drawn.high), drawn.middle
+    value = parse_quantity(text, unit, name)
+    return (value, value), value
+
+
+def _coupling(given: object, info: ValidationInfo) -> str:
+    """Return a set of inertial coupling of the scenario's vehicle, or a multiple of the derived set."""
+    vehicle = _reading(info).vehicle
+    if isinstance(given, dict):
+        (least, _), given = _ends_and_mean(given, "1", info)
+        vehicle.coupling_name(least)
+    return vehicle.coupling_name(given)
+
+
+Coupling = Annotated[str, BeforeValidator(_coupling)]
+Change = Annotated[float, quantity("1", -0.9, 10.0, shown="-90 % to +1000 %", bare=False)]
+Time = Annotated[float, quantity("s", 0.0, 1e5, shown="a time from 0 s to 100000 s")]
+Frequencies = Annotated[tuple[float, ...], quantities("rad/s")]
+Numbers = Annotated[tuple[float, ...], quantities("1")]
+
+
+class Table(BaseModel):
+    """A table of a scenario; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class VehicleTable(Table):
     """The simulated vehicle; ``vehicle = "glider"`` in place of the table gives the name alone."""
 
     name: str = DEFAULT_VEHICLE
-    """Registered, or the path of a file; what ``definition`` is called where there is one"""
+    """Registered name or path of a file; the name of ``definition`` if there is one"""
     definition: dict[str, Any] = Field(default_factory=dict)
-    """The contents of the vehicle's file, which a scenario takes along wherever it goes; none of a shipped one"""
+    """The contents of the vehicle's file, which travel with the scenario; empty for a shipped vehicle"""
     model: Literal["CM", "DM"] = "CM"
     coupling: Coupling = ""
     perturbation: dict[str, Change] = Field(default_factory=dict)
@@ -44,15 +225,43 @@ class InitialTable(Table):
     velocity: Annotated[float, enveloped("velocity", "m/s")]
 
 
+class CommandTable(Table):
+    """A change of the commands: a step at ``start``, or a ramp from there to a later ``end``."""
+
+    altitude_change: Annotated[float, quantity("m")] = 0.0
+    velocity_change: Annotated[float, quantity("m/s")] = 0.0
+    start: Time = 0.0
+    end: Time = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _end_defaults_to_start(cls, data: Any) -> Any:
+        return {"end": data["start"], **data} if isinstance(data, dict) and "start" in data else data
+
+    @field_validator("end")
+    @classmethod
+    def _end_is_not_before_start(cls, end: float, info: ValidationInfo) -> float:
+        start = info.data.get("start", 0.0)
+        if end < start:
+            raise QuantityError(f"end = {end:g} s: expected no time before start, {start:g} s")
+        return end
+
+    def share(self, time: float) -> float:
+        """Return the share of the change that is commanded at ``time`` (s)."""
+        if time >= self.end:
+            return 1.0
+        return max(0.0, (time - self.start) / (self.end - self.start)) if self.end > self.start else 0.0
+
+
 class ReferenceTable(Table):
-    """The equilibrium of a ramp, that of the climb or as if its point stood; half the time of a blended corner."""
+    """The reference: trim of a ramp, that of the climb or of a standing point; half the time of a blended corner."""
 
     trim: Literal["climbing", "static"] = "climbing"
     blend: Time = 0.0
 
 
 class NotchTable(Table):
-    """The notch filter in flight: the design's, but for what is given here, one value or one a section."""
+    """The notch filter in flight: values that replace those of the design, one value or one per section."""
 
     enabled: StrictBool = True
     zero_frequency: Frequencies = ()
@@ -62,7 +271,7 @@ class NotchTable(Table):
 
 
 class NominalTable(Table):
-    """Law for the nominal input."""
+    """The law of the nominal input."""
 
     law: Literal["family", "kothare_online", "qp"] = "family"
 
@@ -75,7 +284,7 @@ class TauChangeTable(Table):
 
 
 class TubeTable(Table):
-    """The tube's feedback: its factor, the design's where none is given, and its changes; one value, or five."""
+    """The tube's feedback: its factor (by default the design's) and changes of it; one value, or five."""
 
     tau: Numbers = ()
     change: tuple[TauChangeTable, ...] = ()
@@ -94,11 +303,69 @@ class RobustMpcTable(Table):
 
 
 class FaultTable(Table):
-    """A scheduled fault; in a file its parameters stand beside the rest."""
+    """A scheduled fault; in a file its parameters stand next to the other keys."""
 
     channel: str
     type: str
     start: Time
     stop: Time | None = None
     parameters: dict[str, float] = Field(default_factory=dict)
-    """Parameters of the fault type, SI."""
+    """Parameters of the fault type, SI"""
+
+
+class Breakpoints(NamedTuple):
+    """The reference: times (s), altitudes (m), velocities (m/s), linear between; two equal times are a step."""
+
+    times: tuple[float, ...]
+    altitudes: tuple[float, ...]
+    velocities: tuple[float, ...]
+
+
+def breakpoints(altitude: float, velocity: float, commands: Sequence[CommandTable]) -> Breakpoints:
+    """Return the reference from an initial ``altitude`` (m) and ``velocity`` (m/s) along the ``commands``.
+
+    A step at t = 0 is one breakpoint: the reference begins at its end.
+    """
+    rows: list[tuple[float, float, float]] = []
+    for time in sorted({t for c in commands for t in (c.start, c.end)} or {0.0}):
+        shares = [c.share(time) for c in commands]
+        before = [0.0 if c.start == c.end == time else share for c, share in zip(commands, shares, strict=True)]
+        for acting in [before, shares] if time > 0.0 and before != shares else [shares]:
+            # An explicit sum: from Python 3.12 on, sum() adds numbers with compensation.
+            climbed = gained = 0.0
+            for share, c in zip(acting, commands, strict=True):
+                climbed += share * c.altitude_change
+                gained += share * c.velocity_change
+            rows.append((time, rounded(altitude + climbed), rounded(velocity + gained)))
+    times, altitudes, velocities = zip(*rows, strict=True)
+    return Breakpoints(times, altitudes, velocities)
+
+
+def check_envelope(reference: Breakpoints, commands: Sequence[CommandTable], vehicle: Vehicle) -> None:
+    """Refuse commands that lead out of the flight envelope of ``vehicle``.
+
+    Raises:
+        ScenarioError: Names the command.
+    """
+    ranges = vehicle.altitude_range, vehicle.velocity_range
+    axes = zip(("altitude", "velocity"), reference[1:], ranges, ("m", "m/s"), strict=True)
+    for axis, goals, limits, unit in axes:
+        for time, goal in zip(reference.times, goals, strict=True):
+            if not limits[0] <= goal <= limits[1]:
+                acting = [i for i, c in enumerate(commands) if c.share(time) and getattr(c, f"{axis}_change")]
+                shown, paper = to_paper(goal, unit)
+                raise ScenarioError(
+                    f"command[{acting[-1]}].{axis}_change leads to {shown:.0f} {paper} at {time:g} s: "
+                    f"expected {envelope(limits, unit)}"
+                )
+
+
+def tables_in(value: object, name: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield every table in ``value``, with the name of its field."""
+    if isinstance(value, dict):
+        yield name, value
+        for key, entry in value.items():
+            yield from tables_in(entry, f"{name}.{key}" if name else key)
+    elif isinstance(value, list):
+        for index, entry in enumerate(value):
+            yield from tables_in(entry, f"{name}[{index}]")

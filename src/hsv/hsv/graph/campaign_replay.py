@@ -14,8 +14,7 @@ from hsv.bags.description import TUBE_STATUS
 from hsv.base.errors import CampaignError, ControllerError
 from hsv.control.design import find_design, read_parameters
 from hsv.control.estimator import ESTIMATOR_ENABLED
-from hsv.flight.campaign.flight_reader import FlightReading
-from hsv.flight.campaign.sample_runner import Outcome
+from hsv.flight.campaign.sample_runner import FlightReading, Outcome
 from hsv.flight.campaign.summary import Results
 from hsv.flight.campaign.table import OUTCOMES
 from hsv.flight.trust import require_path_inside
@@ -49,7 +48,7 @@ def replay_in_process(results: Results, flight: int) -> ReplayedFlight:
         data = flown.data()
         repeated = runner.outcome(FlightReading.of(data, runner.level(data), flown.fingerprint))
     except ControllerError as error:
-        repeated = runner.crashed(error)
+        repeated = runner.outcome(error)
     return ReplayedFlight(flight, _outcome(row), repeated)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from hsv.base.units import FOOT, to_paper
 from hsv.flight.assembly import assemble
 from hsv.flight.closed_loop import fly
-from hsv.flight.commands import breakpoints
+from hsv.flight.tables import breakpoints
 from hsv.model.actuators import ACTUATOR_SETS
 from hsv.model.plant import FlightStatus
 from hsv.model.signals import STATE_NAMES

@@ -9,8 +9,8 @@ import numpy as np
 from hsv.base.processes import Progress
 from hsv.base.units import to_paper
 from hsv.control.design import find_design, read_parameters
-from hsv.flight.commands import CommandTable
 from hsv.flight.scenario import load_scenario
+from hsv.flight.tables import CommandTable
 from hsv_paper.figures.style import BLUE, GREEN, GREY, ORANGE, letter, new_figure
 from hsv_paper.sensitivity.controllers import Controller, corners_of, said_corners
 from hsv_paper.sensitivity.study import Outcome, Study, grid

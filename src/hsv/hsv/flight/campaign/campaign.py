@@ -2,35 +2,70 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
+import numpy as np
 import tomli_w
 
 from hsv.base.errors import CampaignError
 from hsv.base.files import parse_json
+from hsv.base.units import percent, rounded, written
 from hsv.control.library import library_digest
 from hsv.core.arithmetic import SEED_PARAMETER
 from hsv.flight.assembly import assemble, blamed_on, design_parameters, scenario_parameters
-from hsv.flight.campaign.factors import Factor, check_factors, factors_of, flown_table, with_factors
-from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text
+from hsv.flight.distribution import KINDS, Distribution
+from hsv.flight.scenario import Scenario, scenario_at_means, scenario_table, scenario_text, set_field
+from hsv.model.dynamics import COEFFICIENT_UNITS
 
 METHODS = ("uniform", "latin_hypercube", "sobol", "corners")
 
-_BATCHES = 256
-_BATCH_LIMITS = (32, 256)  # multiples of the flights side by side on any processor, as all sizes in between
+MAX_SAMPLES = 10**7
 
-MOST_SAMPLES = 10**7
+_MAX_HYPERCUBE = 10**6
+"""Largest number of samples of a Latin hypercube, which every worker has to draw and keep whole"""
+
+_BATCHES = 256
+"""Number of batches to aim at"""
+
+_BATCH_LIMITS = (32, 256)
+"""Smallest and largest batch: multiples of the lanes of every processor, as are all sizes in between"""
 
 _SEEDS = int(SEED_PARAMETER.maximum) + 1
 
-_MOST = {"latin_hypercube": 10**6}
-"""Samples at most, where fewer than by the other methods: each worker has to draw and keep a hypercube whole."""
+_PERTURBATION = "vehicle.perturbation."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Factor(Distribution):
+    """Range or distribution of one field of the scenario; uncertain parameters are relative changes."""
+
+    name: str
+    """Name of an uncertain parameter, or the field"""
+
+    @property
+    def is_perturbation(self) -> bool:
+        """Whether the factor is an uncertain parameter of the vehicle."""
+        return self.name in COEFFICIENT_UNITS
+
+    @property
+    def field(self) -> str:
+        """The field of the scenario."""
+        return _PERTURBATION + self.name if self.is_perturbation else self.name
+
+
+class Batch(NamedTuple):
+    """A number of flights that are flown and stored together, see :class:`hsv.flight.campaign.run.Batch`."""
+
+    label: str
+    flights: int
+    kind: int = 0
 
 
 @dataclass(frozen=True)
@@ -80,29 +115,75 @@ class Campaign:
         """Return the scenario of a flight with its sample as a file, with errors as above.
 
         Args:
-            flight: Its number.
+            flight: Number of the flight.
             sample: One value a factor.
-            replaced: Values to put in the place of the scenario's, by key.
+            replaced: Values that replace those of the scenario, by key.
         """
         return tomli_w.dumps(self._flown_table(flight, sample) | replaced)
 
     def flight_seed(self, flight: int) -> int:
-        """Return the seed of what is random in a flight; flights of other campaigns have others."""
-        return (self.seed * MOST_SAMPLES + int(flight)) % _SEEDS
+        """Return the seed of the random numbers within a flight; flights of other campaigns have others."""
+        return (self.seed * MAX_SAMPLES + int(flight)) % _SEEDS
 
     def _flown_table(self, flight: int, sample: Sequence[float]) -> dict[str, Any]:
-        return flown_table(self.table, self.scenario_name, self.factors, sample, self.flight_seed(flight))
+        flown = copy.deepcopy(self.table) | {"seed": self.flight_seed(flight)}
+        starts = {}
+        for factor, value in zip(self.factors, sample, strict=True):
+            text = percent(float(value)) if factor.is_perturbation else written(float(value), factor.unit)
+            set_field(flown, factor.field, text, self.scenario_name)
+            if factor.field.startswith("initial."):
+                starts[factor.field.removeprefix("initial.")] = float(value)
+        if starts:
+            fixed = {**flown, "initial": self.table["initial"]}
+            flown["command"] = _commands_to_same_goals(fixed, self.scenario_name, starts)
+        return flown
+
+    def draw(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
+        """Return the samples (flights, factors), in the factors' units, and the seed (flights) that each is drawn from.
+
+        Uniform samples have a seed each, so that any can be drawn alone; the other methods draw from the campaign's.
+        """
+        shares, seeds = self._shares(flights)
+        return np.column_stack([f.quantiles(column) for f, column in zip(self.factors, shares.T, strict=True)]), seeds
+
+    def _shares(self, flights: range) -> tuple[np.ndarray, np.ndarray]:
+        """Return the shares of the distributions (flights, factors) below the samples, 0 to 1, and the seeds."""
+        d = len(self.factors)
+        if self.method == "uniform":
+            keys = (np.random.SeedSequence(self.seed, spawn_key=(flight,)) for flight in flights)
+            seeds = np.array([key.generate_state(1, np.uint64)[0] for key in keys], np.uint64)
+            return np.stack([np.random.default_rng(own).random(d) for own in seeds.tolist()]), seeds
+        seeds = np.full(len(flights), self.seed, np.uint64)
+        if self.method == "latin_hypercube":
+            return self._hypercube[flights.start : flights.stop], seeds
+        if self.method == "sobol":
+            from scipy.stats import qmc
+
+            engine = qmc.Sobol(d, seed=self.seed)
+            if flights.start:
+                engine.fast_forward(flights.start)
+            return np.asarray(engine.random(len(flights))), seeds
+        # Corners: the binary digits of the flight's number, the first factor's first.
+        return (np.array(flights)[:, None] >> np.arange(d)[::-1] & 1).astype(float), seeds
+
+    @cached_property
+    def _hypercube(self) -> np.ndarray:
+        """All samples (samples, factors): the strata of each factor are shuffled over all flights."""
+        from scipy.stats import qmc
+
+        return np.asarray(qmc.LatinHypercube(len(self.factors), seed=self.seed).random(self.samples))
 
     @property
     def batch(self) -> int:
-        """Flights a batch, the unit that is flown and stored at once."""
+        """Number of flights of a batch, the unit that is flown and stored at once."""
         low, high = _BATCH_LIMITS
         return max(low, min(high, self.samples // _BATCHES // low * low))
 
-    @property
-    def batches(self) -> int:
-        """Number of batches."""
-        return -(-self.samples // self.batch)
+    @cached_property
+    def batches(self) -> list[Batch]:
+        """All batches."""
+        flights = map(self.flights, range(-(-self.samples // self.batch)))
+        return [Batch(f"flights {some.start} to {some.stop - 1}", len(some)) for some in flights]
 
     def flights(self, batch: int) -> range:
         """Return the numbers of the flights of a batch."""
@@ -132,12 +213,22 @@ class Campaign:
             found = cls(**values | {"factors": tuple(Factor(**factor) for factor in values["factors"])})
             if found.method not in METHODS:
                 raise ValueError(f"method {found.method!r}")
-            check_factors(found.factors, found.table, found.scenario_name)
+            found._check_factors()
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise CampaignError(
                 f"campaign written by commit {commit}, which this version does not read: {error}"
             ) from error
         return found
+
+    def _check_factors(self) -> None:
+        """Refuse a factor that this version does not know, or that the scenario does not have."""
+        scenario, drawn = scenario_at_means(self.table, self.scenario_name)
+        known = (*scenario.vehicle.described.uncertainty, *drawn)
+        for factor in self.factors:
+            if factor.name not in known:
+                raise CampaignError(f"factor {factor.name!r}: expected one of {', '.join(known)}")
+            if factor.kind not in KINDS:
+                raise CampaignError(f"factor {factor.name!r}: kind {factor.kind!r}, expected one of {', '.join(KINDS)}")
 
     def difference(self, other: Campaign) -> str:
         """Return the first setting in which ``other`` differs, in words; empty if in none."""
@@ -177,17 +268,19 @@ def plan(
     name = Path(scenario_name).stem
     table = scenario_table(text, name)
     if factors:
-        table = with_factors(table, name, factors)
+        for field, ends in factors.items():
+            place = _PERTURBATION + field if field in COEFFICIENT_UNITS else field
+            set_field(table, place, {"uniform": list(ends)}, name)
         text = tomli_w.dumps(table)
-    scenario, _ = scenario_at_means(table, name)
-    found = factors_of(table, name, scale)
+    scenario, drawn = scenario_at_means(table, name)
+    found = _factors(scenario, drawn, scale)
     if method not in METHODS:
         raise CampaignError(f"method = {method!r}: expected one of {', '.join(METHODS)}")
     if method == "corners":
         samples = 2 ** len(found)
-    most = _MOST.get(method, MOST_SAMPLES)
-    if not 1 <= samples <= most:
-        raise CampaignError(f"samples = {samples}: expected 1 to {most}")
+    largest = _MAX_HYPERCUBE if method == "latin_hypercube" else MAX_SAMPLES
+    if not 1 <= samples <= largest:
+        raise CampaignError(f"samples = {samples}: expected 1 to {largest}")
     if method == "sobol" and samples & (samples - 1):
         raise CampaignError(f"samples = {samples}: expected a power of two, where a Sobol sequence is balanced")
     if not 0 <= seed < 2**63:
@@ -199,6 +292,30 @@ def plan(
     return campaign
 
 
+def _factors(scenario: Scenario, drawn: Mapping[str, Distribution], scale: float) -> tuple[Factor, ...]:
+    """Return the factors of a campaign: the vehicle's uncertain parameters, and the distributions in the scenario.
+
+    Args:
+        scenario: The scenario without any change.
+        drawn: Its distributions by field, which replace the bounds of a parameter.
+        scale: As for :func:`plan`.
+
+    Raises:
+        CampaignError: Nothing varies, or ``scale`` is not admissible.
+    """
+    if not 0.0 <= scale <= 10.0:
+        raise CampaignError(f"scale = {scale}: expected 0 to 10")
+    uncertainty = scenario.vehicle.described.uncertainty
+    bounds = {_PERTURBATION + parameter: rounded(scale * bound) for parameter, bound in uncertainty.items()}
+    found = {field: Distribution(unit="1", low=-bound, high=bound) for field, bound in bounds.items() if scale}
+    found |= drawn
+    if not found:
+        raise CampaignError("scale = 0, no other factor and no distribution: expected something that varies")
+    return tuple(
+        Factor(name=field.removeprefix(_PERTURBATION), **vars(distribution)) for field, distribution in found.items()
+    )
+
+
 def _check_ends(campaign: Campaign) -> None:
     """Refuse factors that the scenario does not admit at their ends, all at once or one by one, the others half-way."""
     low, high, mean = ([getattr(f, end) for f in campaign.factors] for end in ("low", "high", "middle"))
@@ -208,3 +325,19 @@ def _check_ends(campaign: Campaign) -> None:
             assemble({**campaign.design, **scenario_parameters(flown)})
         for index, value in enumerate(ends):
             campaign.flown(0, [*mean[:index], value, *mean[index + 1 :]])
+
+
+def _commands_to_same_goals(table: dict[str, Any], name: str, starts: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the commands that lead from other ``starts`` (SI, by axis) to the goals that ``table`` commands.
+
+    Only the step at t = 0 changes: a commanded target does not move with the start.
+    """
+    scenario, _ = scenario_at_means(table, name)
+    steps = [command for command in scenario.command if command.end == 0.0]
+    goals = {"altitude": scenario.commands.altitudes[0], "velocity": scenario.commands.velocities[0]}
+    changes = {axis: sum(getattr(step, f"{axis}_change") for step in steps) for axis in goals}
+    changes |= {axis: rounded(goals[axis] - start) for axis, start in starts.items()}
+    units = {"altitude": "m", "velocity": "m/s"}
+    step = {f"{axis}_change": written(change, units[axis]) for axis, change in changes.items()}
+    later = [given for given, command in zip(table.get("command", ()), scenario.command, strict=True) if command.end]
+    return [step, *later]

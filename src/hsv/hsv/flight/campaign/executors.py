@@ -1,263 +1,273 @@
-"""Execution back ends of campaigns: this process, others of this machine, or the workers of a Dask cluster."""
+"""Executors of campaigns: this process, processes of this machine, or the workers of a Dask scheduler."""
 
 from __future__ import annotations
 
+import hashlib
+import logging
 import multiprocessing
 import os
 import pickle
-from collections import Counter, deque
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+import socket
+import time
+from collections.abc import Callable, Collection, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor as Pool
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from importlib.metadata import version
 from itertools import islice
-from multiprocessing.connection import Connection, wait
-from typing import Any, Protocol, cast
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any
 
 from hsv.base.errors import CampaignError, RunError, reason
 from hsv.base.processes import ctrl_c_held_back, end_with_parent
-from hsv.flight.campaign.program import check_workers
-from hsv.flight.campaign.scheduler import connected
-
-_AHEAD = 4
-"""Batches per core that are queued at the workers: enough that none is idle, few enough that a lost worker costs
-little."""
-
-_AHEAD_HERE = 2
-"""The same for the processes of this machine: one batch flying, one waiting."""
-
-_TRIES = 4
-"""Workers lost with the same batch before the campaign ends."""
-
-_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS")}
-"""Environment of a worker: one thread each, as there are as many workers as processors."""
-
 
 Job = Callable[[str, int], bytes]
-"""Flies a batch, by its number, of the campaign written in a text, and returns what is to be kept of it."""
+"""A function that flies a batch, by its number, of the campaign written in a text, and returns the result."""
 
+Notice = Callable[[str], None]
+"""A function that shows the user what the campaign waits for."""
 
-class Executor(Protocol):
-    """An execution back end, which flies the batches of a campaign."""
+NOTICE = 10.0
+"""Seconds without a result after which the campaign says what it waits for."""
 
-    @property
-    def cores(self) -> int:
-        """Number of flights that are flown at the same time."""
+ANSWER, WORKERS = 60.0, 300.0
+"""Seconds to wait for a Dask scheduler, and for the first of its workers: a cluster may have to start machines."""
 
-    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number and content of each batch of the campaign in ``text``, as ``job`` flies it, in any order."""
+_AHEAD = 2
+"""Batches per core that are submitted at a time: one is flown, one waits."""
 
+_LOOK = 0.5
+"""Seconds between two looks at the scheduler and the clock."""
 
 _KEPT = "what is finished is kept"
 
+_LOGS = ("distributed", "distributed.client", "tornado", "tornado.application")
+"""Loggers that print the tracebacks of exceptions that are also raised."""
 
-class SerialExecutor:
-    """Flies the batches in this process, one flight after the other."""
+
+class Executor:
+    """Flies the batches of a campaign in this process, one after the other."""
 
     cores = 1
+    """Number of batches that are flown at the same time"""
 
-    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number and content of each batch."""
+    def fly(
+        self, job: Job, text: str, batches: Iterable[int], label: Callable[[int], str] = "batch {}".format
+    ) -> Iterator[tuple[int, bytes]]:
+        """Yield the number and the result of each batch, in any order.
+
+        Args:
+            job: Flies a batch.
+            text: The campaign, as ``job`` reads it.
+            batches: Numbers of the batches.
+            label: Returns the name of a batch in messages.
+
+        Raises:
+            RunError: A batch ends every process that flies it, or the scheduler is lost.
+        """
         for batch in batches:
             yield batch, job(text, batch)
 
 
-class ProcessExecutor:
-    """Flies the batches in processes of this machine, each with a queue of its own; one that is lost is replaced."""
+class _PoolExecutor(Executor):
+    """Flies the batches in a pool of workers, and reports when no result comes."""
 
-    def __init__(self, workers: int) -> None:
-        """Make an executor with this many processes; :meth:`start` starts them, :meth:`close` waits for their end."""
-        self.cores = workers
-        self._workers: list[_Worker] = []
+    def __init__(self, notice: Notice) -> None:
+        self._notice = notice
+        self._noticed: set[str] = set()
 
-    def start(self) -> None:
+    def fly(
+        self, job: Job, text: str, batches: Iterable[int], label: Callable[[int], str] = "batch {}".format
+    ) -> Iterator[tuple[int, bytes]]:
+        waiting, flying = iter(batches), dict[Future[bytes], int]()
+        try:
+            while True:
+                for batch in islice(waiting, max(0, _AHEAD * max(self.cores, 1) - len(flying))):
+                    flying[self._submit(job, text, batch)] = batch
+                if not flying:
+                    return
+                for future in self._first(flying, label):
+                    try:
+                        result = self._result(future)
+                    except BrokenProcessPool:
+                        unfinished = sorted(flying.values())
+                        flying.clear()
+                        self._renew()
+                        for batch in unfinished:
+                            yield batch, self._alone(job, text, batch, label)
+                        break
+                    yield flying.pop(future), result
+        finally:
+            for future in flying:
+                future.cancel()
+
+    def _alone(self, job: Job, text: str, batch: int, label: Callable[[int], str]) -> bytes:
+        """Return the result of a batch that is flown with no other batch in flight.
+
+        Raises:
+            RunError: The batch ends its process; its name is in the message.
+        """
+        future = self._submit(job, text, batch)
+        try:
+            self._first({future: batch}, label)
+            return self._result(future)
+        except BrokenProcessPool:
+            self._renew()
+            raise RunError(f"campaign: {label(batch)}: the worker process ended; {_KEPT}") from None
+
+    def _first(self, flying: dict[Future[bytes], int], label: Callable[[int], str]) -> Collection[Future[bytes]]:
+        """Wait for the first results, and return their futures."""
+        due = time.monotonic() + NOTICE
+        while not (done := wait(flying, _LOOK, FIRST_COMPLETED).done):
+            obstacle = self._obstacle()
+            if time.monotonic() > due and obstacle not in self._noticed:
+                self._noticed.add(obstacle)
+                first, others = label(min(flying.values())), len(flying) - 1
+                self._notice(f"waiting for {first}{f' and {others} more' if others else ''}{obstacle}")
+        return done
+
+    def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
+        raise NotImplementedError
+
+    def _result(self, future: Future[bytes]) -> bytes:
+        return future.result()
+
+    def _renew(self) -> None:
+        """Replace a pool that is broken."""
+
+    def _obstacle(self) -> str:
+        """Return why no result can come, as the end of a message; empty if the batches just take long."""
+        return ""
+
+
+class ProcessExecutor(_PoolExecutor):
+    """Flies the batches in processes of this machine, which are replaced when one of them dies."""
+
+    def __init__(self, workers: int, notice: Notice = lambda words: None) -> None:
         """Start the processes.
 
         Raises:
-            RunError: One of them cannot be started.
+            RunError: They cannot be started.
         """
-        for _ in range(self.cores):
-            self._workers.append(_Worker())
+        super().__init__(notice)
+        self.cores = workers
+        self._start()
 
     def pids(self) -> list[int | None]:
         """Return the process identifiers of the workers."""
-        return [worker.process.pid for worker in self._workers]
+        return [process.pid for process in self._processes()]
 
-    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number and content of each batch.
-
-        Raises:
-            RunError: The same batch was lost with several workers.
-        """
-        waiting, lost = iter(batches), Counter[int]()
-        for worker in self._workers:
-            worker.begin(job, text)
-        for worker in self._workers * _AHEAD_HERE:
-            worker.give(islice(waiting, 1))
-        while busy := {worker.connection: worker for worker in self._workers if worker.queue}:
-            for connection in wait([*busy]):
-                worker = busy[cast(Connection, connection)]
-                try:
-                    answer = worker.connection.recv()
-                except (EOFError, OSError):
-                    again = [*worker.queue]
-                    lost[again[0]] += 1
-                    code = worker.restart()
-                    if lost[again[0]] >= _TRIES:
-                        died = f"several workers died of the same batch, at last with exit code {code}"
-                        raise RunError(f"campaign: {died}; {_KEPT}") from None
-                    worker.begin(job, text)
-                    worker.give(again)
-                    continue
-                batch = worker.queue.popleft()
-                worker.give(islice(waiting, 1))
-                if isinstance(answer, Exception):
-                    raise answer
-                yield batch, answer
-
-    def kill(self) -> None:
-        """End the processes at once: what they fly may take minutes."""
-        for worker in self._workers:
-            worker.process.kill()
-
-    def close(self) -> None:
-        """Wait until the processes have ended."""
-        for worker in self._workers:
-            worker.connection.close()
-        for worker in self._workers:
-            worker.process.join()
-
-
-class _Worker:
-    """A process that flies one batch after another and never receives Ctrl-C."""
-
-    def __init__(self) -> None:
-        self.queue: deque[int] = deque()
-        """Batches that it has been given, and has not answered."""
-        self._start()
+    def close(self, *, kill: bool = False) -> None:
+        """End the processes: at once, or when they have flown the batches that they have begun."""
+        if kill:
+            for process in self._processes():
+                process.kill()
+        self._pool.shutdown(cancel_futures=True)
 
     def _start(self) -> None:
+        self._others = set(multiprocessing.active_children())
         context = multiprocessing.get_context("spawn")
-        before = {name: os.environ.get(name) for name in _ONE_THREAD}
+        self._pool = ProcessPoolExecutor(self.cores, context, end_with_parent, (os.getpid(),))
+        for _ in range(self.cores):  # a task for each, so that all start
+            self._call(int)
+
+    def _processes(self) -> list[BaseProcess]:
+        return [child for child in multiprocessing.active_children() if child not in self._others]
+
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        # The processes, which start here, never receive Ctrl-C: this process ends them.
         with ctrl_c_held_back():
-            os.environ.update(_ONE_THREAD)
             try:
-                self.connection, its_end = context.Pipe()
-                # Closed here: the connection then ends with the process, also in the middle of an answer.
-                with its_end:
-                    self.process = context.Process(target=_serve, args=(its_end, os.getpid()))
-                    self.process.start()
+                return self._pool.submit(function, *arguments)
             except OSError as error:
                 raise RunError(f"campaign: a worker process cannot be started ({reason(error)})") from error
-            finally:
-                for name, value in before.items():
-                    if value is None:
-                        del os.environ[name]
-                    else:
-                        os.environ[name] = value
 
-    def begin(self, job: Job, text: str) -> None:
-        """Say what is to be flown. Batches of an earlier flying that ended early are given up, with the process."""
-        if self.queue:
-            self.restart()
-        with suppress(OSError):  # it has ended, as is noticed when it should answer
-            self.connection.send((job, text))
-
-    def give(self, batches: Iterable[int]) -> None:
-        """Let it fly ``batches``, after those that it has."""
-        for batch in batches:
-            self.queue.append(batch)
-            with suppress(OSError):
-                self.connection.send(batch)
-
-    def restart(self) -> int | None:
-        """End the process, if it has not ended, and start another, without batches; return the exit code."""
-        self.process.join(0.1)  # one that is just ending has an exit code of its own
-        self.process.kill()
-        self.process.join()
-        code = self.process.exitcode
-        self.connection.close()
-        self.queue.clear()
+    def _renew(self) -> None:
+        self.close(kill=True)
         self._start()
-        return code
+
+    def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
+        try:
+            return self._call(_portably, job, text, batch)
+        except BrokenProcessPool:  # a process died while it had nothing to do
+            self._renew()
+            return self._call(_portably, job, text, batch)
+
+    def _obstacle(self) -> str:
+        stopped = [str(pid) for pid in self.pids() if _is_stopped(pid)]
+        return f": stopped worker process {', '.join(stopped)}" if stopped else ""
 
 
-def _serve(connection: Connection, parent: int) -> None:
-    """Fly what the ``parent`` asks for, until it closes the connection."""
-    end_with_parent(parent)
-    with suppress(EOFError, OSError):
-        while True:
-            asked = connection.recv()
-            if isinstance(asked, tuple):
-                job, text = asked
-                continue
-            try:
-                answer = job(text, asked)
-            except Exception as error:
-                answer = _portable(error)
-            connection.send(answer)
-
-
-def _portable(error: Exception) -> Exception:
-    """Return an error that arrives in another process: not all can be made again of their arguments."""
+def _portably(job: Job, text: str, batch: int) -> bytes:
+    """Fly a batch; an exception that cannot be unpickled again is replaced by one that can."""
     try:
-        return cast(Exception, pickle.loads(pickle.dumps(error)))
-    except Exception:
-        return RunError(f"{type(error).__name__}: {error}")
+        return job(text, batch)
+    except Exception as error:
+        try:
+            pickle.loads(pickle.dumps(error))
+        except Exception:
+            raise RunError(f"{type(error).__name__}: {error}") from None
+        raise
 
 
-class DaskExecutor:
-    """Flies the batches on the workers of a Dask scheduler; batches of a lost worker are flown by another."""
+def _is_stopped(pid: int | None) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(") ")[2].startswith("T")
+    except OSError:
+        return False
 
-    def __init__(self, client: Any) -> None:
+
+class DaskExecutor(_PoolExecutor):
+    """Flies the batches on the workers of a Dask scheduler, which flies those of a lost worker on another one."""
+
+    def __init__(self, client: Any, notice: Notice = lambda words: None) -> None:
+        super().__init__(notice)
         self._client = client
+        self._pool: Pool = client.get_executor(pure=False)
 
     @property
-    def cores(self) -> int:
-        """Threads of all workers."""
-        return sum(self._client.nthreads().values())
-
-    def fly(self, job: Job, text: str, batches: Iterable[int]) -> Iterator[tuple[int, bytes]]:
-        """Yield number and content of each batch.
-
-        Raises:
-            RunError: Workers die of a batch again and again, or the scheduler is lost.
-        """
-        from distributed import KilledWorker, as_completed
-
-        waiting = iter(batches)
-        # The campaign travels once to each worker; made by a task, it survives the worker that holds it.
-        campaign = self._client.submit(str, text)
-        running = as_completed(loop=self._client.loop, with_results=True)
-        numbers = {}
-
-        def submit(count: int) -> None:
-            for batch in islice(waiting, count):
-                future = self._client.submit(job, campaign, batch)
-                numbers[future.key] = batch
-                running.add(future)
-
-        submit(_AHEAD * max(self.cores, 1))
+    def cores(self) -> int:  # type: ignore[override]
+        """Number of threads of all workers."""
+        if self._client.status != "running":
+            raise self._lost()
         try:
-            for future, content in running:
-                if not isinstance(content, bytes):
-                    raise RunError(f"campaign: the scheduler is lost ({future.status}); {_KEPT}")
-                submit(1)
-                yield numbers.pop(future.key), content
+            return sum(self._client.nthreads().values())
+        except OSError as error:
+            raise self._lost() from error
+
+    def _submit(self, job: Job, text: str, batch: int) -> Future[bytes]:
+        return self._pool.submit(job, text, batch)
+
+    def _result(self, future: Future[bytes]) -> bytes:
+        from distributed import KilledWorker
+
+        try:
+            return future.result()
         except KilledWorker as error:
             raise RunError(f"campaign: several workers died of the same batch ({error}); {_KEPT}") from error
         except ImportError as error:
             raise RunError(f"campaign: a worker that came later has another program ({error}); {_KEPT}") from error
-        except OSError as error:
-            raise RunError(f"campaign: the scheduler is lost ({reason(error)}); {_KEPT}") from error
+        except (CancelledError, OSError) as error:
+            raise self._lost() from error
+
+    def _obstacle(self) -> str:
+        return "" if self.cores else ": the scheduler has no workers"
+
+    def _lost(self) -> RunError:
+        return RunError(f"campaign: the scheduler is lost; {_KEPT}")
 
 
 @contextmanager
-def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None] = lambda: None) -> Iterator[Executor]:
+def make_executor(workers: int, scheduler: str = "", notice: Notice = lambda words: None) -> Iterator[Executor]:
     """Yield the executor for the ``scheduler`` at an address, or for a number of processes of this machine.
 
     Args:
         workers: Number of processes; 0: one per processor; 1 flies in this process.
-        scheduler: Address of a Dask scheduler, e.g. ``"tcp://10.0.0.1:8786"``; empty: this machine.
-        on_wait: Called if the scheduler has no workers yet, before they are waited for.
+        scheduler: Address of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``; empty: this machine.
+        notice: Called with the reason when the campaign has to wait.
 
     Raises:
         CampaignError: The number or the address is not admissible, no scheduler answers there, it has no workers, or
@@ -268,20 +278,102 @@ def make_executor(workers: int, scheduler: str = "", on_wait: Callable[[], None]
     if scheduler:
         if workers:
             raise CampaignError(f"workers = {workers}: expected no --workers with --scheduler, whose workers fly")
-        with connected(scheduler, on_wait) as client:
-            check_workers(client, scheduler)
-            yield DaskExecutor(client)
+        with _connected(scheduler, notice) as client:
+            _check_workers(client, scheduler)
+            yield DaskExecutor(client, notice)
         return
     workers = workers or os.cpu_count() or 1
     if workers == 1:
-        yield SerialExecutor()
+        yield Executor()
         return
-    flying = ProcessExecutor(workers)
+    processes = ProcessExecutor(workers, notice)
     try:
-        flying.start()
-        yield flying
+        yield processes
     except BaseException:
-        flying.kill()
+        processes.close(kill=True)  # the batches in flight may take minutes
         raise
-    finally:
-        flying.close()
+    processes.close()
+
+
+@contextmanager
+def _connected(address: str, notice: Notice) -> Iterator[Any]:
+    """Yield the client of the scheduler at ``address``, which has at least one worker."""
+    from distributed import Client
+    from distributed.comm import get_address_host_port
+
+    try:
+        host, port = get_address_host_port(address)
+        if not host or not 0 < port < 2**16:
+            raise ValueError("no host, or no such port")
+    except ValueError as error:
+        raise CampaignError(f"scheduler = {address!r}: {error}; expected an address as tcp://host:8786") from error
+    silent = CampaignError(f"scheduler = {address!r}: no answer, expected a running Dask scheduler")
+    with ExitStack() as stack:
+        for logger in map(logging.getLogger, _LOGS):
+            stack.callback(logger.setLevel, logger.level)
+            logger.setLevel(logging.CRITICAL)
+        # Dask's own wait for a scheduler cannot be interrupted.
+        if not _in_time(lambda: _answers(host, port), ANSWER, lambda: notice(f"waiting for the scheduler {address}")):
+            raise silent
+        try:
+            client = stack.enter_context(Client(address, timeout=NOTICE, set_as_default=False))
+        except (OSError, ValueError) as error:
+            raise silent from error
+        if not client.nthreads():
+            notice("waiting for the scheduler's workers")
+        if not _in_time(client.nthreads, WORKERS):
+            raise CampaignError(f"scheduler = {address!r}: no workers after {WORKERS:g} s, expected one at least")
+        yield client
+
+
+def _in_time(done: Callable[[], Any], limit: float, notice: Callable[[], None] = lambda: None) -> bool:
+    """Wait until something is done; return whether it was within ``limit`` (s), and call ``notice`` if it is slow."""
+    start, noticed = time.monotonic(), False
+    while not done():
+        waited = time.monotonic() - start
+        if waited > limit:
+            return False
+        if waited > NOTICE and not noticed:
+            noticed = True
+            notice()
+        time.sleep(min(_LOOK, limit))
+    return True
+
+
+def _answers(host: str, port: int) -> bool:
+    try:
+        with socket.create_connection((host, port), timeout=_LOOK):
+            return True
+    except OSError:
+        return False
+
+
+@cache
+def program() -> str:
+    """Return the version of the library, and the first digits of the SHA-256 of its sources."""
+    digest, folder = hashlib.sha256(), Path(__file__).parents[2]
+    for path in sorted(folder.rglob("*.py")):
+        digest.update(f"{path.relative_to(folder).as_posix()}\n".encode() + path.read_bytes())
+    return f"hsv {version('hsv')}, sources {digest.hexdigest()[:12]}"
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """Refuse the scheduler at ``address`` if one of its workers has another program, or none.
+
+    Raises:
+        CampaignError: Names the worker, and what it has.
+    """
+
+    def worker_program() -> str:
+        # A local function travels by value: the worker may not have the library.
+        from hsv.flight.campaign.executors import program
+
+        return program()
+
+    for worker, answer in sorted(client.run(worker_program, on_error="return").items()):
+        if answer == program():
+            continue
+        has = answer
+        if isinstance(answer, Exception):
+            has = "no hsv" if isinstance(answer, ModuleNotFoundError) and answer.name == "hsv" else "another hsv"
+        raise CampaignError(f"scheduler = {address!r}: worker {worker} has {has}, expected {program()}, as here")

@@ -1,30 +1,100 @@
-"""Flies the samples of a campaign; components that all flights share are built once."""
+"""The flights of a campaign: components that all flights share are built once, and flights are read while they fly."""
 
 from __future__ import annotations
 
+import hashlib
+import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from hsv.base.errors import CampaignError, ControllerError, ScenarioError
 from hsv.control.controller import Controller
-from hsv.control.library import library_digest
+from hsv.control.library import LibraryController, library_digest
 from hsv.core import lanes
 from hsv.flight.campaign.campaign import Campaign
-from hsv.flight.campaign.flight_reader import FlightReader, FlightReading
-from hsv.flight.campaign.sampling import Sampler
-from hsv.flight.campaign.tube_levels import TubeLevels
+from hsv.flight.campaign.envelope import Envelope
+from hsv.flight.campaign.executors import Job
+from hsv.flight.campaign.table import encode
 from hsv.flight.campaign.variants import FlightVariants
-from hsv.flight.closed_loop import Components, fly
-from hsv.flight.flight import Flight
-from hsv.flight.metrics import FlightData, flight_metrics
-from hsv.flight.side_by_side import FlightGroup
+from hsv.flight.closed_loop import Components, fly, watched
+from hsv.flight.fingerprint import digested, written
+from hsv.flight.flight import Flight, fault_start, times
+from hsv.flight.history import Q_F, X
+from hsv.flight.metrics import CURVES, FlightCurves, FlightData, flight_metrics, read_curves
+from hsv.flight.side_by_side import FlightGroup, TubeLevels
 from hsv.model.dynamics import in_model_range
+from hsv.model.signals import N_STATES
+
+PIECE = 500
+"""Steps that the flights of a group fly before they are read: 8 flights then fit into a second-level cache of 1 MB."""
+
+_LONG = 10.0
+"""Seconds from which on a flight is timed by its first steps only."""
+
+_FIRST_STEPS = 198
+"""Number of these steps. It holds as many solutions of a problem that is solved every 2 s as the rest of the flight."""
 
 Outcome = dict[str, float | bool | str | None]
+
+
+class FlightReading(NamedTuple):
+    """The results of a flight that a campaign needs; the history itself is not kept."""
+
+    curves: FlightCurves
+    last: np.ndarray
+    """Last state x (9)"""
+    level: float | None
+    """Largest level in the tube's invariant set; None if no set holds for the flight"""
+    fingerprint: str | None
+
+    @classmethod
+    def of(cls, data: FlightData, level: float | None, fingerprint: str | None) -> Self:
+        """Return the reading of a flight whose whole history is in memory."""
+        return cls(data.flight_curves, data.state[-1], level, fingerprint)
+
+
+class FlightReader:
+    """Flies groups of flights of one campaign side by side, and reads them piece by piece."""
+
+    def __init__(self, steps: int, levels: TubeLevels) -> None:
+        """Allocate memory for flights of ``steps`` control periods."""
+        self._rows, self._levels = steps + 1, levels
+        self._group = FlightGroup(min(PIECE, self._rows))
+        self._curves = np.empty((self._group.lanes, CURVES, self._rows))
+        self._saturated = np.empty((self._group.lanes, self._rows, 2), bool)
+
+    def read(self, components: Sequence[Components]) -> list[FlightReading]:
+        """Fly ``components``, which :meth:`FlightGroup.takes`; the readings are valid until the next call."""
+        group, rows, count = self._group, self._rows, len(components)
+        references = [own.nominal_trajectory.reference.along(rows).state for own in components]
+        digests = [hashlib.sha256() for _ in components]
+        last = np.empty((count, N_STATES))
+        group.begin(components, rows, self._levels.set)
+        for start in range(0, rows, PIECE):
+            stop = group.fly(start, min(start + PIECE, rows))
+            for i in range(count):
+                if (end := min(stop, group.ended(i))) > start:
+                    flown, auxiliary, _ = group.lane(i).cut(end - start)
+                    digests[i].update(digested(flown).data)
+                    curves, saturated = self._curves[i, :, start:end], self._saturated[i, start:end]
+                    read_curves(flown, auxiliary, references[i][start:end], curves, saturated)
+                    last[i] = flown[-1, X:Q_F]
+            if stop < min(start + PIECE, rows):
+                break
+        readings = []
+        for i, own in enumerate(components):
+            n = group.ended(i)
+            time, start_of_fault = times(n, own.plant.period), fault_start(own, n)
+            curves_read = FlightCurves(time, self._curves[i, :, :n], self._saturated[i, :n], start_of_fault)
+            level = group.worst(i) if self._levels.set else None
+            readings.append(FlightReading(curves_read, last[i], level, written(digests[i].digest())))
+        return readings
 
 
 class SampleRunner:
@@ -32,7 +102,6 @@ class SampleRunner:
 
     def __init__(self, campaign: Campaign) -> None:
         self.campaign = campaign
-        self.sampler = Sampler(campaign)
         self.scenario = campaign.scenario
         if library_digest(self.scenario.controller) != campaign.library:
             raise CampaignError(
@@ -42,56 +111,116 @@ class SampleRunner:
         self._variants = FlightVariants(self.scenario, campaign.design)
         parts = self._variants.unchanged
         self._levels = TubeLevels(parts)
+        self._reader: FlightReader | None = None
         self.period = parts.plant.period
-        """Control period, s."""
+        """Control period, s"""
         self.steps = parts.plant.steps
-        """Control periods of a flight that does not end early."""
+        """Control periods of a flight that does not end early"""
+
+    @property
+    def controller(self) -> Controller:
+        """The controller of all flights."""
+        return self._variants.unchanged.controller
 
     def sample(self, flight: int) -> list[float]:
         """Return the sample of a flight (one value a factor)."""
-        [sample], _ = self.sampler.draw(range(flight, flight + 1))
+        [sample], _ = self.campaign.draw(range(flight, flight + 1))
         return list(sample.tolist())
 
     def fly(self, flight: int, sample: Sequence[float]) -> Flight:
         """Fly a flight with its sample (one value a factor).
 
         Raises:
-            ControllerError: A controller of one's own ended it.
-            ScenarioError: The scenario does not admit the values of the flight together; it is named.
+            ControllerError: A custom controller failed.
+            ScenarioError: The scenario does not admit the values of the flight together; the flight is named.
         """
         return fly(self._components(flight, sample))
 
     def fly_all(self, flights: Sequence[int], samples: np.ndarray) -> Iterator[FlightReading | ControllerError]:
-        """Fly ``flights`` with their ``samples`` (flights, factors), side by side where that can be.
+        """Fly ``flights`` with their ``samples`` (flights, factors), side by side if possible.
 
-        Each is valid until the next one. In place of a flight that its controller ended comes what it said.
+        Each reading is valid until the next one. A controller that fails yields its error in place of the reading.
 
         Raises:
-            ScenarioError: As above.
+            ScenarioError: As :meth:`fly`.
         """
         width = lanes()
         for start in range(0, len(flights), width):
             drawn = zip(flights[start : start + width], samples[start : start + width], strict=True)
             components = [self._components(flight, sample) for flight, sample in drawn]
             if FlightGroup.takes(components):
+                self._reader = self._reader or FlightReader(self.steps, self._levels)
                 yield from self._reader.read(components)
             else:
-                yield from map(self._flown_or_error, components)
+                yield from map(self._read_alone, components)
 
-    @cached_property
-    def _reader(self) -> FlightReader:
-        return FlightReader(self.steps, self._levels)  # whose memory is kept
+    def fly_unchanged(self) -> Flight:
+        """Fly the scenario itself."""
+        return fly(self._variants.unchanged)
 
-    def _flown_alone(self, components: Components) -> FlightReading:
-        flight = fly(components)
-        data = flight.data()
-        return FlightReading.of(data, self.level(data), flight.fingerprint)
+    def flight_time(self) -> float:
+        """Return about how long (s) a flight takes, measured with the scenario itself.
 
-    def _flown_or_error(self, components: Components) -> FlightReading | ControllerError:
+        Raises:
+            ControllerError: A custom controller failed.
+        """
+        self._time(1)  # builds what the flights share
+        seconds = self._time(min(_FIRST_STEPS, self.steps))
+        return seconds if seconds > _LONG else self._time(self.steps)
+
+    def level(self, flight: FlightData) -> float | None:
+        """Return the largest level of a flight in the tube, None if no set holds for it."""
+        return self._levels.worst(flight)
+
+    def outcome(self, flown: FlightReading | ControllerError) -> Outcome:
+        """Return the row of a flight: its end, tube level, metrics (SI) and fingerprint, or the controller's error."""
+        if isinstance(flown, ControllerError):
+            return {"diverged": False, "crashed": str(flown)}
+        return {
+            "diverged": not in_model_range(flown.last, self._variants.unchanged.plant.vehicle.angle_limit),
+            "end_time": float(flown.curves.time[-1]),
+            "tube_level": flown.level,
+            **flight_metrics(flown.curves),
+            "crashed": None,
+            "fingerprint": flown.fingerprint,
+        }
+
+    def fly_batch(self, batch: int) -> bytes:
+        """Fly a batch; return its rows and envelope as a Parquet file.
+
+        Raises:
+            ScenarioError: As :meth:`fly`.
+        """
+        flights, envelope, rows = self.campaign.flights(batch), Envelope.empty(), []
+        samples, seeds = self.campaign.draw(flights)
+        for flight, sample, seed, flown in zip(flights, samples, seeds, self.fly_all(flights, samples), strict=True):
+            if isinstance(flown, FlightReading):
+                envelope.add(flown.curves, self.steps)
+            drawn = {f"sample_{f.name}": float(x) for f, x in zip(self.campaign.factors, sample, strict=True)}
+            rows.append({"flight": flight, "seed": int(seed), **drawn, **self.outcome(flown)})
+        return encode(self.campaign, rows, envelope)
+
+    def _time(self, steps: int) -> float:
+        parts = self._variants.unchanged
+        plant = copy(parts.plant)
+        plant.steps = steps
+        pieces = [replace(parts, plant=plant)] * lanes()
+        started = time.perf_counter()
+        if FlightGroup.takes(pieces):
+            FlightReader(steps, self._levels).read(pieces)
+            seconds = (time.perf_counter() - started) / len(pieces)
+        else:
+            fly(pieces[0]).data()
+            seconds = time.perf_counter() - started
+        return seconds * self.steps / steps
+
+    def _read_alone(self, components: Components) -> FlightReading | ControllerError:
         try:
-            return self._flown_alone(components)
+            flight = fly(components)
         except ControllerError as error:
             return error
+        data = flight.data()
+        return FlightReading.of(data, self.level(data), flight.fingerprint)
 
     def _components(self, flight: int, sample: Sequence[float]) -> Components:
         if names := self.campaign.perturbed:
@@ -104,50 +233,42 @@ class SampleRunner:
         except ScenarioError as error:
             raise ScenarioError(f"flight {flight}: {error}") from error
 
-    def fly_unchanged(self) -> Flight:
-        """Fly the scenario itself."""
-        return fly(self._variants.unchanged)
-
-    def fly_piece(self, steps: int) -> list[FlightReading]:
-        """Fly so many ``steps`` of the scenario itself, as often as it is flown at once.
-
-        Raises:
-            ControllerError: As :meth:`fly`.
-        """
-        parts = self._variants.unchanged
-        plant = copy(parts.plant)
-        plant.steps = steps
-        pieces = [replace(parts, plant=plant)] * lanes()
-        if not FlightGroup.takes(pieces):
-            return [self._flown_alone(pieces[0])]
-        return FlightReader(steps, self._levels).read(pieces)
-
-    @property
-    def controller(self) -> Controller:
-        """The controller that flies."""
-        return self._variants.unchanged.controller
-
-    def level(self, flight: FlightData) -> float | None:
-        """Return the worst level of a flight in the tube, ``None`` where no set holds for it."""
-        return self._levels.worst(flight)
-
-    def outcome(self, flown: FlightReading) -> Outcome:
-        """Return what a campaign records of a flight: its end, worst tube level, metrics (SI), fingerprint."""
-        return {
-            "diverged": not in_model_range(flown.last, self._variants.unchanged.plant.vehicle.angle_limit),
-            "end_time": float(flown.curves.time[-1]),
-            "tube_level": flown.level,
-            **flight_metrics(flown.curves),
-            "crashed": None,
-            "fingerprint": flown.fingerprint,
-        }
-
-    def crashed(self, error: ControllerError) -> Outcome:
-        """Return the outcome of a flight that its controller ended: the reason, and no metrics."""
-        return {"diverged": False, "crashed": str(error)}
-
 
 @lru_cache(maxsize=1)
 def sample_runner(text: str) -> SampleRunner:
-    """Return the sample runner of the campaign written in ``text``; a worker process caches the last one."""
+    """Return the sample runner of the campaign written in ``text``; a worker process keeps the last one."""
     return SampleRunner(Campaign.from_text(text))
+
+
+def fly_batch(text: str, batch: int) -> bytes:
+    """Fly a batch of the campaign written in ``text``, see :meth:`SampleRunner.fly_batch`."""
+    return _in_library_process(_fly_batch, text, batch)
+
+
+def time_flight(text: str, kind: int) -> bytes:
+    """Return about how long (s, as a text) a flight of the campaign written in ``text`` takes."""
+    return _in_library_process(_time_flight, text, kind)
+
+
+def _fly_batch(text: str, batch: int) -> bytes:
+    return sample_runner(text).fly_batch(batch)
+
+
+def _time_flight(text: str, kind: int) -> bytes:
+    try:
+        return repr(sample_runner(text).flight_time()).encode()
+    except ControllerError:  # which the rows of the flights tell
+        return b"0.0"
+
+
+def _in_library_process(job: Job, text: str, number: int) -> bytes:
+    """Run ``job``, in the child process of the controller's library if there is one.
+
+    If the library crashes, the flights are flown again, each with a child process of its own.
+    """
+    runner = sample_runner(text)
+    if isinstance(runner.controller, LibraryController):
+        with suppress(ControllerError), watched(runner.controller, runner.steps + 1) as (_, request):
+            result: Any = request("call", job, text, number)
+            return bytes(result)
+    return job(text, number)

@@ -1,7 +1,8 @@
-"""Storage of results: finished batches beside the result file during the run, one Parquet file in the end."""
+"""Storage of results: finished batches next to the result file during the run, one Parquet file at the end."""
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import shutil
@@ -16,7 +17,7 @@ from hsv.base.errors import CampaignError, DocumentError, reason
 from hsv.base.files import open_regular, read_text
 from hsv.flight.campaign.campaign import Campaign
 from hsv.flight.campaign.envelope import Envelope
-from hsv.flight.campaign.lock import locked
+from hsv.flight.campaign.sample_runner import fly_batch, time_flight
 from hsv.flight.campaign.table import CAMPAIGN, DIGEST, ENVELOPE, WRITTEN, schema
 
 _CAMPAIGN_FILE = "campaign.json"
@@ -28,17 +29,20 @@ _ROWS = 1024
 class ResultStore:
     """Stores the batches of one campaign; a stored batch stays whole whatever happens to this process."""
 
+    fly = staticmethod(fly_batch)
+    time = staticmethod(time_flight)
+
     def __init__(self, out: Path, campaign: Campaign) -> None:
         self.out = out
         self.folder = out.with_name(out.name + ".parts")
         self._campaign = campaign
 
     @contextmanager
-    def opened(self, restart: bool = False) -> Iterator[set[int]]:
-        """Yield the numbers of the batches that are there whole; only one process at a time may hold a campaign.
+    def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
+        """Yield the numbers of the finished batches; only one process at a time may hold a campaign.
 
         Args:
-            restart: Throw away what is there.
+            restart: Whether to discard what is there.
 
         Raises:
             CampaignError: The file or folder belongs to another campaign, cannot be made, or is in use.
@@ -53,10 +57,10 @@ class ResultStore:
             if self.out.exists():
                 self._check(read_result(self.out)[0], self.out)
                 shutil.rmtree(self.folder, ignore_errors=True)
-                yield set(range(self._campaign.batches))
+                yield set(range(len(self._campaign.batches)))
                 return
             self._describe()
-            yield {batch for batch in range(self._campaign.batches) if self._is_whole(batch)}
+            yield {batch for batch in range(len(self._campaign.batches)) if self._is_whole(batch)}
 
     def keep(self, batch: int, content: bytes) -> None:
         """Keep a finished batch: it is there whole, or not at all.
@@ -67,20 +71,22 @@ class ResultStore:
         write_whole(self._part(batch), content)
 
     def finish(self) -> None:
-        """Make the result file of all batches, and remove them.
+        """Make the result file of all batches, if it is not there, and remove the batches.
 
         Raises:
             CampaignError: The file cannot be written, or a batch is damaged, which is then removed.
         """
+        if self.out.exists():
+            return
         temporary = self.out.with_name(self.out.name + ".unfinished")
         envelope = Envelope.empty()
         columns = schema(self._campaign)
         with _writing(self.out, temporary):
             with pq.ParquetWriter(temporary, columns, **WRITTEN) as writer:
-                together = max(1, _ROWS // self._campaign.batch)
-                for first in range(0, self._campaign.batches, together):
+                together, batches = max(1, _ROWS // self._campaign.batch), len(self._campaign.batches)
+                for first in range(0, batches, together):
                     parts = []
-                    for batch in range(first, min(first + together, self._campaign.batches)):
+                    for batch in range(first, min(first + together, batches)):
                         part, its_envelope = self._read(batch)
                         envelope.merge(its_envelope)
                         parts.append(part.cast(columns))
@@ -89,6 +95,12 @@ class ResultStore:
                 writer.add_key_value_metadata(kept | {DIGEST: _digest(kept)})
             _replace(temporary, self.out)
         shutil.rmtree(self.folder)
+
+    def space(self, flights: int, batches: int) -> int:
+        """Return the disk space (bytes) of so many batches and of the result, before compression."""
+        row, envelope = 8 * len(schema(self._campaign)), len(Envelope.empty().encode())
+        # A batch has its envelope twice, the second time in the schema, in base 64.
+        return flights * row + round(batches * envelope * (1.0 + 4.0 / 3.0)) + self._campaign.samples * row + envelope
 
     def _describe(self) -> None:
         described = self.folder / _CAMPAIGN_FILE
@@ -109,7 +121,7 @@ class ResultStore:
                 found, rows = file.schema_arrow, file.metadata.num_rows
         except (OSError, ValueError):
             return False
-        complete = rows == len(self._campaign.flights(batch)) and ENVELOPE in (found.metadata or {})
+        complete = rows == self._campaign.batches[batch].flights and ENVELOPE in (found.metadata or {})
         return complete and bool(found.equals(schema(self._campaign)))
 
     def _read(self, batch: int) -> tuple[pa.Table, Envelope]:
@@ -174,9 +186,35 @@ def _has(columns: pa.Schema, column: pa.Field) -> bool:
 
 
 def _digest(kept: Mapping[bytes, bytes]) -> bytes:
-    """Return the SHA-256, hexadecimal, of what is kept beside the rows."""
+    """Return the hexadecimal SHA-256 of the metadata."""
     texts = [kept.get(key, b"") for key in (CAMPAIGN, ENVELOPE)]
     return hashlib.sha256(b"".join(b"%d:%s" % (len(text), text) for text in texts)).hexdigest().encode()
+
+
+@contextmanager
+def locked(path: Path, complaint: str) -> Iterator[None]:
+    """Hold the lock file ``path``, which exists only while it is held, or if its holder was killed.
+
+    Raises:
+        CampaignError: Another process holds it, and the message is ``complaint``; or it cannot be made.
+    """
+    while True:
+        try:
+            stream = path.open("w")
+            fcntl.flock(stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise CampaignError(complaint) from None
+        except OSError as error:
+            raise CampaignError(f"{path}: cannot be locked ({reason(error)})") from error
+        with stream:
+            # The last holder may have removed the file in the meantime, and a third process made another one.
+            if not path.exists() or not os.path.samestat(path.stat(), os.fstat(stream.fileno())):
+                continue
+            try:
+                yield
+                return
+            finally:
+                path.unlink(missing_ok=True)
 
 
 def write_whole(path: Path, content: bytes) -> None:

@@ -27,40 +27,39 @@ _EVERY = 8
 """Stride in the list of screening corners; it selects two corners and their mirror images."""
 
 BISECTION = 5
-"""Flights that the bisection of a case is expected to take, beside those with its severities. The estimate of a
-campaign's time alone counts with it: the bisection itself ends where its resolution is reached."""
+"""Expected number of flights of a bisection, for the estimate of a campaign's time."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A controller in its scenario, with all that its flights depend on, and the vehicles that it flies."""
+    """A controller in its scenario, with everything that its flights depend on, and its vehicles."""
 
     name: str
     text: str
-    """The scenario, which stands alone"""
+    """The scenario, with everything that it extends"""
     design: Mapping[str, Any]
-    """Flat parameters of the controller's design, kept whole"""
+    """Flat parameters of the controller's design"""
     library: str
-    """SHA-256 of the controller's library; empty where it is in none"""
+    """SHA-256 of the controller's shared library; empty if it has none"""
     vehicles: tuple[Mapping[str, float], ...]
-    """Relative changes of the vehicle's parameters, the nominal vehicle first."""
+    """Relative changes of the vehicle's parameters, the nominal vehicle first"""
 
     @cached_property
     def scenario(self) -> Scenario:
-        """The scenario as it is."""
+        """The scenario without a fault of the campaign."""
         return parse_scenario(self.text, self.name)
 
     def start(self, moment: Moment) -> float:
-        """Return when a fault starts, s."""
+        """Return the start (s) of a fault."""
         return rounded(moment.share * self.scenario.duration)
 
     def file(self, moment: Moment, vehicle: int, fault: TriedFault | None = None, value: float = 0.0) -> str:
         """Return the scenario of a flight as a file.
 
         Args:
-            moment: When the fault starts; the flight ends so long after it.
-            vehicle: Number of the vehicle, whose changes take the place of the scenario's.
-            fault: The only fault; none for the flight that the others are compared with.
+            moment: Start of the fault; the flight ends :data:`OBSERVED` after it.
+            vehicle: Number of the vehicle, whose changes replace those of the scenario.
+            fault: The only fault; None for the flight with which the others are compared.
             value: Value of the parameter that is its severity.
         """
         table = scenario_table(self.text, self.name)
@@ -68,7 +67,7 @@ class Subject:
         period = self.design.get("period", PERIOD)
         steps = round((start + OBSERVED * self.scenario.duration) / period)
         table["duration"] = written(rounded(steps * period), "s")
-        table.pop("limits", None)  # what is expected of another flight
+        table.pop("limits", None)  # they hold for the flight without these faults
         changes = {name: f"{100.0 * change!r} %" for name, change in self.vehicles[vehicle].items()}
         table["vehicle"] = {**table.get("vehicle", {}), "perturbation": changes}
         table["fault"] = [fault.row(value, start)] if fault else []
@@ -77,25 +76,27 @@ class Subject:
 
 @dataclass(frozen=True)
 class Case:
-    """A fault of one controller's flight at one time: its severities, vehicles and bisection are flown together."""
+    """A fault of one controller at one time: a batch with all severities and vehicles, and the bisection."""
 
     subject: Subject
     fault: str
     moment: Moment
+    kind: int = 0
+    """Number of the subject in the campaign"""
 
     @property
     def flights(self) -> int:
-        """Number of flights, those of the bisection estimated."""
+        """Number of flights; those of the bisection are estimated."""
         return len(TRIED[self.fault].values) * len(self.subject.vehicles) + BISECTION
 
     @property
     def label(self) -> str:
-        """A name for it among the cases of a campaign."""
+        """Name of the case in its campaign."""
         return f"{self.subject.name}_{self.fault}_{self.moment.name}"
 
     @property
     def text(self) -> str:
-        """All that its flights depend on but the code, as JSON."""
+        """Everything that the flights depend on except the code, as JSON."""
         values = {"subject": asdict(self.subject), "fault": asdict(TRIED[self.fault]), "moment": self.moment.name}
         return json.dumps(values, sort_keys=True)
 
@@ -109,9 +110,14 @@ class ResilienceCampaign:
     """Names in :data:`hsv.flight.resilience.faults.TRIED`."""
 
     @cached_property
-    def cases(self) -> list[Case]:
+    def batches(self) -> list[Case]:
         """All cases, in a fixed order."""
-        return [Case(s, fault, moment) for s in self.subjects for fault in self.faults for moment in Moment]
+        return [
+            Case(subject, fault, moment, kind)
+            for kind, subject in enumerate(self.subjects)
+            for fault in self.faults
+            for moment in Moment
+        ]
 
     @property
     def text(self) -> str:
@@ -159,7 +165,7 @@ def _subject(name: str) -> Subject:
         design, library = design_parameters(scenario), library_digest(scenario.controller)
     law = FlightVariants(scenario, design).unchanged.nominal_trajectory.law
     corners = screening_corners(scenario.vehicle.described.uncertainty)[::_EVERY]
-    # What is solved in every step takes a hundred times the time.
+    # A problem that is solved in flight takes about a hundred times as long.
     vehicles = corners if law.in_core else corners[:1]
     subject = Subject(Path(name).stem, scenario_text(name), design, library, tuple(vehicles))
     for moment in Moment:

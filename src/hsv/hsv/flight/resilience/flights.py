@@ -1,4 +1,4 @@
-"""Flights of a resilience campaign: a case's severities on all vehicles, and the bisection on the nominal one."""
+"""Flights of a resilience campaign: all severities of a case on all vehicles, and a bisection on the nominal one."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hsv.flight.campaign.variants import FlightVariants
 from hsv.flight.closed_loop import fly
 from hsv.flight.flight import Flight
 from hsv.flight.metrics import FlightData
-from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
+from hsv.flight.resilience.campaign import ResilienceCampaign, Subject
 from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
 from hsv.flight.scenario import parse_scenario
 from hsv.model.plant import FlightStatus
@@ -27,7 +27,7 @@ ATTITUDE_BAND, ALTITUDE_BAND = np.deg2rad(0.5), 30.0 * 0.3048
 """Distances (rad, m) from the flight without the fault within which a flight counts as recovered."""
 
 _RUNNERS = 16
-"""Runners that a worker keeps: those of eight controllers, so that what is built to time a flight is there later."""
+"""Number of runners that a worker keeps: two times of eight controllers"""
 
 _ALTITUDE, _ATTITUDE = 0, slice(2, 4)
 """Columns of the state: altitude; angle of attack and pitch angle."""
@@ -44,25 +44,25 @@ class FlownFault:
     vehicle: int
     """0: the nominal one"""
     survived: bool
-    """Whether it came to its end within the range of the model"""
+    """Whether the flight came to its end within the range of the model"""
     attitude: float | None
-    """Largest distance of angle of attack or pitch angle after the fault, rad; None where its controller crashed"""
+    """Largest deviation of angle of attack or pitch angle after the fault, rad; None if the controller failed"""
     altitude: float | None
-    """The same of altitude, m"""
+    """Largest deviation of altitude after the fault, m; None if the controller failed"""
     recovery_time: float | None
-    """Time after the fault at which it last left the band, s; None where it is out at the end"""
+    """Time after the fault from which on the flight stays within the band, s; None if it ends outside"""
     time_to_loss: float | None
-    """Time after the fault at which it was lost, s; None where it was not, or its controller crashed"""
+    """Time after the fault at which the flight was lost, s; None if it was not, or the controller failed"""
     crashed: str | None
-    """Why its controller ended it."""
+    """Error of the controller, if it failed"""
 
 
 @dataclass(frozen=True)
 class Boundary:
     """The severities (0 to 1) on the nominal vehicle between which a controller is lost.
 
-    ``survived`` is None where the harmless end is lost, ``lost`` where the worst one is survived. Where a milder fault
-    is lost and a more severe one survived, it is the mildest loss that counts.
+    ``survived`` is None if the harmless end is lost, ``lost`` is None if the worst end is survived. If a milder fault
+    is lost and a more severe one survived, the mildest loss counts.
     """
 
     survived: float | None
@@ -70,7 +70,7 @@ class Boundary:
 
 
 class SubjectRunner:
-    """Flies one controller's flights for one time of occurrence; what they share is built once."""
+    """Flies one controller with faults at one time; components that the flights share are built once."""
 
     def __init__(self, subject: Subject, moment: Moment) -> None:
         if library_digest(subject.scenario.controller) != subject.library:
@@ -87,23 +87,19 @@ class SubjectRunner:
         """Fly with a fault, or without.
 
         Raises:
-            ControllerError: The controller ended the flight.
+            ControllerError: The controller failed.
         """
         text = self._subject.file(self._moment, vehicle, fault, value)
         return fly(self._variants.components(parse_scenario(text, self._subject.name)))
 
     def without(self, vehicle: int) -> FlightData:
-        """Return the flight without a fault, with which the others are compared.
-
-        Raises:
-            ControllerError: The controller ended the flight.
-        """
+        """Return the flight without a fault, with which the others are compared; errors as :meth:`fly`."""
         if vehicle not in self._without:
             self._without[vehicle] = self.fly(vehicle).data()
         return self._without[vehicle]
 
     def outcome(self, severity: str, vehicle: int, fault: TriedFault, value: float) -> FlownFault:
-        """Fly with a fault and return what became of the flight."""
+        """Fly with a fault and return the result."""
         try:
             flight, without = self.fly(vehicle, fault, value), self.without(vehicle)
         except ControllerError as error:
@@ -127,14 +123,14 @@ def distances(flight: FlightData, without: FlightData, start: float) -> tuple[fl
 
     Args:
         flight: Flight with the fault.
-        without: The same flight without it; where either ends early, what both have is compared.
-        start: Start of the fault.
+        without: The same flight without it; if either ends early, the common steps are compared.
+        start: Start of the fault, s.
     """
     rows = min(len(flight.time), len(without.time))
     after = np.flatnonzero(flight.time[:rows] >= start - 1e-9)
     apart = np.abs(flight.state[after] - without.state[after])
     attitude, altitude = apart[:, _ATTITUDE].max(axis=1), apart[:, _ALTITUDE]
-    # What is no number is not within.
+    # NaN counts as outside.
     outside = np.flatnonzero(~((attitude <= ATTITUDE_BAND) & (altitude <= ALTITUDE_BAND)))
     recovery: float | None = 0.0
     if len(outside):
@@ -149,10 +145,10 @@ def boundary(
     """Return the severities between which a controller is lost, found by bisection.
 
     Args:
-        survives: Tells it of a severity.
+        survives: Flies a severity, and returns whether the controller survives it.
         known: Known results by severity.
-        resolution: Largest difference of the two.
-        at: Returns the severity that is flown for one, where only some can be.
+        resolution: Largest distance of the two severities.
+        at: Returns the nearest severity that can be flown; some parameters are integers.
     """
     known = dict(known)
     if all(known.values()):
@@ -185,33 +181,21 @@ def _runner(text: str, subject: int, moment: Moment) -> SubjectRunner:
     return SubjectRunner(_campaign(text).subjects[subject], moment)
 
 
-def runner_of(text: str, case: Case) -> SubjectRunner:
-    """Return the runner of a case of the campaign written in ``text``; a worker process keeps the last ones."""
-    names = [subject.name for subject in _campaign(text).subjects]
-    return _runner(text, names.index(case.subject.name), case.moment)
-
-
-def time_flight(text: str, number: int) -> bytes:
-    """Fly one fault on the nominal vehicle as :func:`fly_case` does; return how long it took (s), as a text.
-
-    Args:
-        text: Text of the campaign.
-        number: Number of the case times the number of severities, plus the number of the severity.
-    """
-    number, chosen = divmod(number, len(SEVERITIES))
-    case = _campaign(text).cases[number]
-    runner, fault = runner_of(text, case), TRIED[case.fault]
-    with suppress(ControllerError):
-        runner.without(0)  # what is built once is there then
+def time_flight(text: str, kind: int) -> bytes:
+    """Return how long (s, as a text) a flight of a subject takes without a fault, by the subject's number."""
+    runner = _runner(text, kind, Moment.after)
+    with suppress(ControllerError):  # which the results of the flights tell
+        runner.without(0)
     started = time.perf_counter()
-    runner.outcome(SEVERITIES[chosen], 0, fault, fault.values[chosen])
+    with suppress(ControllerError):
+        runner.fly(0)
     return repr(time.perf_counter() - started).encode()
 
 
 def fly_case(text: str, number: int) -> bytes:
     """Fly a case, by its number, of the campaign written in ``text``; return its flights and boundary as JSON."""
-    case = _campaign(text).cases[number]
-    runner, fault = runner_of(text, case), TRIED[case.fault]
+    case = _campaign(text).batches[number]
+    runner, fault = _runner(text, case.kind, case.moment), TRIED[case.fault]
     flown = [
         runner.outcome(severity, vehicle, fault, value)
         for severity, value in zip(SEVERITIES, fault.values, strict=True)

@@ -9,7 +9,7 @@ from hsv.base.errors import CampaignError
 from hsv.flight.resilience.campaign import Case, ResilienceCampaign, Subject
 from hsv.flight.resilience.faults import SEVERITIES, TRIED, Moment, TriedFault
 from hsv.flight.resilience.flights import Boundary, FlownFault
-from hsv.flight.resilience.run import CaseStore
+from hsv.flight.resilience.store import CaseStore
 
 
 @dataclass(frozen=True)
@@ -107,21 +107,19 @@ class ResilienceResults:
         Raises:
             CampaignError: A case is missing.
         """
-        squares = {}
-        for fault in campaign.faults:
-            for subject in campaign.subjects:
-                cells, boundaries = {}, {}
-                for moment in Moment:
-                    case = Case(subject, fault, moment)
-                    outcome = store.read(case)
-                    if outcome is None:
-                        raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
-                    flights, boundaries[moment] = outcome
-                    cells[moment] = tuple(
-                        Cell(case, severity, tuple(f for f in flights if f.severity == severity))
-                        for severity in SEVERITIES
-                    )
-                squares[fault, subject.name] = Square(fault, subject, cells, boundaries)
+        squares = {
+            (fault, subject.name): Square(fault, subject, {}, {})
+            for fault in campaign.faults
+            for subject in campaign.subjects
+        }
+        for case in campaign.batches:
+            if (outcome := store.read(case)) is None:
+                raise CampaignError(f"{store.folder}: {case.label} is missing; the same command flies it")
+            square, (flights, boundary) = squares[case.fault, case.subject.name], outcome
+            square.boundaries[case.moment] = boundary
+            square.cells[case.moment] = tuple(
+                Cell(case, severity, tuple(f for f in flights if f.severity == severity)) for severity in SEVERITIES
+            )
         return cls(campaign, squares)
 
     @property

@@ -14,8 +14,8 @@ from markupsafe import Markup
 
 from hsv.base.errors import CampaignError, ControllerError, reason
 from hsv.base.units import UnitSystem
+from hsv.flight.campaign.campaign import Factor
 from hsv.flight.campaign.envelope import SIGNALS, signals, window_starts
-from hsv.flight.campaign.factors import Factor
 from hsv.flight.campaign.summary import (
     ENDED,
     Distribution,

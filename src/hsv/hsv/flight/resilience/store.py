@@ -1,0 +1,79 @@
+"""Storage of a resilience campaign: a file per case, under a digest of everything that its flights depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from hsv.base.errors import CampaignError, reason
+from hsv.base.files import parse_json, read_text
+from hsv.flight.campaign.store import locked, write_whole
+from hsv.flight.resilience.campaign import Case, ResilienceCampaign
+from hsv.flight.resilience.flights import Boundary, FlownFault, fly_case, time_flight
+from hsv.flight.sources import DIGITS, code_digest, digest_of, drop_older
+
+_SPACE = 8000
+"""Disk space (bytes) of a case: its numbers and the scenarios of its worst flights"""
+
+Outcome = tuple[tuple[FlownFault, ...], Boundary]
+"""Flights of a case, and the severities between which the controller is lost."""
+
+
+class CaseStore:
+    """Stores the results of a campaign's cases; those of other campaigns may be in the same folder."""
+
+    fly = staticmethod(fly_case)
+    time = staticmethod(time_flight)
+
+    def __init__(self, out: Path, campaign: ResilienceCampaign) -> None:
+        self.folder = out / "cases"
+        self._cases = campaign.batches
+        # The digest is of the code that is loaded: files may change during the flights.
+        self._code = [code_digest().encode()]
+
+    @contextmanager
+    def opened(self, *, restart: bool = False) -> Iterator[set[int]]:
+        """Lock the folder, and yield the numbers of the finished cases; only one process at a time may fly into it.
+
+        Args:
+            restart: Whether to fly all cases again.
+
+        Raises:
+            CampaignError: The folder cannot be made, or is in use.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise CampaignError(f"{self.folder}: cannot be made ({reason(error)})") from error
+        with locked(self.folder / ".lock", f"{self.folder}: in use, another process is flying this campaign"):
+            yield {n for n, case in enumerate(self._cases) if not restart and self.read(case) is not None}
+
+    def keep(self, number: int, content: bytes) -> None:
+        """Store the results of a case, and remove those of other code.
+
+        Raises:
+            CampaignError: They cannot be written.
+        """
+        path = self._path(self._cases[number])
+        write_whole(path, content)
+        drop_older(path)
+
+    def finish(self) -> None:
+        """Do nothing: the results are the files of the cases."""
+
+    def space(self, flights: int, batches: int) -> int:
+        """Return the disk space (bytes) that so many cases take."""
+        return _SPACE * batches
+
+    def read(self, case: Case) -> Outcome | None:
+        """Return the results of a case, None if it was not flown or its file is damaged."""
+        try:
+            values = parse_json(read_text(self._path(case)))
+            return tuple(FlownFault(**row) for row in values["flights"]), Boundary(**values["boundary"])
+        except (ValueError, KeyError, TypeError):
+            return None
+
+    def _path(self, case: Case) -> Path:
+        digest = digest_of([case.text.encode(), *self._code])
+        return self.folder / f"{case.label}_{digest[:DIGITS]}.json"
