@@ -16,7 +16,7 @@ from hsv.cli.main import EXIT_CODES
 from hsv.cli.output import unit_key
 from hsv.control.design import find_design
 from hsv.flight.metrics import METRICS
-from hsv.flight.scenario import scenario_names, scenario_text
+from hsv.flight.scenario import scenario_text
 
 PRINT_NO_NUMBERS = {"include", "play", "fault", "montecarlo"}
 VISIBLE = [name for name, command in COMMANDS.items() if command.panel]
@@ -167,22 +167,6 @@ def test_linearise_decoupled_has_the_structural_modes(hsv):
     frequencies = [round(p["natural_frequency_rad_per_s"], 6) for p in values["poles"]]
     assert 16.02 in frequencies
     assert 19.58 in frequencies
-
-
-def test_scenarios_lists_them_all(hsv):
-    assert set(hsv("list", "scenarios", "--json").json) == set(scenario_names())
-    out = hsv("list", "scenarios").out
-    assert all(name in out for name in scenario_names())
-
-
-def test_vehicles_lists_them_all_and_shows_one_that_can_be_flown(hsv, tmp_path):
-    assert set(hsv("list", "vehicles", "--json").json) == {"parker", "stiffened"}
-    assert all(name in hsv("list", "vehicles").out for name in ("parker", "stiffened"))
-    (tmp_path / "mine.toml").write_text(hsv("list", "vehicles", "stiffened").out)
-    table = hsv("list", "vehicles", "mine.toml", "--json").json
-    assert table["rigid_body"]["mass"] == {"value": "318 slug", "symbol": "m", "uncertainty": "10 %"}
-    mine, shipped = (hsv("trim", "--vehicle", name, "--json").json for name in ("mine.toml", "stiffened"))
-    assert mine == shipped != hsv("trim", "--json").json
 
 
 def test_coupling_by_number_lies_between_the_named_sets(hsv):
@@ -367,7 +351,6 @@ def design_with(gain, words):
         ("simulate case1 --json --json", "--json: given twice, expected once"),
         ("trim --altitude 1 --units si --altitude 2", "--altitude: given twice, expected once"),
         ("montecarlo case1 --samples 3 --samples 4", "--samples: given twice, expected once"),
-        ("list faults oscilation", "fault = 'oscilation': expected one of loss_of_effectiveness, "),
         ("simulate case1 --out x.csv", "out = 'x.csv': expected a file that ends in .npz"),
     ],
 )

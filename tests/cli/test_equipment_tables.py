@@ -1,7 +1,8 @@
-"""Wrong tables of faults, actuators, air, sensors, links, wrong seeds: one line that says what was due, exit code 2."""
+"""Wrong tables of faults, actuators, air, sensors, links, wrong seeds: one line that says what was expected."""
 
 import pytest
 
+from hsv.base.errors import ScenarioError
 from hsv.flight.scenario import parse_scenario
 
 FLIGHT = """
@@ -181,12 +182,11 @@ def flight(text):
 
 
 @pytest.mark.parametrize(("text", "message"), WRONG)
-def test_what_is_wrong_ends_a_command_with_one_line_that_names_it(hsv, tmp_path, text, message):
-    (tmp_path / "flight.toml").write_text(flight(text))
-    ran = hsv("simulate", "flight.toml")
-    assert ran.code == 2
-    assert ran.error.startswith("scenario 'flight': ")
-    assert message in ran.error
+def test_what_is_wrong_is_refused_with_one_line_that_names_it(text, message):
+    with pytest.raises(ScenarioError) as refused:
+        parse_scenario(flight(text), "flight")
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith("scenario 'flight': ") and message in str(refused.value)
 
 
 def test_the_flight_is_right_without_what_is_wrong():
