@@ -1,13 +1,20 @@
-"""Controllers in shared libraries: where a scenario says they are, and what a recorded flight keeps of them."""
+"""Controllers in shared libraries."""
 
+import ctypes
 import hashlib
+import os
 import shutil
 
+import numpy as np
 import pytest
 from c_libraries import PROBE, build_probe
+from numpy.testing import assert_array_equal
 
 from hsv.base.errors import ParameterError
-from hsv.control.library import inside, library_digest, library_record, seen_from
+from hsv.control.controller import CONTROLLER_INPUTS, CONTROLLER_OUTPUTS
+from hsv.control.library import inside, library_digest, library_record, load_block, seen_from
+from hsv.control.library_process import SharedMemory
+from hsv.model.signals import FILTER_STATE
 
 
 def test_a_flight_keeps_digest_and_source_of_its_library(tmp_path):
@@ -42,3 +49,64 @@ def test_what_is_no_library_is_refused(tmp_path):
         library_record(f"{tmp_path / 'text.so'}:probe")
     with pytest.raises(ParameterError, match=r"controller = '.*nowhere.so:probe': "):
         library_digest(f"{tmp_path / 'nowhere.so'}:probe")
+
+
+def test_shared_memory_grows_and_keeps_what_it_holds():
+    memory = SharedMemory()
+    memory.numbers(3)[:] = [1.0, 2.0, 3.0]
+    assert_array_equal(memory.numbers(2), [1.0, 2.0])
+    assert_array_equal(memory.numbers(1000), [1.0, 2.0, 3.0, *np.zeros(997)])
+    other = SharedMemory(os.dup(memory.descriptor))
+    other.numbers(1000)[999] = 4.0
+    assert memory.numbers(1000)[999] == 4.0
+
+
+def test_the_layout_of_the_header_is_that_of_the_bench(tmp_path):
+    library = build_probe(tmp_path, "-DINPUTS=HSV_CONTROLLER_INPUTS,HSV_FILTER_STATE_INPUT(4)")
+    block = load_block(library, "probe")
+    assert block.inputs == (*CONTROLLER_INPUTS[:-1], FILTER_STATE.of_size(4))
+    assert block.outputs == CONTROLLER_OUTPUTS
+    ends = [0]
+    for signal in CONTROLLER_INPUTS[:-1]:
+        ends.append(ends[-1] + signal.size)
+    assert list((ctypes.c_int64 * len(ends)).in_dll(ctypes.CDLL(str(library)), "offsets")) == ends
+
+
+def test_parameters_are_described_as_those_of_python(tmp_path):
+    block = load_block(build_probe(tmp_path), "probe")
+    assert (block.name, block.source, block.state_size) == ("probe", "probe.c", 1)
+    weight, crash_at, *_, above = block.parameters
+    assert (weight.name, weight.default, weight.unit) == ("probe.weight", [0.5, 0.02, 0.5], "1/s")
+    assert (weight.minimum, weight.maximum) == (-10.0, 10.0)
+    assert (crash_at.name, crash_at.default, crash_at.unit) == ("probe.crash_at", -1.0, "")
+    assert (above.unit, above.description) == ("m", "altitude")
+    above.check(-1e300)
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        (["-DABI=7"], r"^abi_version = 7, expected 1, as of hsv_block.h"),
+        (["-DSTEP=0"], r"^step = NULL, expected a function"),
+        (['-DNAME="two words"'], r"^name = 'two words', expected letters, digits and underscores"),
+        (['-DNAME="\\xff"'], r"^name = b'\\xff', expected text in UTF-8"),
+        (["-DNAME=0"], r"^name = '', expected letters"),
+        (["-DSTATE_SIZE=-1"], r"^state_size = -1, expected 0 to"),
+        (["-DINPUT_COUNT=1LL<<40"], r"^input_count = 1099511627776, expected 0 to"),
+        (['-DINPUTS={"x","m",0}'], r"^inputs\[0\].size = 0, expected 1 to"),
+        (['-DWEIGHT_UNIT="furlongz"'], r"^parameters\[0\].unit = 'furlongz', expected an SI unit"),
+        (['-DWEIGHT="crash_at"'], r"^parameters probe.crash_at, probe.crash_at, .*expected names that differ"),
+    ],
+)
+def test_a_wrong_description_is_named(tmp_path, flags, message):
+    library = build_probe(tmp_path, "-Wno-error", "-w", *flags)
+    with pytest.raises(ParameterError, match=message):
+        load_block(library, "probe")
+
+
+def test_what_is_no_library_or_has_no_such_symbol_is_named(tmp_path):
+    (tmp_path / "text.so").write_text("no library")
+    with pytest.raises(ParameterError, match=r"^cannot be loaded \(.*\), expected a shared library"):
+        load_block(tmp_path / "text.so", "probe")
+    with pytest.raises(ParameterError, match=r"^no symbol 'prob', expected a constant of the type hsv_block"):
+        load_block(build_probe(tmp_path), "prob")

@@ -180,7 +180,7 @@ def _actuators(v: Mapping[str, Any], design: ControlDesign) -> Iterator[str]:
     for i, channel in enumerate(INPUT_NAMES):
         where = f"actuator.{channel}"
         flown, certified = v[f"{where}.set"], known.get(channel, IDEAL)
-        # The vehicle's stops, which the tightened inputs keep off, hold beside those of the actuator.
+        # The stops of the vehicle, which the tightened inputs avoid, hold as well as those of the actuator.
         own = [
             _quantity(p, v[p.name][0])
             for p in ACTUATOR_PARAMETERS

@@ -33,18 +33,18 @@ EFFECTIVENESS_PARAMETERS = (
     ),
     Parameter("effectiveness.noise", 0.0, "largest error of a measured change of the pitch rate", "rad/s", 0.0, 0.1),
 )
-"""Parameters of the estimator beside those of the vehicle and of the start of the flight."""
+"""Parameters of the estimator; it also needs those of the vehicle and of the start of the flight."""
 
 
 WATCHED_PARAMETERS = (*INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
-"""What the estimator must know of the flight: the nominal vehicle, and the trim in which it starts."""
+"""Parameters of the nominal vehicle and of the initial trim, which the estimator needs."""
 
 _MODE = 7
-"""Place of the mode in what is known."""
+"""Index of the mode in ``known``."""
 
 
 class EffectivenessMode(IntEnum):
-    """What the estimator takes the elevator for."""
+    """The estimator's diagnosis of the elevator."""
 
     HEALTHY = 0
     LOSS = 1
@@ -52,12 +52,12 @@ class EffectivenessMode(IntEnum):
     OTHER = 2
     """An offset explains them, a loss of effectiveness does not."""
     PENDING = 3
-    """What is to replace the explanation so far has yet to explain more steps."""
+    """A new explanation must first hold for more steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class EffectivenessData(Data):
-    """The estimator as the core takes it.
+    """The estimator for the core.
 
     The nominal ``vehicle``, the state (9) in which the flight starts, T (s), relative bounds of the moment of inertia
     and of the elevator's effect, then the parameters; ``learning`` and ``drift`` per step.
@@ -79,7 +79,7 @@ class EffectivenessData(Data):
 
 
 class Effectiveness(NamedTuple):
-    """What is known of the effectiveness after a step: the value used, the interval that it lies in, and the mode."""
+    """The effectiveness after a step: the value used, the interval that contains it, and the mode."""
 
     estimate: float
     low: float
@@ -87,14 +87,14 @@ class Effectiveness(NamedTuple):
     mode: EffectivenessMode
 
     def __str__(self) -> str:
-        """Say it in words."""
-        said = {
+        """Return a description."""
+        words = {
             EffectivenessMode.HEALTHY: "healthy",
             EffectivenessMode.LOSS: f"effectiveness {self.estimate:.3f}, from {self.low:.3f} to {self.high:.3f}",
             EffectivenessMode.OTHER: "faulty, not a loss of effectiveness",
             EffectivenessMode.PENDING: f"unexplained, effectiveness {self.estimate:.3f} kept",
         }
-        return said[self.mode]
+        return words[self.mode]
 
 
 def effectiveness_data(values: Mapping[str, Any], period: float) -> EffectivenessData | None:
@@ -128,13 +128,13 @@ def effectiveness_data(values: Mapping[str, Any], period: float) -> Effectivenes
 
 
 def effectiveness_in(memory: np.ndarray) -> Effectiveness:
-    """Return what the ``memory`` of the tube law, a record ``hsv_tube_memory``, says after a step."""
+    """Return the effectiveness in the ``memory`` of the tube law, a record ``hsv_tube_memory``."""
     estimate, low, high = memory["known"][:3].tolist()
     return Effectiveness(estimate, low, high, EffectivenessMode(int(memory["known"][_MODE])))
 
 
 def effectiveness_along(data: EffectivenessData, states: np.ndarray, inputs: np.ndarray) -> list[Effectiveness]:
-    """Return what the estimator knows after each step of a flight.
+    """Return the effectiveness after each step of a flight.
 
     Args:
         data: The estimator.

@@ -56,7 +56,7 @@ N_ESTIMATED = N_STATES + N_INPUTS
 """The states and an offset of each input."""
 
 _SENSED = ("sensors.set", *(f"sensors.{name}.noise" for name in STATE_NAMES[:N_RIGID]))
-"""Parameters that say how noisy the sensors are."""
+"""Parameters of the noise of the sensors."""
 
 _SETTLED = 1e-12
 """Relative change of the gain in an iteration, at most, where it is steady."""
@@ -65,7 +65,7 @@ _MAX_ITERATIONS = 100_000
 
 @dataclass(frozen=True, eq=False)
 class EstimatorData(Data):
-    """The estimator as the core takes it: its ``gain`` (11, 5), the model ``vehicle``, how it is integrated."""
+    """The estimator for the core: its ``gain`` (11, 5), the model ``vehicle``, how it is integrated."""
 
     KIND = "hsv_estimator"
     gain: np.ndarray

@@ -1,10 +1,10 @@
 """Command governor: the fastest jerk-limited reference whose nominal plan stays inside U minus F Z at every step.
 
-A command, whatever its form, is a list of legs: a point of altitude and velocity, when it is asked for, and the least
-time that the way there is to take. A leg is flown as a ramp with blended corners along the climbing, accelerating trims
-of :mod:`hsv.control.reference_trajectory`. Its length is found by bisection, in whole periods: the shortest for which
-x_n (paper eq. 20), driven by the defect of the reference, leaves u_r + u_n inside U minus F Z (eq. 30) in every step,
-and no input changes faster than its actuator can.
+A command is a list of legs: a point of altitude and velocity, the time of the request, and the least duration. A leg is
+flown as a ramp with blended corners along the climbing, accelerating trims of :mod:`hsv.control.reference_trajectory`.
+Its length is found by bisection, in whole periods: the shortest for which x_n (paper eq. 20), driven by the defect of
+the reference, leaves u_r + u_n inside U minus F Z (eq. 30) in every step, and no input changes faster than its actuator
+can.
 """
 
 from __future__ import annotations
@@ -28,20 +28,20 @@ from hsv.model.signals import INPUT_NAMES, INPUT_UNITS, N_INPUTS, N_STATES
 from hsv.model.vehicle import Vehicle
 
 LONGEST = 600.0
-"""Length of a leg (s) that is given up: a slower one leaves no more room to speak of."""
+"""Maximum length of a leg (s): slower ones hardly leave more room."""
 
 AFTERWARDS = 10.0
 """Time (s) for which a plan is watched after its last corner; x_n has died out then."""
 
 USUAL_BLEND = 2.0
-"""Half the time (s) in which the rate changes at a corner, where nothing else is asked for."""
+"""Half the time (s) in which the rate changes at a corner, by default."""
 
 KEPT_FREE = 1e-3
 """Share of U minus F Z that is kept free on every side: in flight the plan is scheduled by what is measured."""
 
 
 class Leg(NamedTuple):
-    """The way to a point: altitude (m), velocity (m/s); ``start`` (s) when it is asked for, least ``duration`` (s)."""
+    """The way to a point: altitude (m), velocity (m/s); ``start`` (s) of the request, least ``duration`` (s)."""
 
     start: float
     duration: float
@@ -130,7 +130,7 @@ class Governor:
             blend: Half the time in which the rate changes at a corner, s; as whole periods.
 
         Raises:
-            GovernorError: A leg for which nothing fits; it says why.
+            GovernorError: No reference fits a leg; the reason is named.
         """
         half = self._half(blend)
         if not legs:
@@ -152,7 +152,7 @@ class Governor:
         of the corners, nor so early that a step before ``beginning`` would change.
 
         Raises:
-            GovernorError: Nothing fits; it says why.
+            GovernorError: No reference fits; the reason is named.
         """
         half = self._half(blend)
         last = corners[-1]
@@ -303,7 +303,7 @@ class CommandGovernor:
             The first step that differs, and the time (s) at which the reference comes to rest.
 
         Raises:
-            GovernorError: A number out of its range, or nothing fits; it says why. The reference stays as it was.
+            GovernorError: A number out of its range, or no reference fits; the reference stays as it was.
         """
         ranges = {
             "altitude": (altitude, "m", self._vehicle.altitude_range),

@@ -55,7 +55,7 @@ COLUMNS = ("times", "altitudes", "velocities", "blends")
 """Names of what a corner has, in the plural: of parameters, after ``reference.``, and of the fields of a message."""
 
 SUBSTEPS = 2
-"""Runge-Kutta steps per period in phi_T, as many as the plant takes unless it is told otherwise."""
+"""Runge-Kutta steps per period in phi_T, the default of the plant."""
 
 
 class Corner(NamedTuple):

@@ -1,9 +1,10 @@
 """Tube-MPC law (paper eq. 36, eq. 48, eq. 54): u = F diag(tau) (x - x_r - x_n) + u_n + u_r within the limits.
 
-The pitch rate in x is the filtered one; that of x_r + x_n is too where the design says so (eq. 48). Integral action on
-the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the offset that a
-wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know. Another one, off by
-default as well, divides the elevator command by its estimated effectiveness (:mod:`hsv.control.effectiveness`).
+The pitch rate in x is the filtered one; that of x_r + x_n is filtered too if ``design.filtered`` (eq. 48). Integral
+action on the altitude and velocity errors is a named extension of the paper's law, off by default: it removes the
+offset that a wrong mass or a lost elevator leaves, and adds two states that the invariant set does not know. Another
+one, off by default as well, divides the elevator command by its estimated effectiveness
+(:mod:`hsv.control.effectiveness`).
 """
 
 from __future__ import annotations
@@ -69,12 +70,12 @@ TUBE_PARAMETERS = (
 
 @dataclass(frozen=True, eq=False)
 class TubeData(Data):
-    """The law as the core takes it.
+    """The law for the core.
 
     ``gains`` F diag(tau) (c, 2, 9), each from its step in ``starts`` (c) on, the first from the beginning; input limits
-    (2); whether the error is one from the plan ``x_r + x_n``, or from x_r alone; whether the plan's pitch rate is
-    ``filtered``, by which ``notch``; rate (1/s) and ``period`` (s) of the integral action; the estimator of the
-    elevator's effectiveness, or None.
+    (2); ``planned``: whether the error is taken from the plan x_r + x_n, or from x_r alone; ``filtered``: whether the
+    pitch rate of the plan passes the ``notch`` filter; rate (1/s) and ``period`` (s) of the integral action; the
+    effectiveness estimator, or None.
     """
 
     KIND = "hsv_tube"
@@ -106,7 +107,7 @@ def no_tube(vehicle: VehicleParameters) -> TubeData:
 
 
 class TubeStep(NamedTuple):
-    """A step of the law: feedback, sum of all parts and limited input (2 each), the index of the gain that holds."""
+    """A step of the law: feedback, unsaturated input and limited input (2 each), and the index of the active gain."""
 
     feedback: np.ndarray
     unsaturated: np.ndarray
@@ -115,7 +116,7 @@ class TubeStep(NamedTuple):
 
 
 def tube_memory() -> np.ndarray:
-    """Return the memory of the law, a record, which step 0 begins."""
+    """Return the memory of the law, a record that step 0 initialises."""
     return np.zeros((), dtype("hsv_tube_memory"))
 
 
@@ -126,7 +127,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
         data: The law.
         memory: See :func:`tube_memory`, updated.
         inputs: Those of the controller.
-        monitored: Whether the filter of the plan is stepped even where the law does not need it.
+        monitored: Whether to step the filter of the plan even if the law does not need it.
     """
     k, feedback_state, q_f, *others = inputs
     sizes = (N_STATES, N_INPUTS, N_STATES, N_INPUTS, len(inputs.filter_state))
@@ -147,7 +148,7 @@ def tube_step(data: TubeData, memory: np.ndarray, inputs: ControllerInput, *, mo
 
 
 def active_gain(data: TubeData, step: int) -> int:
-    """Return the index of the gain that holds in ``step``."""
+    """Return the index of the active gain in ``step``."""
     return max(int(np.searchsorted(data.starts, step, side="right")) - 1, 0)
 
 
@@ -175,7 +176,7 @@ class TubeResult(ControllerResult):
 
 
 class TubeLaw(Controller):
-    """The controller's last stage."""
+    """The Tube-MPC law with its monitor: where the error is in the invariant set."""
 
     PARAMETERS = (*TUBE_PARAMETERS, *(p for p in WATCHED_PARAMETERS if p is not COUPLING_PARAMETER))
     in_core = True
@@ -240,7 +241,7 @@ class TubeLaw(Controller):
         self._arrange([(0, self._tau), *self._scheduled])
 
     def change_tau(self, values: Sequence[float]) -> int:
-        """Fly with the factors ``values``, one or five, from the next step on; return that step.
+        """Use the factors ``values``, one or five, from the next step on; return that step.
 
         Raises:
             ParameterError: They are not certified.

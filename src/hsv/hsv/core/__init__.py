@@ -1,7 +1,7 @@
 """The numeric core in C99, called through cffi: structs filled from Python objects by the names of their fields.
 
 ``core.h`` declares every struct once. :class:`Struct` fills one from an object with attributes of the same names. The
-comment beside an array in ``core.h`` gives its shape; arrays of another shape are refused. Fields that count elements,
+comment after an array in ``core.h`` gives its shape; arrays of another shape are refused. Fields that count elements,
 such as ``sections``, are set from the shapes.
 """
 

@@ -1,8 +1,8 @@
 """Actuators of the vehicle: published sets, their parameters, and the data that ``core/actuators.h`` steps.
 
-An actuator moves on substeps of a quarter of the control period, and so does the vehicle, whose effector is held over
-each at the mean of the substep's two ends. A channel whose actuator is ideal is where its command is; with all channels
-ideal and no fault of theirs the vehicle takes the command itself.
+Actuators and vehicle move on substeps of a quarter of the control period; the effector is held over each substep at the
+mean of the positions at its two ends. An ideal actuator follows its command at once. If all actuators are ideal and
+none has a fault, the vehicle receives the command itself.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ SUBSTEPS = 4
 
 @dataclass(frozen=True)
 class ActuatorSet:
-    """A published actuator, SI and radians; a limit that is infinite is none."""
+    """A published actuator, SI and radians; an infinite limit means no limit."""
 
     channel: str
     order: int
     """0 ideal, 1 or 2"""
     natural_frequency: float
-    """rad/s; the inverse of the time constant where the order is 1"""
+    """rad/s; the inverse of the time constant if the order is 1"""
     damping_ratio: float
     stop: float
-    """Largest magnitude of the position; the vehicle's limits hold beside"""
+    """Largest magnitude of the position; the vehicle's own limits hold as well"""
     rate_limit: float
     source: str
 
@@ -101,13 +101,13 @@ def _parameters() -> tuple[Parameter, ...]:
 
 
 ACTUATOR_PARAMETERS = _parameters()
-"""Empty: as the set has it."""
+"""Parameters of the actuators; an empty array means the value of the set."""
 
 
 class ActuatorData(NamedTuple):
-    """Actuators as the core takes them, an entry a channel (2), and the length ``substep`` (s) of a substep.
+    """Actuators for the core: arrays with an entry for each channel (2), and the length ``substep`` (s) of a substep.
 
-    ``map`` (2, 4) is that of :func:`actuator_map`, over a substep.
+    ``map`` (2, 4): :func:`actuator_map` over a substep.
     """
 
     order: np.ndarray
@@ -123,13 +123,13 @@ class ActuatorData(NamedTuple):
 
 
 def actuator_map(order: int, frequency: float, damping: float, h: float) -> tuple[float, float, float, float]:
-    """Return F11, F12, F21, F22 of position less command and rate over ``h`` (s), the command held: exact.
+    """Return the exact transition F11, F12, F21, F22 of position minus command, and rate, for a held command.
 
     Args:
-        order: 1: position less command decays by F11; 2.
-        frequency: rad/s.
-        damping: Up to 1, of an order of 2.
-        h: s.
+        order: 1 (F11 alone) or 2.
+        frequency: Natural frequency (rad/s).
+        damping: Damping ratio up to 1, for order 2.
+        h: Length (s).
     """
     found = ffi.new("double[4]")
     lib.hsv_actuator_map(int(order), frequency, damping, h, found)
@@ -189,7 +189,7 @@ def _one(values: Mapping[str, Any], name: str, standard: float) -> float:
 
 
 def actuators_at_rest(position: np.ndarray) -> np.ndarray:
-    """Return positions and rates (2, 2) of actuators that rest at ``position`` (2), as flights begin in trim."""
+    """Return positions and rates (2, 2) of actuators at rest at ``position`` (2)."""
     state = np.zeros((N_INPUTS, 2))
     state[:, 0] = position
     return state

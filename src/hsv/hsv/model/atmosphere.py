@@ -1,4 +1,4 @@
-"""Air that moves and whose density differs from the model's: wind, shear, gusts, turbulence; see ``core/atmosphere.h``.
+"""Wind, shear, gusts, turbulence and density that differs from the model's, see ``core/atmosphere.h``.
 
 The air is held over a control period. Turbulence is Dryden's (MIL-F-8785C, MIL-HDBK-1797).
 """
@@ -46,11 +46,11 @@ ATMOSPHERE_PARAMETERS = (
 )
 
 _MEMORY = 4
-"""Numbers that the air remembers beside the distance flown into each gust."""
+"""Size of the memory of the air without the distance flown into each gust"""
 
 
 class AtmosphereData(NamedTuple):
-    """The atmosphere as the core takes it, SI; gusts are rows (g), which begin in step ``gust_start``."""
+    """The atmosphere for the core, SI; gusts are rows (g), which begin in step ``gust_start``."""
 
     wind: np.ndarray
     shear: float
@@ -66,7 +66,7 @@ class AtmosphereData(NamedTuple):
     density_length: float
     period: float
     still: bool
-    """Whether nothing of it is on, so that it need not be stepped."""
+    """Whether the air is still and of the model's density; it is then not stepped"""
 
 
 def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereData:
@@ -107,5 +107,5 @@ def atmosphere_data(values: Mapping[str, object], period: float) -> AtmosphereDa
 
 
 def atmosphere_state(data: AtmosphereData) -> np.ndarray:
-    """Return room (4 + g) for what the air remembers, which the first step fills."""
+    """Return the memory (4 + g) of the air, which the first step fills."""
     return np.zeros(_MEMORY + len(data.gust_start))

@@ -1,15 +1,15 @@
-"""Links of the loop that are not ideal: payloads that come late, are lost or corrupted; see ``core/links.h``.
+"""Links of the loop that are not ideal: payloads arrive late, are lost or corrupted; see ``core/links.h``.
 
-There is a link from the sensors to the filter, the trajectory and the controller, and one from the controller to the
-fault injector. In every step something is sent and something is taken: the payload alone is withheld, never the message
-of a step, for which the loop waits. The receiver keeps the last payload that came. Before the flight, payloads like its
-first came from the sensors, and the input of the trim from the controller.
+One link leads from the sensors to the filter, the trajectory and the controller, another one from the controller to the
+fault injector. Every step sends and receives one message, for which the loop waits; only its payload may be withheld.
+The receiver keeps the last payload that arrived. Before the flight the sensors sent payloads equal to the first one,
+and the controller sent the input of the trim.
 
-A payload that is corrupted has one bit of one of its numbers turned over, of the 64 of a float. With a checksum, or
-where that makes a number that is not finite or beyond :data:`LARGEST`, the receiver notices, and the payload is lost.
+In a corrupted payload one of the 64 bits of one number is flipped. With a checksum, or if the number is then not finite
+or beyond :data:`LARGEST`, the receiver detects this, and the payload is lost.
 
-The time that the controller computes is told apart: its whole periods delay the link of the command, what remains of it
-is the time in a period from which on the actuators have the command, see :func:`computation`.
+The computing time of the controller is divided: its integer number of periods delays the link of the command; the rest
+is the time within a period at which the actuators receive the command, see :func:`computation`.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ MAX_DELAY = 50
 """Steps."""
 
 LARGEST = 1e6
-"""Magnitude (SI) above which a receiver knows that a number is corrupted."""
+"""Magnitude (SI) above which a receiver takes a number for corrupted."""
 
 MEASUREMENT_LINK, COMMAND_LINK = "measurement", "command"
 
 _CHANNELS = {MEASUREMENT_LINK: 0, COMMAND_LINK: 1}
-"""Place of a link among the streams of its random numbers."""
+"""Index of each link in the streams of random numbers."""
 
 
 def _parameters(link: str) -> tuple[Parameter, ...]:
@@ -57,14 +57,14 @@ MEASUREMENT_LINK_PARAMETERS = _parameters(MEASUREMENT_LINK)
 COMMAND_LINK_PARAMETERS = _parameters(COMMAND_LINK)
 
 _ACCEPTED = 3
-"""Numbers in the memory of a link before its payloads."""
+"""Size of the memory of a link without its payloads."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinkData(Data):
-    """A link as the core takes it: delays in steps, and probabilities.
+    """A link for the core: delays in steps, and probabilities.
 
-    Of a loss: ``loss`` in step 0, then ``loss_after_arrival`` and ``loss_after_loss``.
+    The probability of a loss is ``loss`` in step 0, then ``loss_after_arrival`` or ``loss_after_loss``.
     """
 
     KIND = "hsv_link"
@@ -80,7 +80,7 @@ class LinkData(Data):
 
 
 def computation(values: Mapping[str, object], period: float) -> tuple[int, float]:
-    """Return the time that the controller computes in whole periods, and the share of one that remains.
+    """Return the computing time of the controller: an integer number of periods, and the remaining share of one.
 
     Raises:
         ParameterError: A wrong value, named.
@@ -101,7 +101,7 @@ def measurement_link(values: Mapping[str, object]) -> LinkData:
 
 
 def command_link(values: Mapping[str, object], period: float) -> LinkData:
-    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, with the whole periods of the computation.
+    """Return the link that :data:`COMMAND_LINK_PARAMETERS` describe, delayed by the periods of the computation.
 
     Raises:
         ParameterError: A wrong value, named.
@@ -131,9 +131,12 @@ def _link(name: str, values: Mapping[str, object], computing: int) -> LinkData:
 
 
 def link_state(link: LinkData, size: int, before: np.ndarray | None = None) -> np.ndarray:
-    """Return the memory of a ``link`` of payloads of so many numbers.
+    """Return the memory of a link.
 
-    ``before``: what was sent until the flight begins; None: the first payload of the flight.
+    Args:
+        link: The link.
+        size: Numbers of a payload.
+        before: The payload (size) sent before the flight; None: the first payload of the flight.
     """
     memory = np.zeros(_ACCEPTED + size * (link.delay + link.jitter + 2))
     if before is not None:

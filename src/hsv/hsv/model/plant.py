@@ -1,4 +1,4 @@
-"""The simulated vehicle, one control period at a time."""
+"""The simulated vehicle, stepped by control periods."""
 
 from __future__ import annotations
 
@@ -65,14 +65,14 @@ EQUIPMENT_PARAMETERS = (
     *MEASUREMENT_LINK_PARAMETERS,
     COMPUTATION_PARAMETER,
 )
-"""Parameters of everything that is ideal by default; the tables of a scenario are named after them."""
+"""Parameters of the equipment, which is ideal by default; a scenario has tables of the same names."""
 
 
 def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, period: float) -> None:
-    """Refuse :data:`EQUIPMENT_PARAMETERS`, or those of the command's link, that do not fit one another.
+    """Check :data:`EQUIPMENT_PARAMETERS` and the parameters of the command's link.
 
     Raises:
-        ParameterError: Names the one that is wrong.
+        ParameterError: A wrong value, or values that contradict each other, named.
     """
     actuator_data(values, vehicle, period)
     atmosphere_data(values, period)
@@ -82,16 +82,16 @@ def check_equipment(values: Mapping[str, object], vehicle: VehicleParameters, pe
 
 
 CALM = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 0.0])
-"""Conditions of air and engine in still air, with an engine that works."""
+"""Conditions of still air and a working engine"""
 
 _CALM = CALM.tolist()
 
 
 @dataclass(frozen=True, eq=False)
 class PlantData(Data):
-    """The plant as the core takes it; ``period`` T (s).
+    """The plant for the core; ``period`` T (s).
 
-    The actuators have the command of a period ``late`` substeps after its beginning.
+    The actuators receive the command of a period ``late`` substeps after its beginning.
     """
 
     KIND = "hsv_plant"
@@ -113,7 +113,7 @@ class PlantData(Data):
 
 
 class PlantMemory(NamedTuple):
-    """What the plant remembers besides the state x, updated in place.
+    """The memory of the plant besides the state x, updated in place.
 
     Position and rate of the actuators (2, 2); the command and the effectors of the period before (2 each); the memories
     of the atmosphere, of the sensors and of the link of the measurement; the conditions (7) of the last period.
@@ -137,16 +137,16 @@ class PlantFaults(NamedTuple):
 
     @classmethod
     def of(cls, scheduled: Sequence[ScheduledFault], period: float, before: PlantFaults | None = None) -> PlantFaults:
-        """Return those among the ``scheduled``; the faults that were known ``before`` keep their memory."""
+        """Return the ``scheduled`` faults by side; the faults in ``before`` keep their memory."""
         sides = ((DYNAMICS, EFFECTOR), (ENGINE_SIDE,), (SENSOR,))
         return cls._make(fault_rows(side, scheduled, period, before and before[i]) for i, side in enumerate(sides))
 
 
 class PlantResult(NamedTuple):
-    """The state x (9) of a step, what is measured of it (9), and what has led to it.
+    """The state x (9) of a step, its measurement (9), and forces, effectors and air that led to it.
 
-    Lift N, drag N, thrust N, pitching moment N m and dynamic pressure Pa there; where the effectors (2) were last; wind
-    forward and up (m/s) and density for that of the model over the period before (3); the status.
+    ``forces``: lift N, drag N, thrust N, pitching moment N m, dynamic pressure Pa. ``effector`` (2): last positions.
+    ``air`` (3): wind forward and up (m/s), and density relative to the model's, over the period before.
     """
 
     step: int
@@ -159,9 +159,9 @@ class PlantResult(NamedTuple):
 
 
 class Plant:
-    """The vehicle under held inputs, with its actuators and sensors and the link behind these, in its air.
+    """The vehicle under held inputs, with its actuators, its sensors, their link, and the air.
 
-    It starts in the trim of the *nominal* vehicle in still air, perturbed or not.
+    It starts in the trim of the *nominal* vehicle in still air, even if it is perturbed.
     """
 
     PARAMETERS = (*PLANT_PARAMETERS, *VEHICLE_PARAMETERS, *EQUIPMENT_PARAMETERS, SEED_PARAMETER)
@@ -183,7 +183,7 @@ class Plant:
             period: T (s).
             steps: Number of steps of the flight.
             substeps: Runge-Kutta steps a period, while actuators are ideal.
-            equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; the rest is as by default: ideal.
+            equipment: Values of :data:`EQUIPMENT_PARAMETERS`, and the seed; the default is ideal equipment.
         """
         self.vehicle = vehicle
         self.initial = initial
@@ -217,11 +217,11 @@ class Plant:
         return cls(vehicle, initial, v["period"], round(v["duration"] / v["period"]), v["substeps"], equipment)
 
     def perturbed(self, perturbation: Mapping[str, float]) -> Plant:
-        """Return the same with another vehicle, relative changes by parameter name; it starts in the same trim."""
+        """Return a plant with relative changes of the vehicle, by parameter name; it starts in the same trim."""
         return self.varied(self.vehicle.perturbed(perturbation), self.data.seed)
 
     def varied(self, vehicle: VehicleParameters, seed: int) -> Plant:
-        """Return the same with a ``vehicle`` of the same limits and another ``seed``; what these leave is shared."""
+        """Return a plant with another ``vehicle`` of the same limits and another ``seed``; other data are shared."""
         other = copy(self)
         other.vehicle = vehicle
         other.data = self.data.replaced(vehicle=vehicle, seed=seed)
@@ -229,7 +229,7 @@ class Plant:
         return other
 
     def is_ideal(self, scheduled: Sequence[ScheduledFault]) -> bool:
-        """Tell whether the equipment is ideal and the air still, and no fault in a schedule changes that."""
+        """Return whether equipment and air are ideal and stay so under the ``scheduled`` faults."""
         return self.data.ideal and all(row.fault.kind.side == COMMAND for row in scheduled)
 
     def reset(self) -> PlantResult:
@@ -258,16 +258,16 @@ class Plant:
         self._known = Struct("hsv_plant_faults", faults)
 
     def place(self, step: int, state: np.ndarray) -> None:
-        """Go on from ``state`` (9) at ``step``, as a replay does with what was recorded."""
+        """Continue from ``state`` (9) at ``step``, as a replay does with recorded states."""
         if not self._begun:
             self._begin()
         self._state[:] = state
         self._step = step
 
     def step(self, actuator: np.ndarray, active: tuple[ActiveFault, ...] = ()) -> PlantResult:
-        """Hold what reaches the actuators (2) over one period and return the state at its end.
+        """Hold the input of the actuators (2) over one period and return the state at its end.
 
-        ``active``: the faults that are due; those of the command have acted already.
+        ``active``: the active faults; those of the command have been applied already.
         """
         if not self._begun:
             self._begin()

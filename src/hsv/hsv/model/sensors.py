@@ -1,8 +1,8 @@
 """Sensors: from the state to its measurement, channel by channel; see ``core/sensors.h``.
 
 A measurement is y = fault(clip(quantise(hold(delay(lag((1 + s) x) + b + n))))): scale factor and lag of the sensor,
-bias and noise, latency of whole samples, samples that are lost and held, quantisation, range, and at last what fails. A
-channel that is ideal passes to the bit, unless it fails. In step 0 lags rest and delays are full of the first sample.
+bias and noise, latency in samples, hold of lost samples, quantisation, range and faults, in this order. An ideal
+channel without a fault passes the state unchanged. In step 0 lags are at rest and delays hold the first sample.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ALPHA, PITCH = STATE_NAMES.index("angle_of_attack"), STATE_NAMES.index("pitch_an
 
 
 class Field(NamedTuple):
-    """A property of a sensor; ``{}`` in its unit is the unit of the channel, ``standard`` that of an ideal sensor."""
+    """A property of a sensor; ``{}`` in its unit is the unit of the channel, ``standard`` the ideal value."""
 
     name: str
     description: str
@@ -59,12 +59,12 @@ FIELDS = (
 
 @dataclass(frozen=True)
 class SensorSet:
-    """Published sensors: fields of the channels that are not ideal, SI and radians, and their source."""
+    """Published sensors: properties of the channels that are not ideal, SI and radians, and their source."""
 
     channels: Mapping[str, Mapping[str, float]]
     source: str
     inertial_angle_of_attack: bool = False
-    """Whether the angle of attack is the pitch angle less an inertial path angle, with the error of the former"""
+    """Whether the angle of attack is the pitch angle minus an inertial path angle, with the error of the former"""
 
 
 _FINE_ANGLE = math.radians(0.005)
@@ -120,11 +120,11 @@ SENSOR_PARAMETERS = (
         for f in FIELDS
     ),
 )
-"""Empty: as the set has it."""
+"""Parameters of the sensors; an empty array means the value of the set."""
 
 
 class SensorData(NamedTuple):
-    """Sensors as the core takes them, an entry a state (9); ``on`` where a sensor is not ideal.
+    """Sensors for the core: arrays with an entry for each state (9); ``on`` marks sensors that are not ideal.
 
     Lag and drift as shares that remain over a period, the random walk per root of a period.
     """
@@ -207,5 +207,5 @@ def _one(name: str, given: list[float], standard: float) -> float:
 
 
 def sensor_state() -> np.ndarray:
-    """Return room (9) for what the sensors remember, which step 0 fills."""
+    """Return the memory (9) of the sensors, which step 0 fills."""
     return np.zeros(N_STATES, dtype("hsv_sensor_memory"))

@@ -16,10 +16,10 @@ from hsv.model.signals import INPUT_NAMES, N_INPUTS, N_STATES
 from hsv.model.vehicle import COUPLING_PARAMETER, Vehicle
 
 CONVERGED = 1e-9
-"""Largest remaining imbalance of an equilibrium, SI per second; what Newton's method reaches is rounding, far below."""
+"""Largest imbalance of an equilibrium, SI per second; Newton's method converges far below."""
 
 INITIAL_GUESS = np.array([0.03, 0.3, 0.2])
-"""Angle of attack (rad), fuel equivalence ratio and elevator deflection (rad): good all over the envelope."""
+"""Angle of attack (rad), fuel equivalence ratio and elevator deflection (rad); Newton's method converges from it."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ def trim(
 
 
 def check_equilibrium(where: str, size: float, u: np.ndarray, vehicle: VehicleParameters) -> None:
-    """Refuse what :func:`balance` did not balance, or only with an input ``u`` (2) outside the limits of ``vehicle``.
+    """Check the result of :func:`balance`, and that the input ``u`` (2) is within the limits of ``vehicle``.
 
     Raises:
-        TrimError: Says ``where`` and why.
+        TrimError: Names ``where`` and the reason.
     """
     if not size < CONVERGED:
         raise TrimError(f"{where}: no equilibrium there, expected a condition inside the trimmable envelope")

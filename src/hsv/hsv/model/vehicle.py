@@ -6,9 +6,9 @@ Every quantity carries its unit. A package registers its files as entry points o
     [project.entry-points."hsv.vehicles"]
     glider = "my_vehicles:glider.toml"
 
-Scenarios and design inputs then say ``vehicle = "glider"``; where nothing is registered, ``vehicle = "glider.toml"``, a
-path from the folder of the file that says so. A file may extend another one (:mod:`hsv.base.files`). The package
-of a registered vehicle is looked up, not imported: reading data runs no code.
+Scenarios and design inputs then have ``vehicle = "glider"``, or ``vehicle = "glider.toml"`` for a file that is not
+registered, a path relative to the folder of the scenario. A file may extend another one (:mod:`hsv.base.files`). The
+package of a registered vehicle is located, not imported: reading data runs no code.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ GROUP = "hsv.vehicles"
 """The entry points of vehicles, ``package:file.toml`` each."""
 
 SHIPPED_VEHICLES = {name: f"hsv.model:vehicles/{name}.toml" for name in ("parker", "stiffened")}
-"""The files of this library's by name, which a source tree knows as well; others are entry points."""
+"""Files of this library by name; others are entry points."""
 
 DEFAULT_VEHICLE = "parker"
-"""The paper's, where no other is named."""
+"""The paper's vehicle, the default."""
 
 DERIVED = "derived"
-"""The set of inertial coupling that a number is a multiple of."""
+"""The set of inertial coupling of which a number is a multiple."""
 
 MAX_COUPLING = 2.0
-"""Largest multiple of it: twice the coupling of a beam model is no vehicle of this structure any more."""
+"""Largest multiple: more exceeds what a vehicle of this structure can have."""
 
 MAX_UNCERTAIN = 12
-"""Uncertain parameters at most: a design flies every corner of their bounds."""
+"""Maximum number of uncertain parameters: a design flies every corner of their bounds."""
 
 MAX_UNCERTAINTY = 0.9
-"""Relative bound at most."""
+"""Largest relative bound."""
 
 _COUPLING_UNITS = dict.fromkeys(("inertial_coupling_1", "inertial_coupling_2"), "kg^0.5 m")
 _AXES = {"altitude": "m", "velocity": "m/s"}
@@ -81,7 +81,7 @@ VEHICLE_PARAMETERS = (
     Parameter("vehicle.uncertainty.names", [""], "names of the uncertain coefficients"),
     Parameter("vehicle.uncertainty.bounds", [], "relative bound of each"),
 )
-"""Parameters of a vehicle for the nodes; those that are not given are those of the vehicle of that name."""
+"""Parameters of a vehicle for the nodes; missing ones are taken from the vehicle of that name."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +93,11 @@ class Vehicle:
     decoupled: VehicleParameters
     """Coefficients and limits, without inertial coupling (paper eq. 4)"""
     couplings: Mapping[str, tuple[float, float]]
-    """psi_1 and psi_2 (kg^0.5 m) of each set of inertial coupling; the first is taken where none is named"""
+    """psi_1 and psi_2 (kg^0.5 m) of each set of inertial coupling; the first is the default"""
     altitude_range: tuple[float, float]
-    """m, where commands may lead"""
+    """m, range of commands"""
     velocity_range: tuple[float, float]
-    """m/s, where commands may lead"""
+    """m/s, range of commands"""
     uncertainty: Mapping[str, float]
     """Relative bounds of the uncertain coefficients (paper section 5.1)"""
 
@@ -108,7 +108,7 @@ class Vehicle:
         return 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1])
 
     def coupling_name(self, coupling: object = "") -> str:
-        """Return a choice of inertial coupling as it is kept: a set's name, or a multiple of the derived set as text.
+        """Return the canonical name of a choice of inertial coupling: a set, or a multiple of the derived set as text.
 
         Args:
             coupling: A name, a number or its text; empty: the first set.
@@ -149,7 +149,7 @@ class Vehicle:
         return self.couplings[coupling][0] / self.couplings[DERIVED][0]
 
     def check_envelope(self, table: Iterable[Parameter], values: Mapping[str, Any]) -> None:
-        """Refuse altitudes and velocities, the parameters of a ``table`` in m and m/s, outside the flight envelope.
+        """Check that altitudes and velocities, the parameters of a ``table`` in m and m/s, lie in the flight envelope.
 
         Raises:
             ParameterError: Names the parameter.
@@ -179,14 +179,14 @@ class Vehicle:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, Any]) -> Self:
-        """Return the vehicle in flat parameters; those that are not there are those of the vehicle of its name.
+        """Return the vehicle in flat parameters; missing ones are taken from the vehicle of its name.
 
         Raises:
             ParameterError: A wrong value, named.
             VehicleError: Some are missing, and there is no vehicle of that name.
         """
         if lacking := [parameter.name for parameter in VEHICLE_PARAMETERS if parameter.name not in values]:
-            # Parameters may be data of somebody else's, as in a bag or a certificate: no path in them is followed.
+            # Parameters may come from an untrusted bag or certificate: a path in them is not opened.
             if is_path(name := str(values.get("vehicle.name", DEFAULT_VEHICLE))):
                 raise ParameterError(f"parameter {lacking[0]}: missing, expected that of the vehicle {name!r}")
             values = {**named_parameters(values), **values}
@@ -271,21 +271,21 @@ def _registered(name: str) -> Vehicle:
 
 
 def vehicle_label(name: str) -> str:
-    """Return what a vehicle, by name or path, is called."""
+    """Return the name of a vehicle given by name or path."""
     return Path(name).stem if is_path(name) else name
 
 
 def vehicle_tables(name: str) -> Tables:
-    """Return the contents of a vehicle file, by name or path, with those of what it extends.
+    """Return the contents of a vehicle file, by name or path, merged over the files that it extends.
 
     Raises:
-        VehicleError: There is none, it is no TOML, or what it extends is not.
+        VehicleError: No such file, or it or a file that it extends is not TOML.
     """
     return follow_extends(name, _read, lambda file, why: VehicleError(f"vehicle {vehicle_label(file)!r}: {why}"))
 
 
 def vehicle_text(name: str) -> str:
-    """Return the text of a vehicle file, by name or path, with what it extends written out.
+    """Return the text of a vehicle file, by name or path, with the files that it extends merged in.
 
     Raises:
         VehicleError: See :func:`load_vehicle`.
@@ -351,7 +351,7 @@ def _parsed(tables: Mapping[str, Any], name: str) -> Vehicle:
                 if not 0.0 <= bound <= MAX_UNCERTAINTY:
                     most = f"{100 * MAX_UNCERTAINTY:g} %"
                     raise QuantityError(f"{field}.uncertainty = {row['uncertainty']!r}: expected 0 % to {most}")
-                if bound > 0.0:  # a vehicle that extends another says so of what it knows better
+                if bound > 0.0:  # a vehicle that extends another one may set a bound to zero
                     uncertainty[coefficient] = bound
     if len(uncertainty) > MAX_UNCERTAIN:
         raise QuantityError(

@@ -1,4 +1,4 @@
-"""The fault injector: a schedule of faults, those injected and cleared in flight, and what they do to the command."""
+"""The fault injector: scheduled faults, faults injected or cleared in flight, and their effect on the command."""
 
 from __future__ import annotations
 
@@ -32,14 +32,13 @@ LINK_PARAMETERS = (COMPUTATION_PARAMETER, *COMMAND_LINK_PARAMETERS)
 """Parameters of the link that carries the command to the injector."""
 
 NEVER_TIME = 1e9
-"""Stop (s) of a fault that does not end, where others do."""
+"""Stop (s) of a fault that does not end, in a list with faults that do."""
 
 
 class FaultResult(NamedTuple):
     """Input that reaches the actuators (2), and the active faults.
 
-    Those of command, actuators, effectors and engine are due in this step, those of sensors in the next: its
-    measurement is the first that can have heard of them.
+    Faults of command, actuators, effectors and engine act in this step, faults of sensors on the next measurement.
     """
 
     actuator: np.ndarray
@@ -49,8 +48,7 @@ class FaultResult(NamedTuple):
 class FaultInjector:
     """Applies scheduled faults, and those injected or cleared in flight, which act from the next step on.
 
-    What acts on the command is applied here, to what the link of the command leaves of it; the rest is told to the
-    vehicle.
+    Faults of the command are applied here, after its link; the plant receives the other faults.
     """
 
     PARAMETERS = (*FAULT_PARAMETERS, *LINK_PARAMETERS, *INITIAL_PARAMETERS, *VEHICLE_PARAMETERS)
@@ -70,9 +68,9 @@ class FaultInjector:
             period: T (s).
             seed: Seed of the flight.
             link: Link that carries the command; None: an ideal one.
-            before: The input (2) that came on it until the flight began.
+            before: The input (2) sent before the flight.
         """
-        # The first measurement is there before anybody can have told the sensors of a fault.
+        # The first measurement precedes all faults.
         self.scheduled = tuple(
             row._replace(start=max(row.start, 1)) if row.fault.kind.side == SENSOR else row for row in scheduled
         )
@@ -83,7 +81,7 @@ class FaultInjector:
 
     @classmethod
     def from_parameters(cls, values: Mapping[str, object]) -> Self:
-        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`, and of a link where the flight starts.
+        """Build from :data:`FAULT_PARAMETERS` and :data:`LINK_PARAMETERS`; a link also needs the initial trim.
 
         Raises:
             ParameterError, TrimError: A wrong value, named, or arrays of different lengths.
@@ -130,7 +128,7 @@ class FaultInjector:
         return link_state(self.link, N_INPUTS, self._before)
 
     def rows(self, sides: Sequence[str], earlier: FaultRows | None = None) -> FaultRows:
-        """Return the faults of some sides that are known now; those that were known ``earlier`` keep their memory."""
+        """Return the known faults of some sides; those in ``earlier`` keep their memory."""
         return fault_rows(sides, self.known, self.period, earlier)
 
     def parameters(self) -> dict[str, list[str] | list[float]]:
@@ -146,10 +144,10 @@ class FaultInjector:
         }
 
     def inject(self, fault: Fault, steps: int = NEVER) -> int:
-        """Start ``fault`` with the next step, for so many, in place of one of its type on its channel.
+        """Start ``fault`` in the next step, for ``steps`` steps; it replaces a fault of its type on its channel.
 
         Returns:
-            That step.
+            The first step of the fault.
         """
         self.clear(fault.channel, fault.type)
         start = self._first(fault)
@@ -158,10 +156,10 @@ class FaultInjector:
         return start
 
     def clear(self, channel: str = "", kind: str = "") -> int:
-        """End the faults acting on ``channel`` (all channels if empty), those of a kind alone where one is given.
+        """End the active faults of ``channel`` and of type ``kind``; empty: all channels, all types.
 
         Returns:
-            The next step, the first without; of faults of sensors alone, the one after it.
+            The first step without them: the next one, or the one after if only sensors are concerned.
 
         Raises:
             ParameterError: Unknown channel or kind.
@@ -179,7 +177,7 @@ class FaultInjector:
         return min(ended, default=self._next)
 
     def step(self, step: int, command: np.ndarray) -> FaultResult:
-        """Return what becomes of ``command`` (2) in ``step``."""
+        """Return the input that reaches the actuators for ``command`` (2) in ``step``."""
         actuator = np.array(command, float)
         link, payload = self.link.pointer, doubles(actuator)
         lib.hsv_receive(link, doubles(self._link_state), len(self._link_state), step, self.seed, payload, N_INPUTS)
@@ -188,7 +186,7 @@ class FaultInjector:
         return FaultResult(actuator, self.acting(step))
 
     def acting(self, step: int) -> tuple[ActiveFault, ...]:
-        """Return the faults that are due after ``step``, see :class:`FaultResult`."""
+        """Return the active faults of ``step``, see :class:`FaultResult`."""
         return tuple(
             ActiveFault(fault, start)
             for fault, start, stop in self.known
@@ -208,7 +206,7 @@ def read_parameters(text: str) -> dict[str, float]:
     """Return the parameters of a fault, SI, written as :func:`written_parameters` does.
 
     Raises:
-        ParameterError: It is written otherwise.
+        ParameterError: The text has another form.
     """
     found = {}
     for entry in filter(None, text.split(",")):
@@ -223,5 +221,5 @@ def read_parameters(text: str) -> dict[str, float]:
 
 
 def written_parameters(parameters: Mapping[str, Any]) -> str:
-    """Return parameters of a fault as text, every bit of them."""
+    """Return parameters of a fault as text, without loss of bits."""
     return ",".join(f"{name}={float(value)!r}" for name, value in parameters.items())

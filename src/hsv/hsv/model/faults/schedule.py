@@ -49,10 +49,10 @@ def fault_rows(
     """Return the faults of some ``sides`` among those that are scheduled, in the order of their composition.
 
     Args:
-        sides: Of those in :mod:`hsv.model.faults.table`.
-        scheduled: Faults with the first step and the first step without, in any order.
+        sides: Names of sides, see :mod:`hsv.model.faults.table`.
+        scheduled: Faults with their first step and their stop, in any order.
         period: T (s).
-        earlier: Those that were known before a change in flight; the same faults keep their memory.
+        earlier: The faults before a change in flight; the same faults keep their memory.
     """
     rows = _sorted_rows(tuple(sides), tuple(scheduled), period).copy()
     memory = fault_memory(len(rows))
@@ -60,7 +60,7 @@ def fault_rows(
     for row, before in zip(*earlier[:2], strict=True) if earlier else ():
         kept.setdefault(_identity(row), []).append(before)
     for i, row in enumerate(rows) if kept else ():
-        # Each of several identical faults keeps its own.
+        # Each of several identical faults keeps its own memory.
         if same := kept.get(_identity(row)):
             memory[i] = same.pop(0)
     return FaultRows(rows, memory, period)
@@ -86,7 +86,7 @@ def fault_memory(count: int) -> np.ndarray:
 
 
 def _identity(row: np.void) -> bytes:
-    """Return what tells a fault from others: all but its stop, which a clearance in flight moves."""
+    """Return the bytes that identify a fault: all but its stop, which a clearance in flight moves."""
     same = row.copy()
     same["stop"] = 0.0
     return bytes(same.tobytes())

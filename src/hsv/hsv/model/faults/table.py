@@ -1,4 +1,4 @@
-"""Every kind of fault: what may fail in which way, with which parameters; parser, help and documentation read it.
+"""The vocabulary of faults, with their channels and parameters; parser, help and documentation follow it.
 
 A fault has a side, where it acts: on the command on its way to the actuator, on the actuator's dynamics, on the
 effector that it moves, on the engine, or on a sensor. Faults that act at once are composed in one order whatever the
@@ -89,7 +89,7 @@ class FaultParameter:
 
     def written(self, channel: str, value: float, system: UnitSystem = UnitSystem.metric) -> str:
         """Return a ``value``, SI, of a fault of ``channel`` in the units of ``system``."""
-        # Everybody has angles in degrees, but natural frequencies in rad/s.
+        # Angles are read in degrees, but natural frequencies in rad/s.
         given = UnitSystem.si if self.unit == "rad/s" else system
         return readable(value, self.of(channel).unit or "1", given)
 
@@ -398,16 +398,16 @@ class Fault:
 
     def __str__(self) -> str:
         known = {parameter.name: parameter for parameter in fault_parameters(self.channel, self.type)}
-        said = ", ".join(
-            # A loss of effectiveness is one of effectiveness.
+        words = ", ".join(
+            # "loss_of_effectiveness 0.8 of ..." needs no second "effectiveness".
             ("" if self.type.endswith(name) else f"{name} ") + known[name].written(self.channel, value)
             for name, value in self.parameters.items()
         )
-        return f"{self.type} {said + ' ' if said else ''}of {self.channel}"
+        return f"{self.type} {words + ' ' if words else ''}of {self.channel}"
 
     @property
     def kind(self) -> FaultKind:
-        """The kind, as the table has it."""
+        """The kind of the fault."""
         return FAULT_KINDS[self.type]
 
     @property

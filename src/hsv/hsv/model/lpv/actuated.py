@@ -63,7 +63,7 @@ class SampledActuators(Data):
 def sampled_actuators(actuators: Sequence[ActuatorSet], period: float) -> SampledActuators:
     """Return ``actuators``, see :func:`actuator_system`, sampled at ``period`` (s)."""
     A, B, C, D = actuator_system(actuators)
-    # Integrators of the positions beside the actuators themselves.
+    # The actuators, with integrators of their positions.
     whole = np.block([[A, np.zeros((len(A), N_INPUTS))], [C, np.zeros((N_INPUTS, N_INPUTS))]])
     transition, entering = zero_order_hold(whole, np.vstack((B, D)), period)
     a = len(A)

@@ -102,7 +102,7 @@ class PolytopeData(Data):
 
     ``S`` (r, e) holds the entries of [A_i, B_i] that are not zero in all vertices, row by row, then zeros up to a
     multiple of :data:`BLOCK`. ``entries``: their places in the flattened [A_i, B_i] (n (n + m)). ``starts`` (2 n + 1):
-    where those of the rows of A and of B begin, in turn.
+    where those of the rows of A and of B begin, alternately.
     """
 
     KIND = "hsv_polytope"

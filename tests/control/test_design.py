@@ -1,3 +1,5 @@
+"""Designs: their files, parameters, bounds and tau."""
+
 import copy
 import dataclasses
 import math
@@ -6,10 +8,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
-from hsv.base.errors import DesignError
-from hsv.control.design import ControlDesign, digest, find_design, find_file, read_design, read_parameters, write_design
+from hsv.base.errors import DesignError, ParameterError
+from hsv.control.design import (
+    ControlDesign,
+    certified,
+    compact,
+    digest,
+    find_design,
+    find_file,
+    read_design,
+    read_parameters,
+    scheduled_changes,
+    write_design,
+)
 
 SHIPPED = sorted((Path(__file__).parents[2] / "offline_design").glob("*.yaml"))
 VALUES = read_parameters(find_design("baseline"))
@@ -260,3 +273,75 @@ def test_factors_and_filtered_nominal_survive_the_parameter_file_and_are_left_ou
 def test_a_factor_that_cannot_fly_is_refused(changes, message):
     with pytest.raises(DesignError, match=message):
         ControlDesign.from_parameters(read_parameters(find_design("baseline")) | changes)
+
+
+def test_both_bounds_hold_for_a_plan():
+    bounds = read_design(find_design("baseline")).plan_bounds
+    assert_allclose(bounds.lower, bounds.region_minimum[:2])
+    assert_allclose(bounds.upper, bounds.region_maximum[:2])
+    assert (bounds.lower > bounds.input_minimum).all() and (bounds.upper < bounds.input_maximum).all()
+    low, high = bounds.pitch_acceleration
+    assert low < 0.0 < high
+
+
+@pytest.mark.parametrize("name", ["nominal.input_minimum", "nominal.region_maximum"])
+def test_a_bound_that_is_missing_or_too_short_is_named(name):
+    for value in ([], VALUES[name][:-1]):
+        with pytest.raises(DesignError, match=rf"parameter {name}: {len(value)} values, expected"):
+            ControlDesign.from_parameters({**VALUES, name: value})
+
+
+def test_bounds_in_the_wrong_order_are_named():
+    with pytest.raises(DesignError, match=r"parameter nominal.input_minimum: expected values below nominal.input_max"):
+        ControlDesign.from_parameters({**VALUES, "nominal.input_minimum": VALUES["nominal.input_maximum"]})
+
+
+def test_a_design_without_a_tube_carries_none():
+    names = ("nominal.input_m", "nominal.region", "tube.")
+    without = {n: v for n, v in VALUES.items() if not n.startswith(names)}
+    assert ControlDesign.from_parameters(without).plan_bounds is None
+
+
+SCALAR, DIAGONAL = np.full(5, 0.8), np.array([0.8, 0.6, 1.0, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("values", [[0.8], [0.93], [1.0], [0.9] * 5])
+def test_everything_between_the_minimum_and_one_is_certified(values):
+    np.testing.assert_array_equal(certified(values, SCALAR), np.full(5, values[0]))
+
+
+def test_five_equal_factors_are_written_as_one():
+    np.testing.assert_array_equal(compact(np.full(5, 0.9)), [0.9])
+    np.testing.assert_array_equal(compact(DIAGONAL), DIAGONAL)
+
+
+def test_a_diagonal_factor_moves_all_dimensions_together():
+    half_way = [0.9, 0.8, 1.0, 1.0, 1.0]
+    np.testing.assert_array_equal(certified(half_way, DIAGONAL), half_way)
+
+
+def test_a_change_has_one_value_or_five():
+    flown = {"tau_change.starts": [1.0, 2.0]}
+    for values in ([0.9, 0.8], [0.9] * 5 + [0.8] * 5):
+        (first, nine), (second, eight) = scheduled_changes(flown | {"tau_change.values": values}, SCALAR, 0.02)
+        assert (first, second) == (50, 100)
+        np.testing.assert_array_equal([nine, eight], [np.full(5, 0.9), np.full(5, 0.8)])
+    for count in (1, 3, 5, 7):
+        with pytest.raises(ParameterError, match=rf"tau_change\.values: {count} values, expected 2 or 10"):
+            scheduled_changes(flown | {"tau_change.values": [0.9] * count}, SCALAR, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("values", "minimum", "message"),
+    [
+        ([0.79], SCALAR, r"feedback\.tau = 0\.79: expected 0\.8 to 1"),
+        ([1.0, 0.7, 1.0, 1.0, 1.0], SCALAR, r"feedback\.tau\[1\] = 0\.7: expected 0\.8 to 1"),
+        ([0.9, 1.0, 1.0, 1.0, 1.0], SCALAR, "all the same share of the way from 1"),
+        ([0.8, 1.0, 1.0, 1.0, 1.0], DIAGONAL, "all the same share of the way from 1"),
+        ([0.9], DIAGONAL, r"feedback\.tau = \[0\.9, .*the way from 1 to \[0\.8, 0\.6, 1\.0, 1\.0, 1\.0\]"),
+        ([0.9], np.ones(5), "expected 1: no other factor is certified"),
+    ],
+)
+def test_what_is_not_certified_is_refused(values, minimum, message):
+    with pytest.raises(ParameterError, match=message):
+        certified(values, minimum)

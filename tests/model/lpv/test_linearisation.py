@@ -1,0 +1,170 @@
+"""Discretisation, extended models, modes and frequency responses."""
+
+from functools import partial
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from hsv.base.errors import DesignError
+from hsv.control.notch_filter import NotchSection, continuous, series
+from hsv.model.dynamics import jacobian
+from hsv.model.lpv.linearisation import (
+    Filter,
+    bode,
+    bode_difference,
+    extended_derivative,
+    extended_jacobian,
+    extended_state,
+    frequency_response,
+    from_true_rate,
+    grid_polytope,
+    linearise,
+    modes,
+    zero_order_hold,
+)
+from hsv.model.signals import N_STATES
+from hsv.model.trim import trim
+from hsv.model.vehicle import load_vehicle
+
+
+def test_double_integrator_is_exact():
+    A, B = zero_order_hold(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.02)
+    assert_allclose(A, [[1.0, 0.02], [0.0, 1.0]], rtol=1e-15)
+    assert_allclose(B, [[0.5 * 0.02**2], [0.02]], rtol=1e-15)
+
+
+def test_two_half_periods_make_one():
+    rng = np.random.default_rng(1)
+    A, B = rng.normal(size=(4, 4)), rng.normal(size=(4, 2))
+    whole_A, whole_B = zero_order_hold(A, B, 0.1)
+    half_A, half_B = zero_order_hold(A, B, 0.05)
+    assert_allclose(half_A @ half_A, whole_A, rtol=1e-12)
+    assert_allclose(half_A @ half_B + half_B, whole_B, rtol=1e-12)
+
+
+NOTCH = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5)])))
+TWO = Filter(*series(continuous([NotchSection(15.0, 0.02, 15.0, 0.5), NotchSection(19.0, 0.1, 25.0, 0.7)])))
+
+
+@pytest.fixture(scope="module")
+def point():
+    return trim(load_vehicle().coupled("paper_like"), 26000.0, 2400.0)
+
+
+@pytest.mark.parametrize("notch", [NOTCH, TWO])
+def test_equilibrium_of_the_vehicle_is_one_of_the_ecm(point, notch):
+    state = extended_state(point.state, notch)
+    for printed in (False, True):
+        rates = extended_derivative(state, point.input, load_vehicle().coupled("paper_like"), notch, printed)
+        assert np.abs(rates).max() < 1e-10
+
+
+@pytest.mark.parametrize("notch", [NOTCH, TWO])
+def test_physical_reading_is_vehicle_and_filter_in_other_coordinates(point, notch):
+    vehicle = load_vehicle().coupled("paper_like")
+    A, B = extended_jacobian(extended_state(point.state, notch), point.input, vehicle, notch, False)
+    T = from_true_rate(notch)
+    joined, inputs = np.linalg.solve(T, A @ T), np.linalg.solve(T, B)
+    A_vehicle, B_vehicle = jacobian(point.state, point.input, vehicle)
+    assert_allclose(joined[:N_STATES, :N_STATES], A_vehicle, rtol=1e-9, atol=1e-9)
+    assert_allclose(joined[:N_STATES, N_STATES:], 0.0, atol=1e-9)
+    assert_allclose(inputs[:N_STATES], B_vehicle, rtol=1e-12, atol=1e-9)
+    assert_allclose(joined[N_STATES:, N_STATES:], notch.A, atol=1e-9)
+    assert_allclose(joined[N_STATES:, 4], notch.B, atol=1e-12)
+
+
+def test_printed_reading_differs_in_the_kinematics_alone(point):
+    vehicle = load_vehicle().coupled("paper_like")
+    state = extended_state(point.state, NOTCH)
+    physical, _ = extended_jacobian(state, point.input, vehicle, NOTCH, False)
+    printed, _ = extended_jacobian(state, point.input, vehicle, NOTCH, True)
+    assert set(np.nonzero(np.abs(printed - physical) > 1e-12)[0]) == {2, 3}
+    assert printed[3, 4] == 1.0
+    assert_allclose(printed[3, N_STATES:], 0.0, atol=1e-30)
+    assert_allclose(physical[3, 4] * NOTCH.D, 1.0)
+
+
+def test_moving_filter_is_at_rest_for_a_constant_pitch_rate():
+    x = np.zeros(N_STATES)
+    x[4] = 0.3
+    state = extended_state(x, NOTCH)
+    assert_allclose(NOTCH.A @ state[N_STATES:] + NOTCH.B * 0.3, 0.0, atol=1e-12)
+    assert_allclose(state[4], 0.3, rtol=1e-12)  # both filters pass a constant
+
+
+ALTITUDES = np.linspace(*load_vehicle().altitude_range, 4)
+VELOCITIES = np.linspace(*load_vehicle().velocity_range, 5)
+
+
+@pytest.fixture(scope="module")
+def polytope():
+    return grid_polytope(partial(linearise, load_vehicle().coupled()), ALTITUDES, VELOCITIES, 0.02)
+
+
+def test_model_at_a_node_is_the_vertex(polytope):
+    for i, j in ((0, 0), (1, 3), (3, 4)):
+        A, B = polytope.at(ALTITUDES[i], VELOCITIES[j])
+        expected_A, expected_B = zero_order_hold(
+            *linearise(load_vehicle().coupled(), ALTITUDES[i], VELOCITIES[j]), 0.02
+        )
+        assert_allclose(A, expected_A, rtol=1e-13, atol=1e-16)
+        assert_allclose(B, expected_B, rtol=1e-13, atol=1e-16)
+
+
+def test_interpolation_error_between_nodes_is_small(polytope):
+    h, v = 0.5 * (ALTITUDES[1] + ALTITUDES[2]), 0.5 * (VELOCITIES[2] + VELOCITIES[3])
+    A, _ = polytope.at(h, v)
+    exact, _ = zero_order_hold(*linearise(load_vehicle().coupled(), h, v), 0.02)
+    assert np.abs(A - exact).max() < 1e-3 * np.abs(exact - np.eye(9)).max()
+
+
+def test_linearisation_has_the_structural_modes_and_no_inertial_coupling():
+    A, _ = linearise(load_vehicle().coupled("derived"), 25908.0, 2347.594)
+    assert_array_equal(A[:5, 5:], 0.0)
+    modes = np.linalg.eigvals(A[5:, 5:])
+    assert_allclose(np.sort(np.abs(modes)), [16.02, 16.02, 19.58, 19.58], rtol=1e-12)
+    # Control study, section 1: the unstable pole over the envelope.
+    assert 1.65 < np.linalg.eigvals(A).real.max() < 1.80
+
+
+def test_oscillator_has_its_frequency_and_damping():
+    (mode,) = modes(np.array([[0.0, 1.0], [-(7.0**2), -2 * 0.3 * 7.0]]))
+    assert mode.natural_frequency == pytest.approx(7.0)
+    assert mode.damping_ratio == pytest.approx(0.3)
+    assert mode.pole.imag > 0.0
+
+
+def test_real_poles_are_listed_singly_fastest_first():
+    found = modes(np.diag([-1.0, 3.0, 0.0]))
+    assert [mode.natural_frequency for mode in found] == [3.0, 1.0, 0.0]
+    assert [mode.damping_ratio for mode in found] == [-1.0, 1.0, 0.0]
+
+
+A, B = np.array([[0.0, 1.0], [-4.0, -0.4]]), np.array([[0.0], [4.0]])
+
+
+def test_second_order_system_at_resonance():
+    response = frequency_response(A, B, np.array([1e-3, 2.0]))
+    magnitude, phase = bode(response[:, 0, 0])
+    assert_allclose(magnitude, [0.0, 20.0 * np.log10(5.0)], atol=1e-5)
+    assert_allclose(phase, [0.0, -90.0], atol=0.02)
+
+
+def test_discrete_response_is_the_continuous_one_with_half_a_period_of_delay():
+    frequency = np.array([0.5, 1.0])
+    discrete = frequency_response(*zero_order_hold(A, B, 0.01), frequency, 0.01)[:, 0, 0]
+    continuous = frequency_response(A, B, frequency)[:, 0, 0] * np.exp(-0.5j * frequency * 0.01)
+    assert_allclose(discrete, continuous, rtol=1e-4)
+
+
+def test_difference_in_decibels_and_degrees():
+    response = frequency_response(A, B, np.array([1.0]))
+    magnitude, phase = bode_difference(response * 1.1 * np.exp(0.2j), response)
+    assert_allclose(magnitude, 20.0 * np.log10(1.1))
+    assert_allclose(phase, np.degrees(0.2))
+
+
+def test_frequencies_above_nyquist_are_refused():
+    with pytest.raises(DesignError, match="Nyquist"):
+        frequency_response(A, B, np.array([400.0]), 0.01)
