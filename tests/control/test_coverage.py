@@ -5,9 +5,8 @@ from hsv.base.errors import DesignError
 from hsv.control.coverage import commanded, uncovered_faults, uncovered_hardware
 from hsv.control.design import find_design, read_design
 from hsv.control.tube_law import TubeStatusCode
-from hsv.flight.assembly import assemble_flight
+from hsv.flight.assembly import assemble_flight, uncovered_of
 from hsv.flight.blocks import steps
-from hsv.flight.coverage import uncovered_of
 from hsv.flight.scenario import load_scenario
 
 BASELINE, REALISTIC = (read_design(find_design(name)) for name in ("baseline", "realistic"))

@@ -27,12 +27,12 @@ from hsv.base.errors import CampaignError, HsvError
 from hsv.base.units import parse_quantity
 from hsv.control.design import certificate_path, find_design, read_design
 from hsv.control.verification import preflight
+from hsv.flight.assembly import uncovered_of
 from hsv.flight.campaign.campaign import plan
 from hsv.flight.campaign.executors import Executor
 from hsv.flight.campaign.run import run_campaign
 from hsv.flight.campaign.store import ResultStore
 from hsv.flight.campaign.summary import Results, limits, shares, worst_flights
-from hsv.flight.coverage import uncovered_of
 from hsv.flight.scenario import load_scenario, scenario_names, scenario_text
 from hsv.model.vehicle import load_vehicle, vehicle_names, vehicle_text
 

@@ -465,7 +465,7 @@ def certify(
     from hsv.design.certified import load_certified
     from hsv.design.hardware.declared import declared, declared_actuators, described
     from hsv.design.hardware.verdict import certified_with
-    from hsv.flight.coverage import uncovered_of
+    from hsv.flight.assembly import uncovered_of
     from hsv.flight.scenario import load_scenario
 
     subject = load_certified(find_design(file))

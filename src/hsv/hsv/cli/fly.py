@@ -145,9 +145,8 @@ def simulate(
 
     from hsv.cli.summary import FlightSummary, report_flight
     from hsv.control.design import digest, find_design, read_design
-    from hsv.flight.assembly import assemble_flight, blamed_on
+    from hsv.flight.assembly import assemble_flight, blamed_on, uncovered_of
     from hsv.flight.closed_loop import fly
-    from hsv.flight.coverage import uncovered_of
     from hsv.flight.metrics import flight_metrics
     from hsv.flight.scenario import load_scenario
     from hsv.model.plant import FlightStatus

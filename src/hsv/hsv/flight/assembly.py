@@ -1,4 +1,4 @@
-"""Assembly of the loop from flat parameters, used by simulation, checks and replay."""
+"""Assembly of the loop from flat parameters, for simulation, checks and replay."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from typing import Any
 from hsv.base.errors import DesignError, HsvError, ParameterError, ScenarioError, TrimError
 from hsv.base.parameters import table_values
 from hsv.control.controllers import NODE, SHIPPED_CONTROLLERS, controller_class
-from hsv.control.design import TAU, ControlDesign, design_of, find_design, read_design, read_parameters
+from hsv.control.coverage import uncovered
+from hsv.control.design import (
+    TAU,
+    ControlDesign,
+    certificate_path,
+    design_of,
+    find_design,
+    read_certificate,
+    read_design,
+    read_parameters,
+)
 from hsv.flight.blocks import LOOP
 from hsv.flight.closed_loop import Components
 from hsv.flight.scenario import Scenario
@@ -23,23 +33,23 @@ _FIELDS = {
     r"^parameter (integral|robust_mpc)\.": r"\1.",
     r"^parameter reference\.blend\b": "reference.blend",
 }
-"""Parameters as a scenario calls them."""
+"""Names of parameters in a scenario."""
 
 
 def scenario_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of ``scenario``, those of a controller of one's own included, which is loaded.
+    """Return the flat parameters of ``scenario`` with those of a custom controller, which is loaded.
 
     Raises:
-        ParameterError, QuantityError: Names what the controller does not admit.
+        ParameterError, QuantityError: Names the value that the controller does not admit.
     """
     return scenario.parameters() | own_parameters(scenario)
 
 
 def own_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the flat parameters of a controller of one's own, which is loaded; none of a shipped one, or of a node.
+    """Return the flat parameters of a custom controller, which is loaded; a shipped one or a node has none.
 
     Raises:
-        ParameterError, QuantityError: Names what the controller does not admit.
+        ParameterError, QuantityError: Names the value that the controller does not admit.
     """
     if scenario.controller in SHIPPED_CONTROLLERS:
         return {}
@@ -51,7 +61,7 @@ def own_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def design_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the parameters in the file of the scenario's design, none where it has none.
+    """Return the parameters in the file of the scenario's design; empty if it has none.
 
     Raises:
         DesignError: There is no such design, or its file cannot be read.
@@ -60,7 +70,7 @@ def design_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def flight_parameters(scenario: Scenario) -> dict[str, Any]:
-    """Return the design's parameters with those of ``scenario`` over them; :func:`assemble` checks them.
+    """Return the design's parameters, overridden by those of ``scenario``; :func:`assemble` checks them.
 
     Raises:
         DesignError, ParameterError, QuantityError: As above.
@@ -69,9 +79,9 @@ def flight_parameters(scenario: Scenario) -> dict[str, Any]:
 
 
 def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> Components:
-    """Return the five components that these parameters describe; each checks its own.
+    """Return the five components that these parameters describe; each checks its own parameters.
 
-    ``design``: the one in ``values``, where it is known already.
+    ``design``: the one in ``values``, if the caller has read it.
 
     Raises:
         ParameterError, DesignError, TrimError: Names the parameter that is wrong.
@@ -81,7 +91,7 @@ def assemble(values: Mapping[str, Any], design: ControlDesign | None = None) -> 
 
 
 def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> Components:
-    """Return the components that fly ``scenario``, with ``design`` or, where none is given, with its own.
+    """Return the components that fly ``scenario``, with ``design`` or, by default, with the scenario's own.
 
     Raises:
         ScenarioError: Names the field that is wrong, or what is wrong with the design.
@@ -105,9 +115,9 @@ def assemble_flight(scenario: Scenario, design: ControlDesign | None = None) -> 
 
 @contextmanager
 def blamed_on(scenario: Scenario, *, design_read: bool = True) -> Iterator[None]:
-    """Turn errors of components into errors of ``scenario``, with its name and its names of the parameters.
+    """Turn errors of components into errors of ``scenario``, with the scenario's names of the parameters.
 
-    What is wrong with a design that is read, by itself, is said with its file.
+    An error in a design file is reported with the file.
 
     Raises:
         ScenarioError: In place of any other error of the library.
@@ -123,8 +133,28 @@ def blamed_on(scenario: Scenario, *, design_read: bool = True) -> Iterator[None]
         raise ScenarioError(f"scenario {scenario.name!r}: {text}") from error
 
 
+def uncovered_of(
+    scenario: Scenario, design: ControlDesign | None, certificate: Mapping[str, Any] | None = None
+) -> list[str]:
+    """Return the parts of ``scenario`` that no certificate covers, one entry each; empty if all of it is covered.
+
+    Args:
+        scenario: The scenario; its faults are the scheduled ones.
+        design: The design that flies.
+        certificate: Certificate of the design; None: the file next to the scenario's design, if there is one.
+
+    Raises:
+        DesignError: The scenario's design is not there, or its certificate cannot be read.
+    """
+    if certificate is None and scenario.design:
+        path = certificate_path(find_design(scenario.design))
+        certificate = read_certificate(path) if path.is_file() else None
+    values = {**(design.to_parameters() if design else {}), **scenario.parameters()}
+    return uncovered(values, design, certificate, [(f.channel, f.type, f.parameters) for f in scenario.fault])
+
+
 def _wrong_in_file(design: str) -> str:
-    """Return what is wrong with a design whatever the scenario, with its file; nothing where that is not the reason."""
+    """Return the error of a design file itself; empty if the file is correct."""
     try:
         read_design(find_design(design))
     except DesignError as error:

@@ -1,4 +1,4 @@
-"""What was flown in one process, and what is said of it."""
+"""A simulated flight: its history, status and metrics."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=8)
 def times(rows: int, period: float) -> np.ndarray:
-    """Return the simulated time (s) of so many ``rows``, shared by all callers that ask for as many."""
+    """Return the simulated time (s) of ``rows`` steps; flights of the same length share the array."""
     found = np.arange(rows) * period
     found.setflags(write=False)
     return found
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Flight:
-    """A flight: ``period`` (s), what happened at each step, along which reference, time of the first fault."""
+    """A flight: control period (s), history, reference, time of the first fault (s) and final status."""
 
     period: float
     history: History
@@ -40,7 +40,7 @@ class Flight:
 
     @property
     def time(self) -> np.ndarray:
-        """Simulated time (n + 1), s; all flights of so many steps share it."""
+        """Simulated time (n + 1), s; flights of the same length share the array."""
         return times(len(self.history.state), self.period)
 
     @property
@@ -60,16 +60,20 @@ class Flight:
 
     @property
     def fingerprint(self) -> str:
-        """The digest of all its bits, see :mod:`hsv.flight.fingerprint`."""
+        """The digest of all bits of the history, see :mod:`hsv.flight.fingerprint`."""
         return fingerprint(self.history.flown)
 
     @cached_property
     def metrics(self) -> dict[str, float]:
-        """The metrics that it defines, SI, by the names in :data:`hsv.flight.metrics.METRICS`."""
+        """The metrics that the flight defines, SI, by the names in :data:`hsv.flight.metrics.METRICS`."""
         return flight_metrics(self.data())
 
+    def __repr__(self) -> str:
+        steps = len(self.history.flown) - 1
+        return f"<Flight of {steps * self.period:g} s, {steps} steps, {self.status.name.lower()}, {self.fingerprint}>"
+
     def data(self) -> FlightData:
-        """Return what the metrics are made of."""
+        """Return the data from which metrics are computed."""
         h = self.history
         return FlightData(
             time=self.time,
@@ -84,7 +88,7 @@ class Flight:
 
 
 def flight_of(components: Components, history: History) -> Flight:
-    """Return what the ``components`` flew."""
+    """Return the flight of ``components`` with its ``history``."""
     plant = components.plant
     diverged = not in_model_range(history.state[-1], plant.vehicle.angle_limit)
     status = FlightStatus.DIVERGED if diverged else FlightStatus.FINISHED
@@ -93,6 +97,6 @@ def flight_of(components: Components, history: History) -> Flight:
 
 
 def fault_start(components: Components, rows: int) -> float | None:
-    """Return when the first fault of a flight of so many ``rows`` begins (s), ``None`` where none does."""
+    """Return the start (s) of the first fault within a flight of ``rows`` steps, None without one."""
     first = min((row.start for row in components.fault_injector.known), default=NEVER)
     return first * components.plant.period if first < rows else None

@@ -1,4 +1,4 @@
-"""What a flight produced: every signal of every step."""
+"""The history of a flight: every signal of every step."""
 
 from __future__ import annotations
 
@@ -10,31 +10,31 @@ import numpy as np
 from hsv.model.signals import N_INPUTS, N_STATES
 
 X, Q_F, X_N, U_N, U, ACTUATOR, FLOWN = accumulate((0, N_STATES, 1, N_STATES, N_INPUTS, N_INPUTS, N_INPUTS))
-"""First columns of x, q_f, x_n, u_n, the command u and what reaches the actuators in the rows of
-:attr:`History.flown`, and the number of all columns."""
+"""First columns of x, q_f, x_n, u_n, the command u and the actuators' input in :attr:`History.flown`, and the number of
+columns."""
 
 GAIN_INDEX, U_UNSATURATED, BESIDE = accumulate((0, 1, N_INPUTS))
-"""The same of the rows of :attr:`History.beside`."""
+"""First columns of gain index and unsaturated input in :attr:`History.beside`, and the number of columns."""
 
 
 class History(NamedTuple):
-    """Rows k = 0 ... n of everything that a flight produced, SI."""
+    """Rows k = 0 ... n of all signals of a flight, SI."""
 
     flown: np.ndarray
-    """(n + 1, 25): what its fingerprint is made of, side by side"""
+    """(n + 1, 25): the signals of the fingerprint"""
     beside: np.ndarray
-    """(n + 1, 3)"""
+    """(n + 1, 3): auxiliary signals"""
     estimated: np.ndarray | None
-    """(n + 1, 9), where that is not the state"""
+    """(n + 1, 9): measured or estimated state, None if that is the state itself"""
 
     @classmethod
     def empty(cls, rows: int, *, estimated: bool = True) -> History:
-        """Return room for ``rows`` steps; ``estimated``: also for what the controller was given for the state."""
+        """Return an empty history of ``rows`` steps, with the measured or estimated state if ``estimated``."""
         return cls.over(np.empty(rows * (cls.numbers() if estimated else FLOWN + BESIDE)), rows, estimated=estimated)
 
     @classmethod
     def over(cls, memory: np.ndarray, rows: int, *, estimated: bool = True) -> History:
-        """Return ``rows`` steps that lie in ``memory`` (..., numbers), one matrix after the other; of each of many."""
+        """Return a history of ``rows`` steps in ``memory`` (..., numbers), one matrix after the other."""
         matrices, start = [], 0
         for width in (FLOWN, BESIDE, N_STATES)[: 3 if estimated else 2]:
             stop = start + rows * width
@@ -44,7 +44,7 @@ class History(NamedTuple):
 
     @staticmethod
     def numbers() -> int:
-        """Return how many numbers a step has."""
+        """Return the number of values of a step."""
         return FLOWN + BESIDE + N_STATES
 
     @property
@@ -54,7 +54,7 @@ class History(NamedTuple):
 
     @property
     def estimate(self) -> np.ndarray:
-        """(n + 1, 9), what the controller was given for the state: measured, or what an estimator makes of that."""
+        """State that the controller receives (n + 1, 9): measured, or estimated if an estimator is enabled."""
         return self.state if self.estimated is None else self.estimated
 
     @property
@@ -74,12 +74,12 @@ class History(NamedTuple):
 
     @property
     def gain_index(self) -> np.ndarray:
-        """(n + 1), of the nested family."""
+        """Index in the nested family (n + 1)."""
         return self.beside[:, GAIN_INDEX]
 
     @property
     def u_unsaturated(self) -> np.ndarray:
-        """(n + 1, 2)."""
+        """Input before saturation (n + 1, 2)."""
         return self.beside[:, U_UNSATURATED:BESIDE]
 
     @property
@@ -89,7 +89,7 @@ class History(NamedTuple):
 
     @property
     def actuator(self) -> np.ndarray:
-        """(n + 1, 2)."""
+        """Input of the actuators (n + 1, 2)."""
         return self.flown[:, ACTUATOR:FLOWN]
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -118,4 +118,4 @@ SIGNALS = (
     "command",
     "actuator",
 )
-"""What a :class:`History` tells of, in the order of the loop."""
+"""Signals of a :class:`History`, in the order of the loop."""
